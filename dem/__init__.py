@@ -1,0 +1,1 @@
+"""Scene, particle, engine, phases and recording of smarticle runs."""

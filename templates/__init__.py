@@ -1,0 +1,1 @@
+"""Template engine: sweeps become run directories, run directories become results."""
