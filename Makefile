@@ -1,0 +1,53 @@
+# Every target sets up what it needs: on a bare Debian 12 with root (or sudo) `make demo` is enough.
+# Times: two cores, packages from a near mirror.
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo validate bench test lint types unit engine format lock clean
+
+BIN := .venv/bin
+STAMP := $(shell date +%Y%m%d-%H%M%S)
+# A test is one thread: threads that find no free core spin, and bits depend on their number.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: ## install everything into the system and .venv (6 min the first time, then at once)
+	@setup/install.sh
+
+demo: setup ## quick comparison with Gravish et al. 2012, figure included (TIME)
+	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
+	@echo "figures:" && find out/demo-$(STAMP) -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.svg'
+
+validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
+	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
+
+bench: setup ## measure speed (minutes)
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
+test: lint types ## all checks and tests, as continuous integration runs them (minutes)
+	$(PYTEST) -m "not validation"
+
+lint: setup ## style: ruff (seconds)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: setup ## types: mypy, strict (seconds; a minute the first time)
+	$(BIN)/mypy
+
+unit: setup ## tests that need no YADE (seconds)
+	$(PYTEST) tests/unit
+
+engine: setup ## tests that run YADE (a minute)
+	$(PYTEST) tests/engine -m "not validation"
+
+format: setup ## rewrite the sources in the project's style
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: ## pin requirements*.txt anew from requirements*.in (2 min)
+	setup/lock.sh
+
+clean: ## remove .venv and caches; results in out/ stay
+	rm -rf .venv build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -not -path './out/*' -prune -exec rm -rf {} +

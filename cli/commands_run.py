@@ -1,0 +1,108 @@
+"""run, plan, schema: one scene."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from cli.parsing import Commands, Parser, add_json
+
+
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    run = commands.add(
+        "run",
+        run_scene,
+        summary="run one scene into one run directory",
+        text="""
+Pours, shakes and relaxes as the scene says. DIR gets the resolved scene, versions, a log, VTK
+frames (open DIR/frames.pvd in ParaView) and HDF5 series, and done.json at the end. Ctrl-C stops
+the run and leaves what was recorded whole. A directory that holds something is never touched.""",
+        examples="""\
+  smarticles run scene.yaml --out runs/a
+  smarticles run scene.yaml --out runs/b --set seed=2 --set phases.2.duration_s=5
+  smarticles run scene.yaml --out runs/c --set fidelity=draft
+""",
+    )
+    _add_scene(run)
+    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="new run directory")
+
+    plan = commands.add(
+        "plan",
+        plan_scene,
+        summary="what a run would do and cost; simulates nothing",
+        text="""
+Shows the phases, what acts in each and why, time step, spheres and the expected wall time.""",
+        examples="""\
+  smarticles plan scene.yaml
+  smarticles plan scene.yaml --set fidelity=reference
+  smarticles plan scene.yaml --json | jq .time_step_s
+""",
+    )
+    _add_scene(plan)
+    add_json(plan)
+
+    commands.add(
+        "schema",
+        print_schema,
+        summary="print the JSON schema of scene files",
+        text="""
+Every key with its unit, default and meaning. Editors use it to complete and check scenes: put
+`# yaml-language-server: $schema=scene.schema.json` on the first line of a scene.""",
+        examples="""\
+  smarticles schema > scene.schema.json
+""",
+    )
+
+
+def _add_scene(parser: Parser) -> None:
+    parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
+    )
+
+
+def run_scene(arguments: argparse.Namespace) -> int:
+    """`smarticles run`."""
+    from dem import run  # noqa: PLC0415  (imports YADE)
+    from dem.scene import load_scene  # noqa: PLC0415
+
+    scene = load_scene(arguments.scene, arguments.set)
+    outcome = run.run_scene(
+        scene,
+        arguments.out,
+        command=arguments.command_line,
+        progress=sys.stderr.isatty(),
+    )
+    print(
+        f"{arguments.out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s\n"
+        f"next: smarticles measure {arguments.out}, smarticles render {arguments.out}"
+    )
+    return 0
+
+
+def plan_scene(arguments: argparse.Namespace) -> int:
+    """`smarticles plan`."""
+    from dem.plan import plan  # noqa: PLC0415
+    from dem.scene import load_scene  # noqa: PLC0415
+
+    planned = plan(load_scene(arguments.scene, arguments.set))
+    if arguments.json:
+        print(json.dumps(planned.to_dict(), indent=2, ensure_ascii=False))
+    else:
+        print(planned.to_text())
+    return 0
+
+
+def print_schema(_: argparse.Namespace) -> int:
+    """`smarticles schema`."""
+    from dem.scene import json_schema  # noqa: PLC0415
+
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    return 0

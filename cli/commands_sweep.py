@@ -1,0 +1,261 @@
+"""sweep, status, resume: many runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import shlex
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.layout import columns
+from cli.parsing import Commands, Parser, add_json, positive_int
+from dem.errors import InputError, RunError
+
+if TYPE_CHECKING:
+    from dem.scene import Scene
+    from templates.expand import Point
+    from templates.folder import Folder, RunStatus
+    from templates.local import Outcome
+
+_FILE_HELP = """
+A sweep file makes many scenes from one template:
+
+  schema_version: 1
+  name: friction
+  template: scene.yaml.j2             # a scene with {{ variables }}, beside this file
+  run_name: "mu{{ friction }}_seed{{ seed }}"
+  constants: {count: 100}             # the same in every run
+  points:                             # any of these; several are crossed with each other
+    grid: {friction: [0.2, 0.4]}      # every combination
+    zip: {a: [1, 2], b: [3, 4]}       # first with first, second with second
+    list: [{c: 1}, {c: 2}]            # written out
+    table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file
+  derived: {half: "(count / 2) | round | int"}
+  repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+
+The same command again takes up where it stopped: finished runs are kept, what an unfinished one
+left is renamed to NAME.stopped-1, and the run starts anew."""
+
+
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    sweep = commands.add(
+        "sweep",
+        run_sweep,
+        summary="make run directories from a template, and start the runs if asked to",
+        text=_FILE_HELP,
+        examples="""\
+  smarticles sweep friction.yaml --dry-run
+  smarticles sweep friction.yaml --out friction               write the scenes, start nothing
+  smarticles sweep friction.yaml --out friction --submit local
+""",
+    )
+    sweep.add_argument("sweep", type=Path, metavar="SWEEP.yaml", help="sweep file")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="directory of the sweep")
+    sweep.add_argument(
+        "--submit",
+        choices=("none", "local"),
+        default="none",
+        help="none: only write (default); local: run on this machine, one run per core",
+    )
+    sweep.add_argument("--dry-run", action="store_true", help="list the runs, write nothing")
+    add_slots(sweep)
+
+    status = commands.add(
+        "status",
+        show_status,
+        summary="what is done, running, failed, missing",
+        text="""
+Reads files only. A run is `interrupted` after Ctrl-C, `stopped` when it was killed.""",
+        examples="""\
+  smarticles status friction
+  smarticles status friction/runs/mu0.2_seed1
+  smarticles status friction --json | jq .counts
+""",
+    )
+    status.add_argument("directory", type=Path, metavar="DIR", help="of a sweep, a study or a run")
+    add_json(status)
+
+    resume = commands.add(
+        "resume",
+        resume_sweep,
+        summary="run what a sweep is missing",
+        text="""
+Keeps finished runs. What an unfinished one left is renamed, not deleted, and the run starts anew.
+For a study, give the study's command again: it also makes the tables and figures.""",
+        examples="""\
+  smarticles resume friction
+""",
+    )
+    resume.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
+    add_slots(resume)
+
+
+def add_slots(parser: Parser) -> None:
+    """Add --jobs."""
+    parser.add_argument(
+        "--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core"
+    )
+
+
+def run_sweep(arguments: argparse.Namespace) -> int:
+    """`smarticles sweep`."""
+    from templates.expand import expand  # noqa: PLC0415
+    from templates.sweep import load_sweep  # noqa: PLC0415
+
+    sweep = load_sweep(arguments.sweep)
+    points = expand(sweep)
+    if arguments.dry_run:
+        print(_listing(points))
+        return 0
+    if arguments.out is None:
+        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
+        raise InputError(msg)
+    folder = make_folder(arguments.sweep, arguments.out, arguments.command_line)
+    if arguments.submit == "none":
+        print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
+        return 0
+    return _run(folder, arguments.jobs)
+
+
+def make_folder(file: Path, out: Path, command: str) -> Folder:
+    """Expand a sweep file into its directory, or take up the directory that holds it already.
+
+    Raises:
+        InputError: the sweep is not valid, or the directory holds something else.
+    """
+    from templates.expand import expand  # noqa: PLC0415
+    from templates.folder import create_folder  # noqa: PLC0415
+    from templates.sweep import load_sweep  # noqa: PLC0415
+
+    sweep = load_sweep(file)
+    return create_folder(
+        out,
+        sweep,
+        expand(sweep),
+        command=command,
+        versions=versions(),
+        expected_s=expected_wall_s,
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of what expands a sweep; each run records those of what computes it."""
+    packages = ("smarticles", "jinja2", "pydantic", "pyyaml")
+    return {"python": platform.python_version(), **{name: version(name) for name in packages}}
+
+
+def expected_wall_s(scene: Scene) -> float:
+    """Expected wall time of a scene [s], on a machine like the one the costs were measured on."""
+    from dem.plan import plan  # noqa: PLC0415
+
+    return float(plan(scene).to_dict()["expected_wall_s"])
+
+
+def _listing(points: Sequence[Point]) -> str:
+    expected = [expected_wall_s(point.scene) for point in points]
+    names = list(points[0].values)
+    header = ["run", *names, "expected wall s"]
+    rows = [
+        [point.name, *(point.values[name] for name in names), round(wall)]
+        for point, wall in zip(points, expected, strict=True)
+    ]
+    total = f"{len(points)} runs, about {sum(expected) / 3600:.1f} core hours"
+    return f"{columns(header, rows)}\n{total}"
+
+
+def show_status(arguments: argparse.Namespace) -> int:
+    """`smarticles status`."""
+    from templates.folder import MANIFEST, count_states, open_folder, run_status  # noqa: PLC0415
+
+    directory: Path = arguments.directory
+    if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
+        runs = [run_status(directory)]
+        name = directory.name
+    else:
+        folder = open_folder(directory)
+        runs, name = folder.status(), folder.name
+    counts = count_states(runs)
+    if arguments.json:
+        content: Mapping[str, object] = {
+            "directory": str(directory),
+            "name": name,
+            "counts": counts,
+            "runs": [run.to_dict() for run in runs],
+        }
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return 0
+    print(_status_table(runs))
+    print(f"{name}: {len(runs)} runs, " + ", ".join(f"{n} {state}" for state, n in counts.items()))
+    return 0
+
+
+def _status_table(runs: Sequence[RunStatus]) -> str:
+    header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
+    return columns(
+        header,
+        [
+            [run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""]
+            for run in runs
+        ],
+    )
+
+
+def resume_sweep(arguments: argparse.Namespace) -> int:
+    """`smarticles resume`."""
+    from templates.folder import open_folder  # noqa: PLC0415
+
+    directory: Path = arguments.directory
+    if (directory / "run.json").is_file():
+        scene = shlex.quote(str(directory / "scene.yaml"))
+        msg = (
+            f"{directory}: is a single run, which cannot go on from the middle; "
+            f"run it anew: smarticles run {scene} --out NEW_DIR"
+        )
+        raise InputError(msg)
+    return _run(open_folder(directory), arguments.jobs)
+
+
+def _run(folder: Folder, slots: int | None) -> int:
+    outcomes = compute(folder, slots)
+    refuse_failures(folder, outcomes)
+    print(f"{folder.path}: all {len(outcomes)} runs are done; next: smarticles measure {folder.path}")
+    return 0
+
+
+def compute(folder: Folder, slots: int | None) -> list[Outcome]:
+    """Run what a sweep is missing, and show how it goes.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C; the message says how to go on.
+    """
+    from rich.console import Console  # noqa: PLC0415
+
+    from templates.display import display_for  # noqa: PLC0415
+    from templates.local import run_folder  # noqa: PLC0415
+
+    try:
+        return run_folder(folder, display_for(Console(stderr=True)), slots=slots)
+    except KeyboardInterrupt:
+        msg = f"finished runs are kept; go on with: {folder.command}"
+        raise KeyboardInterrupt(msg) from None
+
+
+def refuse_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
+    """Say what is missing, if anything is.
+
+    Raises:
+        RunError: a run failed.
+    """
+    failed = [outcome for outcome in outcomes if outcome.status not in ("done", "kept")]
+    if failed:
+        causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
+        msg = (
+            f"{folder.path}: {len(failed)} of {len(outcomes)} runs are missing: {causes}; "
+            f"logs are in {folder.path / 'logs'}, start them again: smarticles resume {folder.path}"
+        )
+        raise RunError(msg)

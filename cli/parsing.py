@@ -1,0 +1,106 @@
+"""argparse with errors that are one line and name the nearest thing that was meant."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+from dem.errors import InputError
+
+Handler = Callable[[argparse.Namespace], int]
+"""Does what a subcommand says; returns the exit status."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises InputError instead of printing its usage first."""
+
+    def __init__(self, **options: Any) -> None:
+        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(allow_abbrev=False, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse the command line.
+
+        Raises:
+            InputError: always.
+        """
+        invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if invalid:
+            known = re.findall(r"[\w-]+", invalid[2])
+            what = message.partition(":")[0].removeprefix("argument ")
+            message = f"{what}: {invalid[1]!r} is not known; {_nearest(invalid[1], known)}"
+        msg = f"{message}; see `{self.prog} --help`"
+        raise InputError(msg)
+
+    def refuse_unknown(self, words: Sequence[str]) -> NoReturn:
+        """Refuse arguments that the command does not have.
+
+        Raises:
+            InputError: always.
+        """
+        word = words[0].partition("=")[0]
+        if not word.startswith("-"):
+            self.error(f"one argument too many: {words[0]!r}")
+        options = [name for action in self._actions for name in action.option_strings]
+        self.error(f"unknown option {word}; {_nearest(word, options)}")
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+
+
+class Commands:
+    """The subcommands of the console command."""
+
+    def __init__(self, parser: Parser) -> None:
+        self._subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
+        self.parsers: dict[str, Parser] = {}
+
+    def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
+        """Add a subcommand.
+
+        Args:
+            name: its name.
+            handler: what does it.
+            summary: one line for the list of commands.
+            text: what it does and what to expect, for its own help.
+            examples: command lines that work, with what they do.
+        """
+        parser: Parser = self._subparsers.add_parser(
+            name,
+            help=summary,
+            description=f"{summary[0].upper()}{summary[1:]}.\n\n{text.strip()}",
+            epilog=f"examples:\n{examples.rstrip()}",
+        )
+        parser.set_defaults(handler=handler)
+        add_debug(parser, default=argparse.SUPPRESS)
+        self.parsers[name] = parser
+        return parser
+
+
+def add_debug(parser: Parser, default: Any = False) -> None:
+    """Add --debug."""
+    parser.add_argument(
+        "--debug", action="store_true", default=default, help="show the traceback of an error"
+    )
+
+
+def add_json(parser: Parser) -> None:
+    """Add --json."""
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+
+
+def positive_int(text: str) -> int:
+    """A whole number from 1."""
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        msg = f"must be a whole number from 1: got {text!r}"
+        raise argparse.ArgumentTypeError(msg)
+    return number

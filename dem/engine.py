@@ -1,0 +1,367 @@
+"""The running YADE simulation behind a small interface. The only module that imports `yade`.
+
+Heights, velocities and forces are in the laboratory frame. One process runs one simulation: YADE keeps its scene in a
+process-wide singleton.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import os
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dem.errors import RunError
+from dem.particle import Particle
+from dem.placement import Poses
+from dem.timestep import ContactLaw
+
+Array = NDArray[np.float64]
+
+POLL_INTERVAL = 2e-4  # s of wall time; O.run(wait=True) would sleep 40 ms
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """The container as the engine builds it. Lengths in m."""
+
+    radius: float
+    height: float
+    facets: int
+
+
+@dataclass(frozen=True)
+class State:
+    """All smarticles at one instant, in the laboratory frame.
+
+    Args:
+        positions: (N, 3) centres of mass [m].
+        rotations: (N, 3, 3) body frame to laboratory frame [1].
+        velocities: (N, 3) of the centres of mass [m/s].
+        angular_velocities: (N, 3) [rad/s].
+    """
+
+    positions: Array
+    rotations: Array
+    velocities: Array
+    angular_velocities: Array
+
+    def points(self, body: Array) -> Array:
+        """Points of the body frame, (k, 3) [m], on every smarticle: (N, k, 3) [m]."""
+        return np.einsum("nij,kj->nki", self.rotations, body) + self.positions[:, None]
+
+
+def yade_version() -> str:
+    """Version of the YADE that runs.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    import_yade()
+    return str(importlib.import_module("yade.config").version)
+
+
+def import_yade() -> Any:
+    """The distribution's YADE, imported into this process.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    # Threads that find no free core spin; a run of seconds would take minutes.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    for folder in (Path("/usr/lib").glob("*/yade*/py")):
+        if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
+            sys.path.append(str(folder))
+    try:
+        sys.stdout.flush()
+        return importlib.import_module("yade")
+    except ImportError as error:
+        msg = (
+            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, "
+            "see environment.md; `smarticles doctor` tells what is missing"
+        )
+        raise RunError(msg) from None
+
+
+class Engine:
+    """A cylinder that smarticles are added to and that time is advanced in.
+
+    Args:
+        particle: one smarticle.
+        cylinder: the container; its floor is at z = 0 at the start.
+        law: contact law.
+        gravity: g, downwards [m/s²].
+        time_step: dt [s].
+        shaken: whether the container will move; the engine that moves it exists only then.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+
+    def __init__(
+        self,
+        *,
+        particle: Particle,
+        cylinder: Cylinder,
+        law: ContactLaw,
+        gravity: float,
+        time_step: float,
+        shaken: bool,
+    ) -> None:
+        import_yade()
+        from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
+        from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
+
+        self._utils, self._yade, self._vector, self._quaternion = utils, wrapper, Vector3, Quaternion
+        self.particle = particle
+        self.time_step = time_step
+        self._gravity = gravity
+        self._omega = wrapper.Omega()
+        self._omega.reset()
+        self._clumps: list[Any] = []
+        self._clump_ids: list[int] = []
+        self._to_body: list[Any] = []
+        self._smarticle_of: dict[int, int] = {}
+        self._add_materials(law)
+        self._add_container(cylinder)
+        self._assemble(law, shaken=shaken)
+
+    # -- construction ------------------------------------------------------------------------------------------
+
+    def _add_materials(self, law: ContactLaw) -> None:
+        # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen
+        # such that the series with a smarticle's gives the wall's. Density zero: the spheres weigh nothing, the
+        # mass comes from a ballast that is taken away again (see `_clump`).
+        between = 2 * law.normal_damping
+        wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
+        for label, damping in (("smarticle", between), ("wall", wall)):
+            self._omega.materials.append(
+                self._yade.ViscElMat(
+                    density=0,
+                    kn=2 * law.normal_stiffness,
+                    ks=2 * law.tangential_stiffness,
+                    cn=damping,
+                    cs=damping * law.tangential_damping,
+                    label=label,
+                )
+            )
+
+    def _add_container(self, cylinder: Cylinder) -> None:
+        # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
+        n = cylinder.facets
+        corner = cylinder.radius * math.sqrt(2 * math.pi / (n * math.sin(2 * math.pi / n)))
+        low, high = -0.1 * cylinder.radius, cylinder.height
+        angles = 2 * math.pi * np.arange(n + 1) / n
+        ring = np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
+        bodies = []
+        for (x0, y0), (x1, y1) in zip(ring[:-1], ring[1:], strict=True):
+            a, b = self._vector(x0, y0, low), self._vector(x1, y1, low)
+            c, d = self._vector(x1, y1, high), self._vector(x0, y0, high)
+            bodies += [
+                self._utils.facet([a, b, c], material="wall", fixed=True),
+                self._utils.facet([a, c, d], material="wall", fixed=True),
+            ]
+        # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
+        bodies.append(self._utils.wall(0, axis=2, sense=1, material="wall"))
+        self._container = [self._omega.bodies.append(body) for body in bodies]
+        self._floor = self._omega.bodies[self._container[-1]].state
+
+    def _assemble(self, law: ContactLaw, *, shaken: bool) -> None:
+        yade = self._yade
+        friction = yade.MatchMaker(
+            matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction)))
+        )
+        self._shaker = yade.HarmonicMotionEngine(ids=self._container, dead=True) if shaken else None
+        collider = yade.InsertionSortCollider(
+            [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb()],
+            verletDist=0.3 * self.particle.radius,
+        )
+        self._omega.engines = [
+            yade.ForceResetter(),
+            collider,
+            yade.InteractionLoop(
+                [yade.Ig2_Sphere_Sphere_ScGeom(), yade.Ig2_Facet_Sphere_ScGeom(), yade.Ig2_Wall_Sphere_ScGeom()],
+                [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)],
+                [yade.Law2_ScGeom_ViscElPhys_Basic()],
+            ),
+            *([self._shaker] if shaken else []),
+            yade.NewtonIntegrator(
+                damping=0, gravity=self._vector(0, 0, -self._gravity), exactAsphericalRot=True
+            ),
+        ]
+        self._omega.dt = self.time_step
+
+    def add(self, poses: Poses) -> None:
+        """Add smarticles at rest."""
+        for position, rotation in zip(poses.positions, poses.rotations, strict=True):
+            self._clump(position, rotation)
+
+    def _clump(self, position: Array, rotation: Rotation) -> None:
+        # Clumped at the origin in the body frame, then moved: YADE's own mass properties of overlapping spheres depend
+        # on the pose and count overlaps twice. The spheres weigh nothing; one ballast member carries the exact mass
+        # and inertia of the boxes and is erased again, which leaves the clump's state alone.
+        omega, particle = self._omega, self.particle
+        spheres = [
+            omega.bodies.append(self._utils.sphere(self._vector(*centre), particle.radius, material="smarticle"))
+            for centre in particle.centres
+        ]
+        ballast = self._yade.Body()
+        ballast.shape = self._yade.Box()
+        ballast.material = omega.materials["smarticle"]
+        ballast.state.mass = particle.boxes.mass
+        ballast.state.inertia = self._vector(*particle.boxes.inertia)
+        ballast_id = omega.bodies.append(ballast)
+        clump_id = omega.bodies.clump([*spheres, ballast_id], discretization=0)
+        omega.bodies.erase(ballast_id)
+        clump = omega.bodies[clump_id].state
+        principal = clump.ori  # YADE sorts the principal axes: a permutation of ours
+        x, y, z, w = rotation.as_quat()
+        clump.ori = self._quaternion(w, x, y, z) * principal
+        clump.pos = self._vector(*position)
+        for sphere, centre in zip(spheres, rotation.apply(particle.centres) + position, strict=True):
+            omega.bodies[sphere].state.pos = self._vector(*centre)
+            self._smarticle_of[sphere] = len(self._clumps)
+        self._clumps.append(clump)
+        self._clump_ids.append(clump_id)
+        self._to_body.append(principal.inverse())
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._omega.time)
+
+    @property
+    def steps(self) -> int:
+        """Steps made."""
+        return int(self._omega.iter)
+
+    def advance(self, steps: int) -> None:
+        """Advance by whole steps.
+
+        Raises:
+            RunError: YADE stopped before the last step.
+        """
+        target = self.steps + steps
+        self._omega.run(steps, False)
+        try:
+            while self._omega.running:
+                time.sleep(POLL_INTERVAL)
+        except BaseException:
+            # Ctrl-C arrives here, while YADE's own thread is at work: let it finish its step.
+            self._omega.pause()
+            raise
+        if self.steps != target:
+            msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
+            raise RunError(msg)
+
+    def shake(self, *, amplitude: float, frequency: float) -> None:
+        """Move the container as z = A sin(2πf t), t from now; it starts at the position where it is.
+
+        Args:
+            amplitude: A [m].
+            frequency: f [Hz].
+        """
+        if self._shaker is None:
+            msg = "the engine was built without a shaker"
+            raise RunError(msg)
+        # YADE sets v(t) = -Aω sin(ωt + φ) before the integrator moves by v dt. Half a step is added to the phase, so
+        # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
+        omega = 2 * math.pi * frequency
+        phase = -math.pi / 2 - omega * (self.time - self.time_step / 2)
+        self._shaker.A = self._vector(0, 0, amplitude)
+        self._shaker.f = self._vector(0, 0, frequency)
+        self._shaker.fi = self._vector(0, 0, phase)
+        self._shaker.dead = False
+
+    def stop_container(self) -> None:
+        """Bring the container to rest where it is."""
+        if self._shaker is not None:
+            self._shaker.dead = True
+        for body in self._container:
+            self._omega.bodies[body].state.vel = self._vector(0, 0, 0)
+
+    # -- state -------------------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """Smarticles present."""
+        return len(self._clumps)
+
+    @property
+    def floor(self) -> float:
+        """Height of the container's floor [m]."""
+        return float(self._floor.pos[2])
+
+    @property
+    def container_velocity(self) -> float:
+        """Vertical velocity of the container [m/s]."""
+        return float(self._floor.vel[2])
+
+    def state(self) -> State:
+        """Poses and velocities of all smarticles."""
+        n = self.count
+        positions, velocities, spins = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+        quaternions = np.empty((n, 4))
+        for k, (clump, to_body) in enumerate(zip(self._clumps, self._to_body, strict=True)):
+            positions[k] = clump.pos
+            velocities[k] = clump.vel
+            spins[k] = clump.angVel
+            q = clump.ori * to_body
+            quaternions[k] = q[0], q[1], q[2], q[3]
+        rotations = Rotation.from_quat(quaternions).as_matrix() if n else np.empty((0, 3, 3))
+        return State(positions, rotations, velocities, spins)
+
+    def contacts(self) -> NDArray[np.int64]:
+        """(N,) int64: how many other smarticles each one touches."""
+        touching: set[tuple[int, int]] = set()
+        for interaction in self._omega.interactions:
+            first = self._smarticle_of.get(interaction.id1)
+            second = self._smarticle_of.get(interaction.id2)
+            if first is None or second is None or not interaction.isReal:
+                continue
+            if interaction.phys.normalForce.squaredNorm() > 0:
+                touching.add((first, second) if first < second else (second, first))
+        result = np.zeros(self.count, dtype=np.int64)
+        for pair in touching:
+            result[list(pair)] += 1
+        return result
+
+    def touches(self) -> NDArray[np.int64]:
+        """(N,) int64: contacts of each smarticle with others and with the container, spheres counted singly."""
+        result = np.zeros(self.count, dtype=np.int64)
+        for interaction in self._omega.interactions:
+            if interaction.isReal:
+                for body in (interaction.id1, interaction.id2):
+                    k = self._smarticle_of.get(body)
+                    if k is not None:
+                        result[k] += 1
+        return result
+
+    def container_force(self) -> Array:
+        """(3,) [N]: force of the smarticles on the container in the last step."""
+        force = np.zeros(3)
+        for body in self._container:
+            force += self._omega.forces.f(body)
+        return force
+
+    def unbalanced_force(self) -> float:
+        """Mean net force on a smarticle, gravity included, over the mean contact force [1]; 0 for a still pile."""
+        value = float(self._utils.unbalancedForce())
+        return value if math.isfinite(value) else math.inf
+
+    def kinetic_energy(self, state: State) -> float:
+        """Translational and rotational kinetic energy [J] of the smarticles in a state."""
+        spins = np.einsum("nij,ni->nj", state.rotations, state.angular_velocities)
+        mass, inertia = self.particle.boxes.mass, self.particle.boxes.inertia
+        return float(0.5 * mass * (state.velocities**2).sum() + 0.5 * (inertia * spins**2).sum())
+

@@ -1,0 +1,51 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from dem.errors import RunError
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` make a file under a temporary name beside `path`, then rename it.
+
+    Args:
+        path: the file that is to appear, or to be replaced.
+        write: called with the temporary path, which keeps the suffix of `path`.
+
+    Raises:
+        RunError: the disk is full or the folder cannot be written; what was at `path` before is untouched.
+    """
+    temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
+    try:
+        write(temporary)
+        os.replace(temporary, path)  # noqa: PTH105 - the atomic call by its name
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        msg = (
+            f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
+            "everything written before is whole"
+        )
+        raise RunError(msg) from error
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text whole."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_whole(path, write)
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON whole."""
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")

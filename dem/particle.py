@@ -1,0 +1,256 @@
+"""One smarticle: three rigid boxes, and the sphere chains that stand for them in contact.
+
+Mass, centre of mass and inertia are those of the boxes, exactly. Spheres only carry contact: how many rows, how far
+apart and how thick is a choice of accuracy against cost (`Fidelity`), and no choice changes the mass or the inertia.
+
+Body frame: origin at the centre of mass, axes along the principal axes of inertia, z along the normal of the plane.
+For the symmetric U (both angles 90°) x runs along the middle link and y from the middle link to the mouth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.errors import InputError
+
+Array = NDArray[np.float64]
+
+LINKS = 3
+
+
+def mean_width_diameter(thickness_normal: float, thickness_in_plane: float) -> float:
+    """Diameter [m] of the round bar with the same mean width as a rectangular one.
+
+    A loose packing of thin bars is set by their excluded volume. Averaged over random orientations the excluded volume
+    of two long bars is proportional to the mean caliper width of the section, perimeter/π, so the equivalent round
+    section has d = 2 (t1 + t2)/π.
+
+    Source: Cauchy's formula for the mean width of a convex section; Onsager's excluded volume of long rods.
+    """
+    return 2.0 * (thickness_normal + thickness_in_plane) / math.pi
+
+
+@dataclass(frozen=True, kw_only=True)
+class Boxes:
+    """Exact geometry of a smarticle. Lengths in m, angles in rad, density in kg/m³.
+
+    `angles` are (α1, α2): 0 is straight, π/2 the U.
+    """
+
+    middle_length: float
+    barb_length: float
+    thickness_normal: float
+    thickness_in_plane: float
+    density: float
+    angles: tuple[float, float] = (math.pi / 2, math.pi / 2)
+
+    @property
+    def lengths(self) -> Array:
+        """(3,) float64 [m]: barb 1, middle link, barb 2."""
+        return np.array([self.barb_length, self.middle_length, self.barb_length])
+
+    @property
+    def volume(self) -> float:
+        """Solid volume t1 t2 (w + 2l) [m³]; the small overlap at the hinges is counted as in the paper."""
+        return float(self.thickness_normal * self.thickness_in_plane * self.lengths.sum())
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return self.density * self.volume
+
+    @cached_property
+    def directions(self) -> Array:
+        """(3, 3) float64: unit vectors, hinge to tip for the barbs, hinge 1 to hinge 2 for the middle link."""
+        a1, a2 = self.angles
+        return np.array(
+            [
+                [-math.cos(a1), math.sin(a1), 0.0],
+                [1.0, 0.0, 0.0],
+                [math.cos(a2), math.sin(a2), 0.0],
+            ]
+        )
+
+    @cached_property
+    def _plain_vertices(self) -> Array:
+        """(4, 3) [m]: tip, hinge, hinge, tip with the middle link's centre as origin, x along the middle link."""
+        half = self.middle_length / 2
+        hinges = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+        tips = hinges + self.barb_length * self.directions[[0, 2]]
+        return np.array([tips[0], hinges[0], hinges[1], tips[1]])
+
+    @cached_property
+    def _plain_centres(self) -> Array:
+        """(3, 3) [m]: link centres in the same frame."""
+        v = self._plain_vertices
+        return (v[:3] + v[1:]) / 2
+
+    @cached_property
+    def plain_centre_of_mass(self) -> Array:
+        """(3,) [m]: centre of mass in the middle link's frame."""
+        lengths = self.lengths
+        return (lengths[:, None] * self._plain_centres).sum(axis=0) / lengths.sum()
+
+    @cached_property
+    def _principal(self) -> tuple[Array, Array]:
+        """Principal moments (3,) [kg m²] and rotation (3, 3): columns are the body axes in the middle link's frame."""
+        tensor = np.zeros((3, 3))
+        for length, direction, centre in zip(
+            self.lengths, self.directions, self._plain_centres, strict=True
+        ):
+            mass = self.density * length * self.thickness_normal * self.thickness_in_plane
+            u, n = direction, np.array([0.0, 0.0, 1.0])
+            v = np.cross(n, u)
+            # Second moments of the box about its centre, along its own axes: length, in-plane, normal.
+            second = mass / 12 * np.array([length**2, self.thickness_in_plane**2, self.thickness_normal**2])
+            axes = np.stack([u, v, n], axis=1)
+            arm = centre - self.plain_centre_of_mass
+            moment = axes @ np.diag(second) @ axes.T + mass * np.outer(arm, arm)
+            tensor += np.trace(moment) * np.eye(3) - moment
+        # z is a principal axis by symmetry, so only the in-plane block is turned: the smallest rotation that
+        # diagonalises it keeps x along the middle link for every symmetric shape.
+        angle = 0.5 * math.atan2(2 * tensor[0, 1], tensor[0, 0] - tensor[1, 1]) if tensor[0, 1] else 0.0
+        if tensor[0, 1] and tensor[0, 0] < tensor[1, 1]:
+            angle -= math.copysign(math.pi / 2, angle)
+        c, s = math.cos(angle), math.sin(angle)
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.diag(rotation.T @ tensor @ rotation).copy(), rotation
+
+    @property
+    def inertia(self) -> Array:
+        """(3,) float64 [kg m²]: principal moments about the centre of mass, along the body axes."""
+        return self._principal[0]
+
+    def to_body(self, points: Array) -> Array:
+        """Points (n, 3) [m] from the middle link's frame to the body frame."""
+        return (points - self.plain_centre_of_mass) @ self._principal[1]
+
+    @cached_property
+    def vertices(self) -> Array:
+        """(4, 3) float64 [m]: barb tip, hinge, hinge, barb tip in the body frame."""
+        return self.to_body(self._plain_vertices)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphereChain:
+    """How spheres are put along the links. Lengths in m.
+
+    Args:
+        rows: rows of spheres side by side across t1, the thickness along the normal.
+        diameter: sphere diameter [m].
+        pitch: largest distance between neighbouring centres along a link [m].
+    """
+
+    rows: int
+    diameter: float
+    pitch: float
+
+
+@dataclass(frozen=True)
+class Particle:
+    """A smarticle as the engine sees it.
+
+    Args:
+        boxes: exact geometry, mass and inertia.
+        chain: the sphere chains that carry contact.
+
+    Raises:
+        InputError: the spheres are thicker than the link is wide, or too many for the link.
+    """
+
+    boxes: Boxes
+    chain: SphereChain
+
+    def __post_init__(self) -> None:
+        d, w = self.chain.diameter, self.boxes.middle_length
+        if d > w / 2:
+            msg = (
+                f"fidelity.diameter_m: spheres of {d:g} m do not fit a middle link of {w:g} m; "
+                f"use at most half its length, {w / 2:g} m"
+            )
+            raise InputError(msg)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """(rows,) [m]: offsets along the normal; outermost spheres reach exactly ±t1/2."""
+        if self.chain.rows == 1:
+            return np.zeros(1)
+        reach = (self.boxes.thickness_normal - self.chain.diameter) / 2
+        return np.linspace(-reach, reach, self.chain.rows)
+
+    def _stations(self, link: int) -> Array:
+        """Distances [m] of the sphere centres along a link, from its start (hinge, or hinge 1)."""
+        d, pitch = self.chain.diameter, self.chain.pitch
+        if link == 1:
+            # The spheres at the hinges belong to the middle link and are centred on the hinge axes. A bar without
+            # barbs has free ends, where the sphere's surface, not its centre, marks the end.
+            inset = 0.0 if self.boxes.barb_length > 0 else d / 2
+            start, end = inset, self.boxes.middle_length - inset
+        else:
+            # One diameter away from the hinge's sphere, so that the links of one smarticle never overlap while they
+            # turn; the last sphere's surface is the tip.
+            start, end = d, self.boxes.barb_length - d / 2
+            if end <= 0:
+                return np.empty(0)
+            if end <= start:
+                return np.array([end])
+        count = max(2, math.ceil((end - start) / pitch - 1e-9) + 1)
+        return np.linspace(start, end, count)
+
+    @cached_property
+    def _layout(self) -> tuple[Array, NDArray[np.int64]]:
+        vertices = self.boxes._plain_vertices
+        starts = vertices[[1, 1, 2]]
+        centres: list[Array] = []
+        links: list[int] = []
+        for link in range(LINKS):
+            for station in self._stations(link):
+                for offset in self._rows:
+                    centre = starts[link] + station * self.boxes.directions[link]
+                    centres.append(centre + np.array([0.0, 0.0, offset]))
+                    links.append(link)
+        return self.boxes.to_body(np.array(centres)), np.array(links, dtype=np.int64)
+
+    @property
+    def centres(self) -> Array:
+        """(S, 3) float64 [m]: sphere centres in the body frame."""
+        return self._layout[0]
+
+    @property
+    def links(self) -> NDArray[np.int64]:
+        """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
+        return self._layout[1]
+
+    @property
+    def radius(self) -> float:
+        """Sphere radius [m]."""
+        return self.chain.diameter / 2
+
+    @property
+    def reach(self) -> float:
+        """Largest distance [m] of any material point, boxes or spheres, from the centre of mass."""
+        spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
+        half = math.hypot(self.boxes.thickness_normal, self.boxes.thickness_in_plane) / 2
+        return max(spheres, float(np.linalg.norm(self.boxes.vertices, axis=1).max()) + half)
+
+    @cached_property
+    def smallest_effective_mass(self) -> float:
+        """Smallest mass [kg] felt by a push on any sphere, over its centre and all directions.
+
+        A force F at r from the centre of mass accelerates the point by (1/m + (r × n)·I⁻¹(r × n)) F along its own
+        direction n; the largest eigenvalue of that mobility over the spheres is the inverse of the result. It rules
+        the stable time step: barb tips are several times lighter than the body.
+        """
+        inverse = 1.0 / self.boxes.inertia
+        mobility = 0.0
+        for x, y, z in self.centres:
+            # A push on a sphere acts at its surface, but the normal passes through the centre.
+            cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            tensor = np.eye(3) / self.boxes.mass + cross.T @ (inverse[:, None] * cross)
+            mobility = max(mobility, float(np.linalg.eigvalsh(tensor)[-1]))
+        return 1.0 / mobility

@@ -1,0 +1,103 @@
+"""What a running simulation tells: `progress.json` for other processes, one line for the person at the terminal."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+INTERVAL = 1.0  # s of wall time between updates
+
+
+@dataclass
+class Progress:
+    """Tells at most once per second.
+
+    Args:
+        folder: the run directory; `progress.json` in it is replaced.
+        total: smarticles in the scene.
+        show: whether to draw a line on standard error.
+    """
+
+    folder: Path
+    total: int
+    show: bool
+    _phase: str = ""
+    _index: int = 0
+    _end: float | None = None
+    _begun: float = field(default_factory=time.monotonic)
+    _phase_begun: tuple[float, float] = (0.0, 0.0)
+    _last: float = -math.inf
+
+    def begin(self, *, index: int, phase: str, start: float, end: float | None) -> None:
+        """A phase begins.
+
+        Args:
+            index: number of the phase.
+            phase: its type.
+            start: simulated time [s].
+            end: when it will end [s], if that is known.
+        """
+        self._index, self._phase, self._end = index, phase, end
+        self._phase_begun = (time.monotonic(), start)
+        self._last = -math.inf
+
+    def update(self, *, time: float, phi: float, count: int) -> None:  # noqa: A002 - simulated time, as everywhere
+        """Simulated time [s], packing fraction [1] and smarticles present."""
+        now = _now()
+        if now - self._last < INTERVAL:
+            return
+        self._last = now
+        shown_phi = phi if math.isfinite(phi) else None
+        data = {
+            "phase": self._phase,
+            "phase_index": self._index,
+            "time_s": time,
+            "end_s": self._end,
+            "phi": shown_phi,
+            "count": count,
+            "wall_s": now - self._begun,
+        }
+        temporary = self.folder / ".progress.partial.json"
+        try:
+            temporary.write_text(json.dumps(data))
+            os.replace(temporary, self.folder / "progress.json")  # noqa: PTH105
+        except OSError:
+            # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
+            return
+        if self.show:
+            self._draw(time, shown_phi, count, now)
+
+    def finish(self) -> None:
+        """The run has ended."""
+        (self.folder / "progress.json").unlink(missing_ok=True)
+        if self.show:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+
+    def _draw(self, simulated: float, phi: float | None, count: int, now: float) -> None:
+        wall_begun, start = self._phase_begun
+        done, left = "", ""
+        if self._end is not None and simulated > start:
+            fraction = (simulated - start) / (self._end - start)
+            bar = "█" * round(20 * fraction)
+            done = f" {bar:<20} {100 * fraction:3.0f} %"
+            left = f"  {(now - wall_begun) * (1 - fraction) / fraction:.0f} s left in this phase"
+        elif self._phase == "deposit":
+            fraction = count / self.total
+            done = f" {'█' * round(20 * fraction):<20} {count}/{self.total}"
+            if 0 < fraction < 1:
+                # The pile grows, and each layer costs as much as the pile under it: time goes as the square.
+                left = f"  about {(now - wall_begun) * (1 / fraction**2 - 1):.0f} s left in this phase"
+        packing = f"  φ {phi:.3f}" if phi is not None else ""
+        line = f"{self._phase:<8}{done}  t = {simulated:.2f} s{packing}{left}"
+        sys.stderr.write(f"\r\x1b[K{line}")
+        sys.stderr.flush()
+
+
+def _now() -> float:
+    return time.monotonic()

@@ -1,0 +1,58 @@
+"""Everything a run writes while time passes: series, frames, progress; and the watchdog that sees the same state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dem.engine import Engine
+from dem.frames import FrameWriter, frame_mesh
+from dem.progress import Progress
+from dem.series import SeriesWriter
+from dem.watchdog import Watchdog
+
+
+@dataclass
+class Recorder:
+    """Records at fixed intervals, counted in steps.
+
+    Args:
+        series: writes the series.
+        frames: writes the frames.
+        watchdog: looks at every sampled state.
+        progress: told at every sample.
+        series_steps: steps between samples.
+        frame_steps: steps between frames; a whole multiple of `series_steps`.
+    """
+
+    series: SeriesWriter
+    frames: FrameWriter
+    watchdog: Watchdog
+    progress: Progress
+    series_steps: int
+    frame_steps: int
+    next_step: int = 0
+
+    def record(self, engine: Engine, phase: int) -> None:
+        """Take what is due at this step; the state is read once for all.
+
+        Raises:
+            RunError: the watchdog stopped the run, or a file cannot be written.
+        """
+        state = engine.state()
+        phi = self.series.sample(engine, state, phase)
+        due = engine.steps % self.frame_steps == 0
+        if due and engine.count:
+            mesh = frame_mesh(
+                engine.particle.boxes,
+                state,
+                contacts=engine.contacts(),
+                time=engine.time,
+                floor=engine.floor,
+                phase=phase,
+            )
+            self.frames.write(mesh, engine.time)
+            self.series.write()
+        # After the frame is written: the last picture of a run that fails is worth having.
+        self.watchdog.check(state, floor=engine.floor, time=engine.time)
+        self.progress.update(time=engine.time, phi=phi, count=engine.count)
+        self.next_step = engine.steps + self.series_steps

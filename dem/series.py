@@ -1,0 +1,122 @@
+"""Time series of a run: sampled often, small, one HDF5 file with units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.engine import Engine, State
+from dem.files import write_whole
+
+FORMAT = 1
+
+COLUMNS: dict[str, tuple[str, str]] = {
+    "time_s": ("s", "simulated time"),
+    "phase": ("1", "index of the phase in the scene"),
+    "count": ("1", "smarticles in the container"),
+    "container_z_m": ("m", "height of the container's floor"),
+    "container_velocity_m_per_s": ("m/s", "vertical velocity of the container"),
+    "container_force_N": (
+        "N",
+        "force of the smarticles on the container (x, y, z), mean since the sample before, from the momentum balance",
+    ),
+    "com_height_m": ("m", "mean height of the centres of mass above the floor"),
+    "kinetic_energy_J": ("J", "translational and rotational kinetic energy of the smarticles"),
+    "max_speed_m_per_s": ("m/s", "largest speed of a centre of mass"),
+    "unbalanced_force": ("1", "mean net force on a smarticle over the mean contact force"),
+    "packing_fraction": ("1", "N V_s / (pi r² z), z the second-highest centre of mass above the floor"),
+}
+
+
+def packing_fraction(heights: NDArray[np.float64], *, solid_volume: float, radius: float) -> float:
+    """φ by the second-highest centre of mass, the paper's definition; NaN for fewer than two smarticles.
+
+    Args:
+        heights: (N,) centres of mass above the floor [m].
+        solid_volume: of one smarticle [m³].
+        radius: of the container [m].
+    """
+    if len(heights) < 2:
+        return math.nan
+    height = np.partition(heights, -2)[-2]
+    return float(len(heights) * solid_volume / (math.pi * radius**2 * height)) if height > 0 else math.nan
+
+
+@dataclass
+class SeriesWriter:
+    """Samples the engine and rewrites `series.h5` whole when asked.
+
+    Args:
+        folder: the run directory.
+        radius: of the container [m].
+        gravity: g [m/s²].
+        attributes: root attributes: scene hash, seed.
+    """
+
+    folder: Path
+    radius: float
+    gravity: float
+    attributes: dict[str, Any]
+    _rows: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in COLUMNS})
+    _before: tuple[float, NDArray[np.float64]] | None = None
+
+    def sample(self, engine: Engine, state: State, phase: int) -> float:
+        """Take one sample.
+
+        Returns:
+            The packing fraction [1].
+        """
+        boxes = engine.particle.boxes
+        heights = state.positions[:, 2] - engine.floor
+        phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
+        row = {
+            "time_s": engine.time,
+            "phase": phase,
+            "count": engine.count,
+            "container_z_m": engine.floor,
+            "container_velocity_m_per_s": engine.container_velocity,
+            "container_force_N": self._mean_force(engine, boxes.mass * state.velocities.sum(axis=0)),
+            "com_height_m": heights.mean() if len(heights) else math.nan,
+            "kinetic_energy_J": engine.kinetic_energy(state),
+            "max_speed_m_per_s": np.linalg.norm(state.velocities, axis=1).max(initial=0.0),
+            "unbalanced_force": engine.unbalanced_force(),
+            "packing_fraction": phi,
+        }
+        for name, value in row.items():
+            self._rows[name].append(value)
+        return phi
+
+    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+        # What the container received is what the smarticles lost to it: -(ΔP/Δt) - M g ẑ. Exact over any interval,
+        # where a sampled contact force would alias the shaking and miss the impacts between samples. Smarticles are
+        # added at rest, so a layer that was poured in between brings no momentum; its weight acts since it is there.
+        time, before = engine.time, self._before
+        self._before = (time, momentum)
+        if before is None or time <= before[0]:
+            return np.full(3, math.nan)
+        weight = np.array([0.0, 0.0, engine.particle.boxes.mass * engine.count * self.gravity])
+        return -(momentum - before[1]) / (time - before[0]) - weight
+
+    def write(self) -> None:
+        """Rewrite the file with all samples.
+
+        Raises:
+            RunError: it cannot be written.
+        """
+        write_whole(self.folder / "series.h5", self._write)
+
+    def _write(self, path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file.attrs["format"] = FORMAT
+            for name, value in self.attributes.items():
+                file.attrs[name] = value
+            for name, (unit, description) in COLUMNS.items():
+                dataset = file.create_dataset(name, data=np.array(self._rows[name]))
+                dataset.attrs["unit"] = unit
+                dataset.attrs["description"] = description

@@ -1,0 +1,122 @@
+"""Contact stiffness, damping and the stable time step, from masses and inertias rather than from sphere size."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem.errors import InputError
+from dem.particle import Particle
+from dem.scene import Scene
+
+# Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
+# smarticle's chain touches two of them; more act along different directions and do not add up in one mode.
+CONTACTS_AT_A_TIP = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactLaw:
+    """Linear spring, dashpot and Coulomb friction of one contact.
+
+    Args:
+        normal_stiffness: kn [N/m].
+        tangential_stiffness: ks [N/m].
+        normal_damping: cn between smarticles [N s/m].
+        wall_damping: cn against the container [N s/m].
+        tangential_damping: cs over cn [1].
+        friction: Coulomb coefficient between smarticles [1].
+        wall_friction: Coulomb coefficient against the container [1].
+    """
+
+    normal_stiffness: float
+    tangential_stiffness: float
+    normal_damping: float
+    wall_damping: float
+    tangential_damping: float
+    friction: float
+    wall_friction: float
+
+
+def typical_effective_mass(particle: Particle) -> float:
+    """Harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
+
+    The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace.
+    """
+    inverse = 1.0 / particle.boxes.inertia
+    x, y, z = particle.centres.T
+    rotation = (
+        inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)
+    ) / 3
+    return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
+
+
+def damping_ratio(restitution: float) -> float:
+    """Damping ratio ζ [1] of a linear spring and dashpot whose rebound has the given restitution.
+
+    Source: e = exp(-πζ/√(1-ζ²)), solved for ζ; the contact ends where the spring is back at zero length.
+    """
+    logarithm = math.log(restitution)
+    return -logarithm / math.hypot(math.pi, logarithm)
+
+
+def contact_law(scene: Scene) -> ContactLaw:
+    """The contact law of a scene; restitution holds at the typical effective mass of a pair."""
+    stiffness = scene.fidelity.stiffness_N_per_m
+    single = typical_effective_mass(scene.particle)
+    zeta = damping_ratio(scene.contact.restitution)
+    return ContactLaw(
+        normal_stiffness=stiffness,
+        tangential_stiffness=stiffness * scene.contact.tangential_stiffness_ratio,
+        normal_damping=2 * zeta * math.sqrt(stiffness * single / 2),
+        wall_damping=2 * zeta * math.sqrt(stiffness * single),
+        tangential_damping=scene.contact.tangential_damping_ratio,
+        friction=scene.contact.friction_smarticle,
+        wall_friction=scene.contact.friction_wall,
+    )
+
+
+def stable_time_step(particle: Particle, law: ContactLaw) -> float:
+    """Largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
+
+    Four modes, each a mass on parallel springs and dashpots: the lightest points of two smarticles against each other
+    and against the container, `CONTACTS_AT_A_TIP` contacts each; and a smarticle lying flat, every sphere in contact,
+    on the container and on another one. The flat modes rule: a resting smarticle that breaks them does not blow up but
+    chatters for ever, which shakes the pile and lets it compact. YADE takes the dashpot's velocity half a step late,
+    so a mode is stable while ω²dt² + 2c dt ≤ 4 with ω² = K/m, c = C/m.
+
+    Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1.
+    """
+    lightest, mass, spheres = particle.smallest_effective_mass, particle.boxes.mass, len(particle.centres)
+    modes = (
+        (lightest / 2, CONTACTS_AT_A_TIP, law.normal_damping),
+        (lightest, CONTACTS_AT_A_TIP, law.wall_damping),
+        (mass / 2, spheres, law.normal_damping),
+        (mass, spheres, law.wall_damping),
+    )
+    steps = []
+    for moved, contacts, damping in modes:
+        squared = contacts * law.normal_stiffness / moved
+        rate = contacts * damping / moved
+        steps.append((math.sqrt(rate**2 + 4 * squared) - rate) / squared)
+    return min(steps)
+
+
+def time_step(scene: Scene) -> float:
+    """The time step [s] of a scene, a whole fraction of its recording intervals.
+
+    Raises:
+        InputError: the given `time_step_s` is above the stable one, or the recording intervals do not fit.
+    """
+    stable = stable_time_step(scene.particle, contact_law(scene))
+    given = scene.fidelity.time_step_s
+    if given is not None and given > stable:
+        msg = (
+            f"fidelity.time_step_s: {given:.3g} s is above the stable step {stable:.3g} s of this smarticle at "
+            f"{scene.fidelity.stiffness_N_per_m:g} N/m; use a smaller step or leave it out"
+        )
+        raise InputError(msg)
+    wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
+    series = scene.recording.series_interval_s
+    return series / max(1, math.ceil(series / wanted * (1 - 1e-12)))

@@ -1,0 +1,65 @@
+"""Frames and series in; measures, tables, figures and pictures out.
+
+Readers take a run directory (see ARCHITECTURE.md); measures are pure functions of NumPy arrays and
+return frozen results. Lengths are in metres, times in seconds.
+"""
+
+from postprocess.averages import Mean, mean_with_error
+from postprocess.contacts import ContactPairs, contact_pairs, neighbours_in_contact
+from postprocess.entanglement import (
+    CrossingPairs,
+    Entanglement,
+    LinkedPairs,
+    crossing_pairs,
+    entanglement,
+    has_plane,
+    link_crossings,
+    linking_pairs,
+)
+from postprocess.errors import UndefinedMeasureError
+from postprocess.frames import Frame, FrameSequence, read_frame, read_frames
+from postprocess.geometry import centres_of_mass
+from postprocess.heights import Heights, heights, material_height
+from postprocess.manifest import PhaseRecord, RunManifest, read_run
+from postprocess.measure import PackingChange, measure_run, packing_change, summarise_run
+from postprocess.packing import DEFINITIONS, PackingFraction, packing_fraction
+from postprocess.series import Series, read_series
+from postprocess.tables import write_table
+
+__all__ = [
+    "DEFINITIONS",
+    "ContactPairs",
+    "CrossingPairs",
+    "Entanglement",
+    "Frame",
+    "FrameSequence",
+    "Heights",
+    "LinkedPairs",
+    "Mean",
+    "PackingChange",
+    "PackingFraction",
+    "PhaseRecord",
+    "RunManifest",
+    "Series",
+    "UndefinedMeasureError",
+    "centres_of_mass",
+    "contact_pairs",
+    "crossing_pairs",
+    "entanglement",
+    "has_plane",
+    "heights",
+    "link_crossings",
+    "linking_pairs",
+    "material_height",
+    "mean_with_error",
+    "measure_run",
+    "neighbours_in_contact",
+    "packing_change",
+    "packing_fraction",
+    "read_frame",
+    "read_frames",
+    "read_run",
+    "read_series",
+    "summarise_run",
+    "write_table",
+]

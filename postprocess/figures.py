@@ -1,0 +1,236 @@
+"""The look of every figure: size, colours, footer, and how a figure reaches the disk whole.
+
+A figure is drawn inside `style()`, gets its provenance from `add_footer` and is written by `save`.
+"""
+
+from __future__ import annotations
+
+import os
+import textwrap
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+
+with warnings.catch_warnings():
+    # The distribution's mpl_toolkits shadows ours where the environment sees system packages; no
+    # figure here is three-dimensional.
+    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
+    import matplotlib.figure
+    import matplotlib.style
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN_WIDTH = 3.5
+"""Width of a journal column [inch]."""
+
+RESOLUTION = 300
+"""Of bitmaps [dots per inch]."""
+
+BLACK = "#1a1a1a"
+BLUE = "#0072b2"
+ORANGE = "#d55e00"
+GREY = "#6e6e6e"
+"""Okabe and Ito's colours: told apart with every common colour blindness, and in grey print."""
+
+_STYLE = {
+    "axes.edgecolor": BLACK,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "errorbar.capsize": 2.0,
+    "figure.dpi": RESOLUTION,
+    "font.family": "DejaVu Sans",
+    "font.size": 7.5,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 6.5,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 4.0,
+    "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,
+    "savefig.dpi": RESOLUTION,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "smarticles",
+    "xtick.direction": "out",
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+}
+
+_FOOTER_SIZE = 4.6
+_FOOTER_LINE = 0.082  # inch per line of footer
+_FOOTER_COLUMNS = 104  # characters of that size across one column width
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib's settings for our figures, restored afterwards."""
+    with rc_context({**_STYLE}):
+        yield
+
+
+def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:
+    """An empty figure with one pair of axes, drawn by Agg whatever the machine's display.
+
+    Args:
+        width: [inch].
+        height: of the axes with their labels, without the footer [inch].
+
+    Returns:
+        The figure and its axes.
+    """
+    figure = matplotlib.figure.Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure, figure.add_subplot()
+
+
+def add_footer(figure: Figure, lines: Sequence[str]) -> None:
+    """Put the provenance below the axes; the figure grows by the height of the text.
+
+    Args:
+        figure: drawn completely; its layout is settled here.
+        lines: one statement each; a long one is broken.
+    """
+    width, height = figure.get_size_inches()
+    columns = int(_FOOTER_COLUMNS * width / COLUMN_WIDTH)
+    text = [part for line in lines for part in textwrap.wrap(line, columns) or [""]]
+    below = _FOOTER_LINE * len(text) + 0.06
+    figure.set_size_inches(width, height + below)
+    base = below / (height + below)
+    figure.set_layout_engine("constrained", rect=(0.0, base, 1.0, 1.0 - base))
+    figure.text(
+        0.015,
+        0.03 / (height + below),
+        "\n".join(text),
+        fontsize=_FOOTER_SIZE,
+        color=GREY,
+        va="bottom",
+        ha="left",
+        linespacing=1.25,
+        parse_math=False,
+    )
+
+
+def save(
+    figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")
+) -> list[Path]:
+    """Write a figure in several formats, each beside and then renamed.
+
+    The files hold no date: the same figure gives the same bytes.
+
+    Args:
+        figure: to write.
+        path: without suffix.
+        formats: suffixes without the dot.
+
+    Returns:
+        The files written.
+    """
+    metadata: dict[str, dict[str, str | None]] = {
+        "svg": {"Date": None},
+        "pdf": {"CreationDate": None, "ModDate": None},
+    }
+    written = []
+    for suffix in formats:
+        target = path.with_name(f"{path.name}.{suffix}")
+        with whole_file(target) as temporary:
+            figure.savefig(temporary, format=suffix, metadata=metadata.get(suffix))
+        written.append(target)
+    return written
+
+
+@contextmanager
+def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
+    """A temporary path beside `path`, renamed to it when the block ends well.
+
+    Args:
+        path: the file to be made.
+        overwrite: whether an existing file may be replaced.
+
+    Raises:
+        InputError: the file exists and must not be replaced, or its folder does not exist.
+    """
+    refuse_to_overwrite(path, overwrite=overwrite)
+    if not path.parent.is_dir():
+        msg = f"{path}: the folder {path.parent} does not exist: create it or choose another output"
+        raise InputError(msg)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
+    """Complain early about an output that exists.
+
+    Raises:
+        InputError: the file exists and `overwrite` is false.
+    """
+    if path.exists() and not overwrite:
+        msg = f"{path}: exists already: choose another output, or allow overwriting"
+        raise InputError(msg)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CountColours:
+    """Colours for whole numbers 0 … top, the last one open-ended if `clipped`."""
+
+    colours: Colormap
+    norm: BoundaryNorm
+    ticks: tuple[int, ...]
+    labels: tuple[str, ...]
+
+
+def sequence(colours: int, *, first: float = 0.10, last: float = 0.92) -> list[str]:
+    """Equally spaced colours of viridis without its darkest and lightest ends.
+
+    Args:
+        colours: how many.
+        first: place of the first one in the map, 0 … 1.
+        last: place of the last one.
+
+    Returns:
+        Hexadecimal colours, dark to light.
+    """
+    steps = [first + (last - first) * i / max(colours - 1, 1) for i in range(colours)]
+    return [matplotlib.colors.to_hex(matplotlib.colormaps["viridis"](s)) for s in steps]
+
+
+def count_colours(largest: int, *, classes: int = 9) -> CountColours:
+    """One colour per whole number, with a neutral grey for zero.
+
+    Args:
+        largest: the largest number to show.
+        classes: the most colours; larger numbers share the last one.
+
+    Returns:
+        Colour map, norm, and the ticks of a colour bar.
+    """
+    top = max(1, min(largest, classes - 1))
+    colours = ["#c9c9c9", *sequence(top)]
+    labels = [str(i) for i in range(top + 1)]
+    if largest > top:
+        labels[-1] = f"≥ {top}"
+    return CountColours(
+        colours=ListedColormap(colours),
+        norm=BoundaryNorm([i - 0.5 for i in range(top + 2)], top + 1),
+        ticks=tuple(range(top + 1)),
+        labels=tuple(labels),
+    )

@@ -1,0 +1,92 @@
+"""Lengths, centres and planes of smarticles given by their four vertices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dem.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
+    """The vertices as an array that every measure can rely on.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        (N, 4, 3) float64 [m].
+
+    Raises:
+        InputError: Wrong shape, a value that is not finite, or a smarticle without any length.
+    """
+    array = np.asarray(vertices, dtype=np.float64)
+    if array.ndim != 3 or array.shape[1:] != (4, 3):
+        msg = f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices"
+        raise InputError(msg)
+    if not np.all(np.isfinite(array)):
+        bad = int(np.nonzero(~np.isfinite(array).all(axis=(1, 2)))[0][0])
+        msg = f"vertices must be finite [m]: smarticle {bad} is not; the run has blown up there"
+        raise InputError(msg)
+    if np.any(link_lengths(array).sum(axis=1) <= 0):
+        bad = int(np.argmin(link_lengths(array).sum(axis=1)))
+        msg = f"vertices of smarticle {bad} coincide (0 m long); leave it out"
+        raise InputError(msg)
+    return array
+
+
+def link_lengths(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) [m], lengths of barb 1, middle link and barb 2, of (N, 4, 3) [m] vertices."""
+    lengths: NDArray[np.float64] = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+    return lengths
+
+
+def centres_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
+    """Centres of mass of smarticles whose three links have the same cross-section.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        (N, 3) [m].
+
+    Raises:
+        InputError: See `checked_vertices`.
+    """
+    vertices = checked_vertices(vertices)
+    weights = link_lengths(vertices)[:, :, None]
+    middles = (vertices[:, :-1] + vertices[:, 1:]) / 2
+    centres: NDArray[np.float64] = (weights * middles).sum(axis=1) / weights.sum(axis=1)
+    return centres
+
+
+def bounding_spheres(
+    vertices: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres (N, 3) [m] and radii (N,) [m] of spheres that hold all four vertices of each."""
+    centres = vertices.mean(axis=1)
+    radii = np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
+    return centres, radii
+
+
+def plane_frames(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Right-handed axes of the best-fitting plane of each smarticle.
+
+    The normal is the direction of least spread of the four vertices: unlike a cross product of
+    two links it is as good for every shape, and it averages over slightly bent hinges. Of a
+    straight smarticle it is some vector across it.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+
+    Returns:
+        (N, 3, 3), rows: two axes in the plane and the normal.
+    """
+    _, _, axes = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True))
+    axes[np.linalg.det(axes) < 0, 2] *= -1
+    frames: NDArray[np.float64] = axes
+    return frames

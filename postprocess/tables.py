@@ -1,0 +1,51 @@
+"""Tables on disk, whole or absent."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
+    """Writes a table as CSV beside its place and renames it, so that it is whole or absent.
+
+    Args:
+        table: The table; its column names carry the units.
+        path: Where to, ending in `.csv`.
+        overwrite: Whether an existing file may be replaced.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InputError: The file exists already, its folder does not, or it is no `.csv`.
+    """
+    path = Path(path)
+    if path.suffix != ".csv":
+        msg = f"cannot write table {path}: tables are CSV; let its name end in .csv"
+        raise InputError(msg)
+    if path.exists() and not overwrite:
+        msg = f"cannot write table {path}: it exists; choose another name or ask to overwrite it"
+        raise InputError(msg)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        msg = f"cannot write table {path}: {error.strerror}; choose a folder that can be written"
+        raise InputError(msg) from None
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
+            table.to_csv(file, index=False)
+        # mkstemp makes files private; a table is as readable as any other new file.
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Regenerate the pins in requirements.txt and requirements-dev.txt from the two .in files.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+/usr/bin/python3 -m venv "$scratch/venv"
+pip=("$scratch/venv/bin/python" -m pip -qq --disable-pip-version-check --no-input)
+pins() { "${pip[@]}" freeze --all --exclude pip | sort -f; }
+
+"${pip[@]}" install --upgrade setuptools -r requirements.in
+pins >"$scratch/run"
+"${pip[@]}" install -r "$scratch/run" -r requirements-dev.in
+pins >"$scratch/all"
+
+{
+    echo "# Made by 'make lock' from requirements.in; setuptools builds the project itself."
+    cat "$scratch/run"
+} >requirements.txt
+{
+    echo "# Made by 'make lock' from requirements-dev.in; used together with requirements.txt."
+    comm -13 <(sort "$scratch/run") <(sort "$scratch/all") | sort -f
+} >requirements-dev.txt

@@ -1,0 +1,394 @@
+"""Run many runs on this machine: one process each, at most one per core, the longest first.
+
+A run that fails does not stop the others. Ctrl-C stops all of them in an orderly way.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Literal, Protocol
+
+from templates.folder import Folder
+from templates.texts import read_json
+
+Ending = Literal["done", "kept", "failed", "interrupted"]
+
+# Threads that find no free core spin: one thread per run, set before its interpreter starts.
+ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A run to be started.
+
+    Args:
+        name: its name.
+        command: what to start.
+        directory: the run directory it writes.
+        log: file for what it prints.
+        expected_s: expected wall time [s].
+    """
+
+    name: str
+    command: tuple[str, ...]
+    directory: Path
+    log: Path
+    expected_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a run ended.
+
+    Args:
+        name: its name.
+        status: `kept` was finished before.
+        cause: why it failed, or None.
+        wall_s: wall time [s].
+    """
+
+    name: str
+    status: Ending
+    cause: str | None = None
+    wall_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """Where a run that is being computed stands; None is unknown.
+
+    Args:
+        name: its name.
+        wall_s: wall time so far [s].
+        expected_s: expected wall time [s].
+        phase: type of the phase it is in.
+        time_s: simulated time [s].
+        end_s: simulated time at which the run ends [s].
+        phi: packing fraction so far.
+    """
+
+    name: str
+    wall_s: float
+    expected_s: float
+    phase: str | None = None
+    time_s: float | None = None
+    end_s: float | None = None
+    phi: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """All runs at one moment.
+
+    Args:
+        total: how many runs there are, kept ones included.
+        ended: how many of them ended, however.
+        failed: how many failed.
+        running: those being computed.
+        left_s: wall time left [s], as far as can be told.
+    """
+
+    total: int
+    ended: int
+    failed: int
+    running: tuple[Progress, ...]
+    left_s: float
+
+
+class Display(Protocol):
+    """Shows a person how the runs go."""
+
+    def __enter__(self) -> Display: ...
+
+    def __exit__(self, *exception: object) -> None: ...
+
+    def started(self, job: Job) -> None:
+        """A run was started."""
+
+    def ended(self, outcome: Outcome) -> None:
+        """A run ended, or was found finished."""
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Some time has passed."""
+
+
+def slots_here() -> int:
+    """How many runs this process may have at once: one per core it is allowed to use."""
+    return len(os.sched_getaffinity(0))
+
+
+def smarticles_command(scene: Path, directory: Path) -> tuple[str, ...]:
+    """The command that runs one scene into one run directory, with this interpreter."""
+    # -P: a file called like a library in the working directory must not be imported.
+    return (
+        *(sys.executable, "-P", "-m", "cli", "run", str(scene.resolve())),
+        *("--out", str(directory.resolve())),
+    )
+
+
+def run_folder(
+    folder: Folder,
+    display: Display,
+    *,
+    slots: int | None = None,
+    command: Callable[[Path, Path], Sequence[str]] = smarticles_command,
+    timing: Timing | None = None,
+) -> list[Outcome]:
+    """Run what a sweep's directory is missing.
+
+    Finished runs are kept, unfinished ones set aside and run anew.
+
+    Args:
+        folder: the sweep's directory.
+        display: shows how it goes.
+        slots: how many runs at once; by default one per core.
+        command: (scene file, run directory) -> command of one run.
+        timing: intervals of the runner.
+
+    Returns:
+        One outcome per run, in the manifest's order.
+
+    Raises:
+        InputError: another process computes this sweep already.
+        KeyboardInterrupt: Ctrl-C; all runs were stopped.
+    """
+    outcomes: dict[str, Outcome] = {}
+    jobs = []
+    with folder.lock() as lock, display:
+        for entry in folder.entries:
+            if folder.is_done(entry):
+                outcomes[entry.name] = Outcome(name=entry.name, status="kept")
+                display.ended(outcomes[entry.name])
+                continue
+            folder.set_aside(entry)
+            jobs.append(
+                Job(
+                    name=entry.name,
+                    command=tuple(command(folder.scene(entry), folder.run(entry))),
+                    directory=folder.run(entry),
+                    log=folder.log(entry),
+                    expected_s=entry.expected_s,
+                )
+            )
+        runner = _Runner(
+            display=display,
+            slots=slots or slots_here(),
+            timing=timing or Timing(),
+            inherited=(lock,),
+            kept=len(outcomes),
+            pending=sorted(jobs, key=lambda job: -job.expected_s),
+        )
+        outcomes |= {outcome.name: outcome for outcome in runner.run()}
+    return [outcomes[entry.name] for entry in folder.entries]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """Intervals of the runner [s].
+
+    Args:
+        poll_s: between looks at the processes.
+        grace_s: between asking a process to stop and making it.
+    """
+
+    poll_s: float = 0.25
+    grace_s: float = 60.0
+
+
+@dataclass(kw_only=True)
+class _Active:
+    job: Job
+    process: subprocess.Popen[bytes]
+    output: IO[bytes]
+    started: float
+
+    @property
+    def wall_s(self) -> float:
+        return time.monotonic() - self.started
+
+
+@dataclass(kw_only=True)
+class _Runner:
+    display: Display
+    slots: int
+    timing: Timing
+    inherited: tuple[int, ...]
+    kept: int
+    pending: list[Job]
+    active: list[_Active] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
+    # (expected, measured) wall time [s] of the runs that finished here.
+    finished: list[tuple[float, float]] = field(default_factory=list)
+
+    def run(self) -> list[Outcome]:
+        try:
+            while self.pending or self.active:
+                while self.pending and len(self.active) < self.slots:
+                    self._start(self.pending.pop(0))
+                time.sleep(self.timing.poll_s)
+                self._collect()
+                self.display.update(self._snapshot())
+        finally:
+            # Ctrl-C, or a display that failed: no process outlives its runner.
+            self._stop()
+        return self.outcomes
+
+    def _start(self, job: Job) -> None:
+        job.log.parent.mkdir(parents=True, exist_ok=True)
+        job.directory.parent.mkdir(parents=True, exist_ok=True)
+        output = job.log.open("wb")
+        try:
+            process = subprocess.Popen(
+                job.command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=_environment(),
+                pass_fds=self.inherited,
+                # Ctrl-C at the terminal reaches this process only, which then asks each run once.
+                start_new_session=True,
+            )
+        except BaseException:
+            output.close()
+            raise
+        self.active.append(
+            _Active(job=job, process=process, output=output, started=time.monotonic())
+        )
+        self.display.started(job)
+
+    def _collect(self) -> None:
+        for run in [run for run in self.active if run.process.poll() is not None]:
+            self.active.remove(run)
+            run.output.close()
+            outcome = _outcome(run.job, run.process.returncode, run.wall_s)
+            if outcome.status == "done":
+                self.finished.append((run.job.expected_s, outcome.wall_s))
+            self.outcomes.append(outcome)
+            self.display.ended(outcome)
+
+    def _stop(self) -> None:
+        """Ask every run to stop, wait, insist; a second Ctrl-C does not wait."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+            for run in self.active:
+                with contextlib.suppress(ProcessLookupError):
+                    run.process.send_signal(number)
+            deadline = time.monotonic() + self.timing.grace_s
+            # A second Ctrl-C means: do not wait.
+            with contextlib.suppress(KeyboardInterrupt):
+                while self.active and time.monotonic() < deadline:
+                    self._collect()
+                    time.sleep(min(0.05, self.timing.poll_s))
+            if not self.active:
+                return
+
+    def _snapshot(self) -> Snapshot:
+        running = tuple(_progress(run) for run in self.active)
+        # How much slower this machine is than expected: from finished runs, and from those overdue.
+        overdue = [(run.expected_s, run.wall_s) for run in running if run.wall_s > run.expected_s]
+        known = [*self.finished, *overdue]
+        expected = sum(pair[0] for pair in known)
+        ratio = sum(pair[1] for pair in known) / expected if expected > 0 else 1.0
+        left = time_left(
+            [max(run.expected_s * ratio - run.wall_s, 0.0) for run in running],
+            [job.expected_s * ratio for job in self.pending],
+            self.slots,
+        )
+        return Snapshot(
+            total=self.kept + len(self.outcomes) + len(self.active) + len(self.pending),
+            ended=self.kept + len(self.outcomes),
+            failed=sum(outcome.status != "done" for outcome in self.outcomes),
+            running=running,
+            left_s=left,
+        )
+
+
+def time_left(running: Sequence[float], pending: Sequence[float], slots: int) -> float:
+    """Wall time [s] until all is done; each pending run, in order, takes the slot free first.
+
+    Args:
+        running: wall time that each active run still needs [s].
+        pending: wall time of each run not yet started [s], in the order of their start.
+        slots: how many run at once.
+    """
+    free_at = [*running, *([0.0] * (slots - len(running)))]
+    heapq.heapify(free_at)
+    for wall_s in pending:
+        heapq.heappush(free_at, heapq.heappop(free_at) + wall_s)
+    return max(free_at)
+
+
+def _environment() -> dict[str, str]:
+    environment = {**os.environ, **ONE_THREAD}
+    root = Path(__file__).resolve().parent.parent
+    if "site-packages" not in root.parts and "dist-packages" not in root.parts:
+        # A source tree that is not installed: runs use the same code as this process.
+        paths = [str(root), environment.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    return environment
+
+
+def _progress(run: _Active) -> Progress:
+    said = read_json(run.job.directory / "progress.json") or {}
+
+    def number(key: str) -> float | None:
+        value = said.get(key)
+        return float(value) if isinstance(value, int | float) else None
+
+    phase = said.get("phase")
+    return Progress(
+        name=run.job.name,
+        wall_s=run.wall_s,
+        expected_s=run.job.expected_s,
+        phase=phase if isinstance(phase, str) else None,
+        time_s=number("time_s"),
+        end_s=number("end_s"),
+        phi=number("phi"),
+    )
+
+
+def _outcome(job: Job, returncode: int, wall_s: float) -> Outcome:
+    failed = read_json(job.directory / "failed.json") or {}
+    status: Ending
+    if returncode == 0 and (job.directory / "done.json").is_file():
+        return Outcome(name=job.name, status="done", wall_s=wall_s)
+    if failed.get("status") == "interrupted" or returncode in (130, -signal.SIGINT):
+        status, cause = "interrupted", "interrupted"
+    else:
+        status, cause = "failed", str(failed.get("cause") or _last_words(job, returncode))
+    return Outcome(name=job.name, status=status, cause=cause, wall_s=wall_s)
+
+
+def _last_words(job: Job, returncode: int) -> str:
+    """Why a process without `failed.json` ended: its error line, else its end and last line."""
+    try:
+        lines = job.log.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    for line in lines:
+        if line.startswith("smarticles: error: "):
+            return line.removeprefix("smarticles: error: ")
+    if returncode < 0:
+        name = signal.Signals(-returncode).name
+        reason = f"killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
+    elif returncode == 0:
+        reason = "ended without done.json"
+    else:
+        reason = f"exit status {returncode}"
+    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+    return f"{reason}: {last}" if last else f"{reason}, without a word; see {job.log}"
+
+
+def iterate_causes(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """`NAME: cause` for the runs that are not done."""
+    for outcome in outcomes:
+        if outcome.status not in ("done", "kept"):
+            yield f"{outcome.name}: {outcome.cause}"
