@@ -1,4 +1,4 @@
-"""run, plan, schema: one scene."""
+"""run, plan, schema, doctor: one scene, and what it needs."""
 
 from __future__ import annotations
 
@@ -56,6 +56,20 @@ Every key with its unit, default and meaning. Editors use it to complete and che
 """,
     )
 
+    doctor = commands.add(
+        "doctor",
+        examine,
+        summary="what of YADE, PyVista, Slurm … is installed and works",
+        text="""
+Tries each part instead of only looking for it. Exit status 1 if something that a run needs fails,
+with the way out.""",
+        examples="""\
+  smarticles doctor
+  smarticles doctor --json
+""",
+    )
+    add_json(doctor)
+
 
 def _add_scene(parser: Parser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
@@ -70,16 +84,21 @@ def _add_scene(parser: Parser) -> None:
 
 def run_scene(arguments: argparse.Namespace) -> int:
     """`smarticles run`."""
-    from dem import run  # noqa: PLC0415  (imports YADE)
     from dem.scene import load_scene  # noqa: PLC0415
 
     scene = load_scene(arguments.scene, arguments.set)
-    outcome = run.run_scene(
-        scene,
-        arguments.out,
-        command=arguments.command_line,
-        progress=sys.stderr.isatty(),
-    )
+    from dem import run  # noqa: PLC0415  (leads to YADE: not before the scene is known to be good)
+
+    try:
+        outcome = run.run_scene(
+            scene,
+            arguments.out,
+            command=arguments.command_line,
+            progress=sys.stderr.isatty(),
+        )
+    except KeyboardInterrupt:
+        msg = f"what was recorded is whole, measure it with: smarticles measure {arguments.out}"
+        raise KeyboardInterrupt(msg) from None
     print(
         f"{arguments.out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s\n"
         f"next: smarticles measure {arguments.out}, smarticles render {arguments.out}"
@@ -106,3 +125,10 @@ def print_schema(_: argparse.Namespace) -> int:
 
     print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return 0
+
+
+def examine(arguments: argparse.Namespace) -> int:
+    """`smarticles doctor`."""
+    from cli.doctor import doctor  # noqa: PLC0415
+
+    return doctor(arguments.json)

@@ -97,9 +97,7 @@ For a study, give the study's command again: it also makes the tables and figure
 
 def add_slots(parser: Parser) -> None:
     """Add --jobs."""
-    parser.add_argument(
-        "--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core"
-    )
+    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
 
 
 def run_sweep(arguments: argparse.Namespace) -> int:
@@ -119,7 +117,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
         return 0
-    return _run(folder, arguments.jobs)
+    return _run(folder, arguments)
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
@@ -153,10 +151,12 @@ def expected_wall_s(scene: Scene) -> float:
     """Expected wall time of a scene [s], on a machine like the one the costs were measured on."""
     from dem.plan import plan  # noqa: PLC0415
 
-    return float(plan(scene).to_dict()["expected_wall_s"])
+    return plan(scene).wall_s
 
 
 def _listing(points: Sequence[Point]) -> str:
+    from templates.display import duration  # noqa: PLC0415
+
     expected = [expected_wall_s(point.scene) for point in points]
     names = list(points[0].values)
     header = ["run", *names, "expected wall s"]
@@ -164,7 +164,7 @@ def _listing(points: Sequence[Point]) -> str:
         [point.name, *(point.values[name] for name in names), round(wall)]
         for point, wall in zip(points, expected, strict=True)
     ]
-    total = f"{len(points)} runs, about {sum(expected) / 3600:.1f} core hours"
+    total = f"{len(points)} runs, about {duration(sum(expected))} of one core"
     return f"{columns(header, rows)}\n{total}"
 
 
@@ -198,10 +198,7 @@ def _status_table(runs: Sequence[RunStatus]) -> str:
     header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
     return columns(
         header,
-        [
-            [run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""]
-            for run in runs
-        ],
+        [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs],
     )
 
 
@@ -217,17 +214,17 @@ def resume_sweep(arguments: argparse.Namespace) -> int:
             f"run it anew: smarticles run {scene} --out NEW_DIR"
         )
         raise InputError(msg)
-    return _run(open_folder(directory), arguments.jobs)
+    return _run(open_folder(directory), arguments)
 
 
-def _run(folder: Folder, slots: int | None) -> int:
-    outcomes = compute(folder, slots)
+def _run(folder: Folder, arguments: argparse.Namespace) -> int:
+    outcomes = compute(folder, arguments)
     refuse_failures(folder, outcomes)
     print(f"{folder.path}: all {len(outcomes)} runs are done; next: smarticles measure {folder.path}")
     return 0
 
 
-def compute(folder: Folder, slots: int | None) -> list[Outcome]:
+def compute(folder: Folder, arguments: argparse.Namespace) -> list[Outcome]:
     """Run what a sweep is missing, and show how it goes.
 
     Raises:
@@ -239,9 +236,9 @@ def compute(folder: Folder, slots: int | None) -> list[Outcome]:
     from templates.local import run_folder  # noqa: PLC0415
 
     try:
-        return run_folder(folder, display_for(Console(stderr=True)), slots=slots)
+        return run_folder(folder, display_for(Console(stderr=True)), slots=arguments.jobs)
     except KeyboardInterrupt:
-        msg = f"finished runs are kept; go on with: {folder.command}"
+        msg = f"finished runs are kept; go on with: {arguments.command_line}"
         raise KeyboardInterrupt(msg) from None
 
 
@@ -251,7 +248,7 @@ def refuse_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
     Raises:
         RunError: a run failed.
     """
-    failed = [outcome for outcome in outcomes if outcome.status not in ("done", "kept")]
+    failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
         msg = (

@@ -1,4 +1,4 @@
-"""The console command `smarticles`: reads the command line, starts the command, maps errors to exit status.
+"""The console command `smarticles`: command line in, exit status out.
 
 Exit status: 0 done; 1 the run failed; 2 bad input or usage; 130 stopped by Ctrl-C.
 """
@@ -9,7 +9,7 @@ import os
 import shlex
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from cli import commands_result, commands_run, commands_study, commands_sweep
 from cli.parsing import Commands, Parser, add_debug
@@ -61,22 +61,31 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status.
     """
     words = list(sys.argv[1:] if argv is None else argv)
-    debug = "--debug" in words
+    return guarded(lambda: _dispatch(words), debug="--debug" in words)
+
+
+def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
+    """The one place where what ends an action becomes a message and an exit status.
+
+    Args:
+        action: what to do; returns its exit status.
+        debug: whether to show the traceback of an error.
+    """
     try:
         with orderly_stop():
-            status = _dispatch(words)
+            status = action()
             sys.stdout.flush()
             return status
     except SystemExit as error:  # argparse, after --help and --version
         return error.code if isinstance(error.code, int) else 0
     except BrokenPipeError:
-        # Whoever read our output, such as `head`, has had enough; the interpreter must not flush to it again.
+        # Who read our output, such as `head`, has had enough: nothing more must be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
-        _complain(f"stopped: {error}" if str(error) else "stopped by Ctrl-C", error, debug)
+        _complain(f"stopped; {str(error) or 'what was written is whole'}", error, debug)
         return STOPPED
-    except Exception as error:  # the one place where an error becomes a message
+    except Exception as error:  # nothing passes without a message
         return _report(error, debug)
 
 
@@ -101,10 +110,7 @@ def _report(error: Exception, debug: bool) -> int:
     if isinstance(error, RunError):
         text = str(error)
     elif isinstance(error, ModuleNotFoundError):
-        text = (
-            f"the Python package {error.name!r} is not installed; "
-            "run `make setup`, then `smarticles doctor`"
-        )
+        text = f"the Python package {error.name!r} is not installed; run `make setup`, then `smarticles doctor`"
     elif isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
         text = f"{where}{error.strerror or error}; free space, or check the path and its permissions"

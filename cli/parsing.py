@@ -84,9 +84,7 @@ class Commands:
 
 def add_debug(parser: Parser, default: Any = False) -> None:
     """Add --debug."""
-    parser.add_argument(
-        "--debug", action="store_true", default=default, help="show the traceback of an error"
-    )
+    parser.add_argument("--debug", action="store_true", default=default, help="show the traceback of an error")
 
 
 def add_json(parser: Parser) -> None:

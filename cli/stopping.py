@@ -11,18 +11,20 @@ from types import FrameType
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def _stop(number: int, _: FrameType | None) -> None:
-    msg = f"stopped by {signal.Signals(number).name}"
-    raise KeyboardInterrupt(msg)
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
 
 
-def _pass_over(number: int, _: FrameType | None) -> None:
-    """Ignore the signal in this process; a started process gets the default again, unlike SIG_IGN."""
+def _pass_over(_number: int, _frame: FrameType | None) -> None:
+    """Ignore a signal here only: unlike SIG_IGN, this is not handed down to started processes."""
 
 
 @contextmanager
 def orderly_stop() -> Iterator[None]:
-    """Turn signals that end the process into KeyboardInterrupt; what nohup or a shell ignores stays ignored."""
+    """Turn signals that end the process into KeyboardInterrupt.
+
+    What the process was told to ignore, by nohup or by a shell's `&`, stays ignored.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,8 @@ class State:
 
     def points(self, body: Array) -> Array:
         """Points of the body frame, (k, 3) [m], on every smarticle: (N, k, 3) [m]."""
-        return np.einsum("nij,kj->nki", self.rotations, body) + self.positions[:, None]
+        turned: Array = np.einsum("nij,kj->nki", self.rotations, body)
+        return turned + self.positions[:, None]
 
 
 def yade_version() -> str:
@@ -77,7 +79,7 @@ def import_yade() -> Any:
     """
     # Threads that find no free core spin; a run of seconds would take minutes.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    for folder in (Path("/usr/lib").glob("*/yade*/py")):
+    for folder in Path("/usr/lib").glob("*/yade*/py"):
         if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
             sys.path.append(str(folder))
     try:
@@ -120,7 +122,12 @@ class Engine:
         from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
         from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
 
-        self._utils, self._yade, self._vector, self._quaternion = utils, wrapper, Vector3, Quaternion
+        self._utils, self._yade, self._vector, self._quaternion = (
+            utils,
+            wrapper,
+            Vector3,
+            Quaternion,
+        )
         self.particle = particle
         self.time_step = time_step
         self._gravity = gravity
@@ -162,7 +169,7 @@ class Engine:
         angles = 2 * math.pi * np.arange(n + 1) / n
         ring = np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
         bodies = []
-        for (x0, y0), (x1, y1) in zip(ring[:-1], ring[1:], strict=True):
+        for (x0, y0), (x1, y1) in pairwise(ring):
             a, b = self._vector(x0, y0, low), self._vector(x1, y1, low)
             c, d = self._vector(x1, y1, high), self._vector(x0, y0, high)
             bodies += [
@@ -176,9 +183,7 @@ class Engine:
 
     def _assemble(self, law: ContactLaw, *, shaken: bool) -> None:
         yade = self._yade
-        friction = yade.MatchMaker(
-            matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction)))
-        )
+        friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
         self._shaker = yade.HarmonicMotionEngine(ids=self._container, dead=True) if shaken else None
         collider = yade.InsertionSortCollider(
             [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb()],
@@ -188,14 +193,16 @@ class Engine:
             yade.ForceResetter(),
             collider,
             yade.InteractionLoop(
-                [yade.Ig2_Sphere_Sphere_ScGeom(), yade.Ig2_Facet_Sphere_ScGeom(), yade.Ig2_Wall_Sphere_ScGeom()],
+                [
+                    yade.Ig2_Sphere_Sphere_ScGeom(),
+                    yade.Ig2_Facet_Sphere_ScGeom(),
+                    yade.Ig2_Wall_Sphere_ScGeom(),
+                ],
                 [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)],
                 [yade.Law2_ScGeom_ViscElPhys_Basic()],
             ),
             *([self._shaker] if shaken else []),
-            yade.NewtonIntegrator(
-                damping=0, gravity=self._vector(0, 0, -self._gravity), exactAsphericalRot=True
-            ),
+            yade.NewtonIntegrator(damping=0, gravity=self._vector(0, 0, -self._gravity), exactAsphericalRot=True),
         ]
         self._omega.dt = self.time_step
 
@@ -364,4 +371,3 @@ class Engine:
         spins = np.einsum("nij,ni->nj", state.rotations, state.angular_velocities)
         mass, inertia = self.particle.boxes.mass, self.particle.boxes.inertia
         return float(0.5 * mass * (state.velocities**2).sum() + 0.5 * (inertia * spins**2).sum())
-

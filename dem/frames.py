@@ -23,7 +23,13 @@ VERTICES = 4
 
 
 def frame_mesh(
-    boxes: Boxes, state: State, *, contacts: NDArray[np.int64], time: float, floor: float, phase: int
+    boxes: Boxes,
+    state: State,
+    *,
+    contacts: NDArray[np.int64],
+    time: float,
+    floor: float,
+    phase: int,
 ) -> meshio.Mesh:
     """One frame as a mesh of lines.
 
@@ -54,7 +60,9 @@ def frame_mesh(
         "phase": np.full(number, phase, dtype=np.int64),
     }
     return meshio.Mesh(
-        vertices.reshape(-1, 3), [("line", lines)], cell_data={name: [values] for name, values in data.items()}
+        vertices.reshape(-1, 3),
+        [("line", lines)],
+        cell_data={name: [values] for name, values in data.items()},
     )
 
 
@@ -87,5 +95,5 @@ class FrameWriter:
             f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(f"frames/frame_{k:06d}.vtu")}/>'
             for k, time in enumerate(self.times)
         ]
-        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'
-        return head + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
+        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"

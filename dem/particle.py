@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +23,45 @@ Array = NDArray[np.float64]
 LINKS = 3
 
 
-def mean_width_diameter(thickness_normal: float, thickness_in_plane: float) -> float:
-    """Diameter [m] of the round bar with the same mean width as a rectangular one.
+def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
+    """Mean caliper width [m] of a rectangular section over all directions: perimeter/π.
 
-    A loose packing of thin bars is set by their excluded volume. Averaged over random orientations the excluded volume
-    of two long bars is proportional to the mean caliper width of the section, perimeter/π, so the equivalent round
-    section has d = 2 (t1 + t2)/π.
+    A loose packing of thin bars is set by their excluded volume. For two long bars at random orientations it is
+    proportional to the distance at which their axes touch, whose mean is the mean width of the section.
 
-    Source: Cauchy's formula for the mean width of a convex section; Onsager's excluded volume of long rods.
+    Source: Cauchy's formula for convex sections; Onsager's excluded volume of long rods.
     """
     return 2.0 * (thickness_normal + thickness_in_plane) / math.pi
+
+
+@lru_cache
+def chain_mean_width(pitch: float) -> float:
+    """Mean distance of the axes of two touching sphere chains, over the sphere diameter [1].
+
+    The excluded volume of two long chains is that of two smooth bars of this width: less than one diameter, since beads
+    sit partly in the valleys of the other chain. Two chains crossing at the angle γ touch where, seen along their
+    common normal, two spheres lie nearest to each other, r diameters apart: the axes are then √(1 - r²) apart. The mean
+    is over the phases of both chains, uniform over a period, and over isotropic directions, density sin γ, weighted
+    with the area sin γ of the parallelogram that excluded volume goes with.
+
+    Args:
+        pitch: distance of neighbouring centres over the diameter, below √2, where chains would pass through each other.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    angles, angle_weights = (
+        math.pi / 4 * (nodes + 1),
+        weights * np.sin(math.pi / 4 * (nodes + 1)) ** 2,
+    )
+    phases = pitch * nodes / 2
+    beads = pitch * np.arange(-3, 4)
+    along = (phases[:, None] + beads).reshape(24, 1, 7, 1)
+    across = (phases[:, None] + beads).reshape(1, 24, 1, 7)
+    total = 0.0
+    for angle, weight in zip(angles, angle_weights / angle_weights.sum(), strict=True):
+        squared = along**2 + across**2 - 2 * along * across * math.cos(angle)
+        nearest = np.minimum(squared.min(axis=(2, 3)), 1.0)
+        total += weight * float(weights @ np.sqrt(1 - nearest) @ weights) / 4
+    return total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,16 +122,13 @@ class Boxes:
     @cached_property
     def plain_centre_of_mass(self) -> Array:
         """(3,) [m]: centre of mass in the middle link's frame."""
-        lengths = self.lengths
-        return (lengths[:, None] * self._plain_centres).sum(axis=0) / lengths.sum()
+        return np.average(self._plain_centres, axis=0, weights=self.lengths)
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
         """Principal moments (3,) [kg m²] and rotation (3, 3): columns are the body axes in the middle link's frame."""
         tensor = np.zeros((3, 3))
-        for length, direction, centre in zip(
-            self.lengths, self.directions, self._plain_centres, strict=True
-        ):
+        for length, direction, centre in zip(self.lengths, self.directions, self._plain_centres, strict=True):
             mass = self.density * length * self.thickness_normal * self.thickness_in_plane
             u, n = direction, np.array([0.0, 0.0, 1.0])
             v = np.cross(n, u)

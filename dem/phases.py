@@ -11,8 +11,9 @@ import numpy as np
 
 from dem.engine import Engine
 from dem.errors import RunError
+from dem.parts import Deposit, Relax, Settle, Shake
 from dem.placement import place_layer
-from dem.scene import Deposit, Relax, Scene, Settle, Shake, derive_seed
+from dem.scene import Scene, derive_seed
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down or a pile has settled
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
@@ -43,7 +44,7 @@ def perform(phase: object, scene: Scene, clock: Clock) -> None:
 
 
 @perform.register
-def _(phase: Relax, scene: Scene, clock: Clock) -> None:  # noqa: ARG001
+def _(phase: Relax, scene: Scene, clock: Clock) -> None:
     clock.advance(phase.duration_s)
 
 

@@ -68,10 +68,18 @@ def place_layer(
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
-            distance, angle, lift = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random(), rng.random()
+            distance, angle, lift = (
+                radius * math.sqrt(rng.random()),
+                2 * math.pi * rng.random(),
+                rng.random(),
+            )
             lowest = spheres[:, 2].min() - particle.radius
             centre = np.array(
-                [distance * math.cos(angle), distance * math.sin(angle), bottom + lift * height - lowest]
+                [
+                    distance * math.cos(angle),
+                    distance * math.sin(angle),
+                    bottom + lift * height - lowest,
+                ]
             )
             spheres += centre
             if np.hypot(spheres[:, 0], spheres[:, 1]).max() > widest:

@@ -46,7 +46,7 @@ class Progress:
         self._phase_begun = (time.monotonic(), start)
         self._last = -math.inf
 
-    def update(self, *, time: float, phi: float, count: int) -> None:  # noqa: A002 - simulated time, as everywhere
+    def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""
         now = _now()
         if now - self._last < INTERVAL:

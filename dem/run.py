@@ -20,10 +20,11 @@ from dem.engine import Cylinder, Engine, yade_version
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
+from dem.parts import Shake
 from dem.phases import Clock, container_height, perform, shake_amplitude
 from dem.progress import Progress
 from dem.recorder import Recorder
-from dem.scene import Scene, Shake, dump_scene, scene_hash
+from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
 from dem.timestep import contact_law, time_step
 from dem.watchdog import Watchdog
@@ -90,7 +91,13 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool) -> RunOu
             handler.close()
         log.handlers.clear()
     wall = time.monotonic() - begun
-    done = {"status": "done", "time_s": engine.time, "steps": engine.steps, "wall_s": wall, "phases": phases}
+    done = {
+        "status": "done",
+        "time_s": engine.time,
+        "steps": engine.steps,
+        "wall_s": wall,
+        "phases": phases,
+    }
     write_json(out / "done.json", done)
     return RunOutcome(out, engine.time, engine.steps, wall)
 
@@ -147,7 +154,9 @@ def _claim(out: Path) -> None:
 
 def _build_engine(scene: Scene, dt: float) -> Engine:
     cylinder = Cylinder(
-        radius=scene.container.radius_m, height=container_height(scene), facets=scene.fidelity.wall_facets
+        radius=scene.container.radius_m,
+        height=container_height(scene),
+        facets=scene.fidelity.wall_facets,
     )
     return Engine(
         particle=scene.particle,
@@ -172,9 +181,7 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         default=0.0,
     )
     return Recorder(
-        series=SeriesWriter(
-            out, radius, gravity, {"scene_sha256": scene_hash(scene), "seed": scene.seed}
-        ),
+        series=SeriesWriter(out, radius, gravity, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
         frames=FrameWriter(out),
         watchdog=Watchdog(radius=radius, height=height, speed=SPEED_MARGIN * max(fall, shaking)),
         progress=progress,
@@ -183,9 +190,7 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
     )
 
 
-def _perform_all(
-    scene: Scene, engine: Engine, recorder: Recorder, log: logging.Logger
-) -> list[dict[str, Any]]:
+def _perform_all(scene: Scene, engine: Engine, recorder: Recorder, log: logging.Logger) -> list[dict[str, Any]]:
     performed = []
     for index, phase in enumerate(scene.phases):
         start, wall = engine.time, time.monotonic()
@@ -205,22 +210,36 @@ def _perform_all(
             recorder.record(engine, index)
         perform(phase, scene, Clock(engine, advance))
         spent = time.monotonic() - wall
-        log.info("phase %d %s ended at t = %.4f s after %.1f s of wall time", index, phase.type, engine.time, spent)
+        log.info(
+            "phase %d %s ended at t = %.4f s after %.1f s of wall time",
+            index,
+            phase.type,
+            engine.time,
+            spent,
+        )
         performed.append(
-            {"index": index, "type": phase.type, "start_s": start, "end_s": engine.time, "wall_s": spent}
+            {
+                "index": index,
+                "type": phase.type,
+                "start_s": start,
+                "end_s": engine.time,
+                "wall_s": spent,
+            }
         )
     return performed
 
 
-def _leave_usable(
-    out: Path, recorder: Recorder | None, engine: Engine | None, *, status: str, cause: str
-) -> None:
+def _leave_usable(out: Path, recorder: Recorder | None, engine: Engine | None, *, status: str, cause: str) -> None:
     try:
         if recorder is not None:
             recorder.series.write()
         write_json(
             out / "failed.json",
-            {"status": status, "cause": cause, "time_s": engine.time if engine is not None else 0.0},
+            {
+                "status": status,
+                "cause": cause,
+                "time_s": engine.time if engine is not None else 0.0,
+            },
         )
     except RunError:
         # The disk is full: the cause is on the terminal, and what was written before is whole.
@@ -249,7 +268,12 @@ def _git_revision() -> str:
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         answer = subprocess.run(
-            command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True, timeout=10
+            command,
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
         )
     except (OSError, subprocess.SubprocessError):
         return "unknown"

@@ -30,7 +30,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "kinetic_energy_J": ("J", "translational and rotational kinetic energy of the smarticles"),
     "max_speed_m_per_s": ("m/s", "largest speed of a centre of mass"),
     "unbalanced_force": ("1", "mean net force on a smarticle over the mean contact force"),
-    "packing_fraction": ("1", "N V_s / (pi r² z), z the second-highest centre of mass above the floor"),
+    "packing_fraction": (
+        "1",
+        "N V_s / (pi r² z), z the second-highest centre of mass above the floor",
+    ),
 }
 
 
@@ -101,7 +104,8 @@ class SeriesWriter:
         if before is None or time <= before[0]:
             return np.full(3, math.nan)
         weight = np.array([0.0, 0.0, engine.particle.boxes.mass * engine.count * self.gravity])
-        return -(momentum - before[1]) / (time - before[0]) - weight
+        mean: NDArray[np.float64] = -(momentum - before[1]) / (time - before[0]) - weight
+        return mean
 
     def write(self) -> None:
         """Rewrite the file with all samples.

@@ -46,9 +46,7 @@ def typical_effective_mass(particle: Particle) -> float:
     """
     inverse = 1.0 / particle.boxes.inertia
     x, y, z = particle.centres.T
-    rotation = (
-        inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)
-    ) / 3
+    rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3
     return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
 
 
@@ -88,7 +86,11 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
 
     Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1.
     """
-    lightest, mass, spheres = particle.smallest_effective_mass, particle.boxes.mass, len(particle.centres)
+    lightest, mass, spheres = (
+        particle.smallest_effective_mass,
+        particle.boxes.mass,
+        len(particle.centres),
+    )
     modes = (
         (lightest / 2, CONTACTS_AT_A_TIP, law.normal_damping),
         (lightest, CONTACTS_AT_A_TIP, law.wall_damping),

@@ -34,11 +34,17 @@ class Watchdog:
         speeds = np.linalg.norm(state.velocities, axis=1)
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
-        self._refuse(broken, time, "a position or velocity that is no number", "lower fidelity.time_step_fraction")
+        self._refuse(
+            broken,
+            time,
+            "a position or velocity that is no number",
+            "lower fidelity.time_step_fraction",
+        )
         self._refuse(
             speeds > self.speed,
             time,
-            f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), which nothing in this scene explains",
+            f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
+            "which nothing in this scene explains",
             "lower fidelity.time_step_fraction",
         )
         outside = (np.hypot(positions[:, 0], positions[:, 1]) > self.radius) | (heights < 0)

@@ -30,8 +30,9 @@ def refuse(what: str, path: Path, cause: BaseException | str, remedy: str) -> No
         InputError: Always. The exception behind it, if any, is left out of what the user sees.
     """
     if isinstance(cause, BaseException):
-        strerror = cause.strerror if isinstance(cause, OSError) else None
-        lines = (strerror or str(cause)).strip().splitlines()
-        cause = f"{type(cause).__name__}: {lines[0]}" if lines else type(cause).__name__
+        lines = str(cause).strip().splitlines()
+        named = ": ".join([type(cause).__name__, *lines[:1]])
+        # The system's own words say enough, and str() would repeat the path.
+        cause = getattr(cause, "strerror", None) or named
     msg = f"cannot read {what} {path}: {cause}; {remedy}"
     raise InputError(msg) from None

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dem.errors import InputError
 
 with warnings.catch_warnings():
@@ -25,7 +27,7 @@ with warnings.catch_warnings():
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, to_hex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -198,8 +200,8 @@ class CountColours:
     labels: tuple[str, ...]
 
 
-def sequence(colours: int, *, first: float = 0.10, last: float = 0.92) -> list[str]:
-    """Equally spaced colours of viridis without its darkest and lightest ends.
+def sequence(colours: int, *, first: float = 0.16, last: float = 1.0) -> list[str]:
+    """Equally spaced colours of viridis, lightened so that shading stays visible on them.
 
     Args:
         colours: how many.
@@ -210,7 +212,8 @@ def sequence(colours: int, *, first: float = 0.10, last: float = 0.92) -> list[s
         Hexadecimal colours, dark to light.
     """
     steps = [first + (last - first) * i / max(colours - 1, 1) for i in range(colours)]
-    return [matplotlib.colors.to_hex(matplotlib.colormaps["viridis"](s)) for s in steps]
+    plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
+    return [to_hex(colour) for colour in 1 - 0.86 * (1 - plain)]
 
 
 def count_colours(largest: int, *, classes: int = 9) -> CountColours:

@@ -223,9 +223,7 @@ class _FrameReader:
             link_angular_velocity=self._per_link("angular_velocity_rad_per_s", np.float64, (3,)),
             contacts=_frozen(self._per_link("contacts", np.int64, ())[:, 0]),
             # What is left once the contract's own data are taken out.
-            cell_data=MappingProxyType(
-                {name: _frozen(self._folded(values)) for name, values in self._data.items()}
-            ),
+            cell_data=MappingProxyType({name: _frozen(self._folded(values)) for name, values in self._data.items()}),
         )
 
     def _refuse(self, cause: str) -> NoReturn:

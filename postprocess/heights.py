@@ -65,9 +65,7 @@ def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95
     )
 
 
-def material_height(
-    vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0
-) -> float:
+def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
     """Height below which a given share of the links' material lies.
 
     The material is spread evenly along each link's centreline. The share below a height is then

@@ -183,9 +183,7 @@ def read_run(directory: Path | str) -> RunManifest:
     versions = run.data.get("versions", {})
     if not isinstance(versions, dict):
         refuse("manifest", run.path, "'versions' must be an object", _REMEDY)
-    phases = tuple(
-        PhaseRecord(index=phase.integer("index"), type=phase.text("type")) for phase in run.phases()
-    )
+    phases = tuple(PhaseRecord(index=phase.integer("index"), type=phase.text("type")) for phase in run.phases())
     if [phase.index for phase in phases] != list(range(len(phases))):
         refuse("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", _REMEDY)
     return RunManifest(

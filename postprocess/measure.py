@@ -206,9 +206,7 @@ def _check_last(last: int) -> None:
         raise InputError(msg)
 
 
-def _open(
-    directory: Path | str, definitions: Iterable[str]
-) -> tuple[RunManifest, FrameSequence, Series | None]:
+def _open(directory: Path | str, definitions: Iterable[str]) -> tuple[RunManifest, FrameSequence, Series | None]:
     for definition in definitions:
         if definition not in DEFINITIONS:
             msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"

@@ -26,18 +26,10 @@ if TYPE_CHECKING:
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
-        "second-highest-com": (
-            "N V_s / (π r² z), z = second-highest smarticle centre of mass above the floor"
-        ),
-        "top-percentile": (
-            "N V_s / (π r² h), 95 % of the links' material lies below h above the floor"
-        ),
-        "voxel": (
-            "share of the inner cylinder (0.75 r, 20 % to 80 % of the height) inside the true boxes"
-        ),
-        "voronoi": (
-            "V_s over the mean set-Voronoi cell of the smarticles centred in the inner cylinder"
-        ),
+        "second-highest-com": ("N V_s / (π r² z), z = second-highest smarticle centre of mass above the floor"),
+        "top-percentile": ("N V_s / (π r² h), 95 % of the links' material lies below h above the floor"),
+        "voxel": ("share of the inner cylinder (0.75 r, 20 % to 80 % of the height) inside the true boxes"),
+        "voronoi": ("V_s over the mean set-Voronoi cell of the smarticles centred in the inner cylinder"),
     }
 )
 """Each definition of the packing fraction with its meaning, for listings and help."""

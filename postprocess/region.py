@@ -39,15 +39,11 @@ class Cylinder:
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n,) bool, which of (n, 3) points [m] lie inside."""
         x, y, z = points[:, 0] - self.axis[0], points[:, 1] - self.axis[1], points[:, 2]
-        inside: NDArray[np.bool_] = (
-            (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
-        )
+        inside: NDArray[np.bool_] = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
         return inside
 
 
-def inner_region(
-    pile: Cylinder, *, inner: float = 0.75, low: float = 0.2, high: float = 0.8
-) -> Cylinder:
+def inner_region(pile: Cylinder, *, inner: float = 0.75, low: float = 0.2, high: float = 0.8) -> Cylinder:
     """The part of a pile that stays clear of wall, floor and free surface.
 
     Args:

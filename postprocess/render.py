@@ -53,7 +53,7 @@ _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000
 _FIELD_OF_VIEW = 22.0  # degree, vertical
 _FILL = 0.97  # share of the panel that the pile and its container may take
-_PANEL = (0.0, 0.0, 0.87, 0.90)  # left, bottom, width, height as shares of the picture
+_PANEL = (0.87, 0.885)  # width and height as shares of the picture, from its lower left corner
 _MOST_FILM_FRAMES = 150
 
 # Corners of a box (along, in plane, normal) and its faces, seen from outside.
@@ -325,7 +325,7 @@ class _Look:
     @property
     def panel(self) -> tuple[int, int]:
         """Width and height of the three-dimensional part [pixel]."""
-        return round(self.size[0] * _PANEL[2]), round(self.size[1] * _PANEL[3])
+        return round(self.size[0] * _PANEL[0]), round(self.size[1] * _PANEL[1])
 
     @property
     def axes(self) -> NDArray[np.float64]:
@@ -444,6 +444,10 @@ class _Stage:
                 diffuse=0.85,
                 specular=0.12,
                 specular_power=20,
+                show_edges=True,
+                edge_color="#101418",
+                edge_opacity=0.55,
+                line_width=0.5 * _OVERSAMPLING,
                 reset_camera=False,
                 render=False,
             )
@@ -454,7 +458,7 @@ class _Stage:
     def _build(self, extent: NDArray[np.float64]) -> None:
         plotter, axes = self._plotter, self._look.axes
         radius = self._run.container_radius * _MILLIMETRE
-        top = _wall_height(float(extent[:, 2].max()), self._run)
+        top = float(extent[:, 2].max())  # of the wall's rim, which is above the pile
         plotter.set_background("white")
         floor = pv.Disc(inner=0, outer=radius, c_res=180)
         plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
@@ -466,20 +470,8 @@ class _Stage:
             )
             plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False)
             upper = arc + np.array([0.0, 0.0, top])
-            plotter.add_mesh(
-                pv.MultipleLines(np.concatenate([arc[:1], upper, arc[-1:]])),
-                color="#7d8f9f",
-                line_width=2 * _OVERSAMPLING,
-                lighting=False,
-                render=False,
-            )
-        plotter.add_mesh(
-            pv.MultipleLines(_circle(radius, 0.0)),
-            color="#7d8f9f",
-            line_width=1.5 * _OVERSAMPLING,
-            lighting=False,
-            render=False,
-        )
+            self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]]))
+        self._add_outline(_circle(radius, 0.0 if arc is not None else top))
         width, height = self._look.panel
         position, focus = _fitted_camera(extent, axes, width / height)
         self._light(position, focus)
@@ -493,15 +485,24 @@ class _Stage:
         camera.clipping_range = (max(distance - reach, distance / 1000), distance + reach)
         plotter.enable_ssao(
             radius=0.6 * self._run.middle_length * _MILLIMETRE,
-            bias=0.05 * self._run.thickness_in_plane * _MILLIMETRE,
+            bias=0.4 * self._run.thickness_in_plane * _MILLIMETRE,
             kernel_size=64,
             blur=True,
+        )
+
+    def _add_outline(self, points: NDArray[np.float64]) -> None:
+        self._plotter.add_mesh(
+            pv.MultipleLines(points),
+            color="#7d8f9f",
+            line_width=1.8 * _OVERSAMPLING,
+            lighting=False,
+            render=False,
         )
 
     def _light(self, position: NDArray[np.float64], focus: NDArray[np.float64]) -> None:
         right, up, forward = self._look.axes
         distance = float(np.linalg.norm(position - focus))
-        for side, rise, strength in ((-0.6, 1.1, 0.78), (0.9, 0.35, 0.30), (0.0, 0.0, 0.18)):
+        for side, rise, strength in ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25)):
             source = focus + distance * (side * right + rise * up - forward)
             self._plotter.add_light(
                 pv.Light(
@@ -512,7 +513,7 @@ class _Stage:
                 )
             )
 
-    def _caption(self, frame: Frame) -> tuple[str, str]:
+    def _caption(self, frame: Frame) -> tuple[str, str, str]:
         run = self._run
         count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
         phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
@@ -528,16 +529,13 @@ class _Stage:
             packing = "φ undefined"
         mean = entanglement(frame.vertices).mean
         crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "⟨N⟩ undefined"
-        parts = (
-            f"l/w = {run.aspect_ratio:g}",
-            f"N = {count}",
-            f"t = {frame.time:.3f} s ({phase})",
-            packing,
-            crossings,
+        return (
+            run.name,
+            f"l/w = {run.aspect_ratio:g}   N = {count}   t = {frame.time:.3f} s ({phase})",
+            f"{packing}   {crossings}",
         )
-        return run.name, "   ".join(parts)
 
-    def _composed(self, panel: NDArray[np.uint8], caption: tuple[str, str]) -> Image.Image:
+    def _composed(self, panel: NDArray[np.uint8], caption: tuple[str, str, str]) -> Image.Image:
         """The drawn panel with its caption and colour bar."""
         width, height = self._look.size
         unit = min(width, height) / 100  # pixel; text scales with the picture
@@ -547,26 +545,21 @@ class _Stage:
             )
             FigureCanvasAgg(figure)
             figure.figimage(panel, xo=0, yo=0, origin="upper")
-            title, line = caption
-            edge = 2.6 * unit / width
-            figure.text(
-                edge,
-                1 - 2.2 * unit / height,
-                title,
-                fontsize=2.5 * unit,
-                weight="bold",
-                va="top",
-                parse_math=False,
-            )
-            figure.text(
-                edge,
-                1 - 6.0 * unit / height,
-                line,
-                fontsize=1.85 * unit,
-                va="top",
-                color=figures.GREY,
-                parse_math=False,
-            )
+            rows = ((2.0, 2.4, "bold", figures.BLACK), (5.4, 1.85, "normal", figures.GREY))
+            for text, (below, points, weight, colour) in zip(
+                (caption[0], "\n".join(caption[1:])), rows, strict=True
+            ):
+                figure.text(
+                    2.6 * unit / width,
+                    1 - below * unit / height,
+                    text,
+                    fontsize=points * unit,
+                    weight=weight,
+                    color=colour,
+                    va="top",
+                    linespacing=1.35,
+                    parse_math=False,
+                )
             self._scale.draw(figure, self._look.colouring.label, unit)
             canvas = FigureCanvasAgg(figure)
             canvas.draw()
@@ -606,8 +599,10 @@ class _Scale:
         """Draws the bar to the right of the panel, unless the colours only tell identity."""
         if self._mappable is None:
             return
-        axes = figure.add_axes((0.885, 0.24, 0.024, 0.46))
+        height = min(0.055 * len(self._ticks), 0.46) if self._ticks else 0.46
+        axes = figure.add_axes((0.885, 0.47 - height / 2, 0.024, height))
         bar = figure.colorbar(self._mappable, cax=axes)
+        bar.minorticks_off()
         bar.outline.set_linewidth(0.08 * unit)
         axes.tick_params(labelsize=1.8 * unit, length=0.7 * unit, width=0.12 * unit)
         bar.set_label(label, fontsize=1.9 * unit)

@@ -101,10 +101,7 @@ def read_series(directory: Path | str) -> Series:
         with h5py.File(path, "r") as file:
             attributes = dict(file.attrs)
             data = {name: _frozen(file[name]) for name in file}
-            texts = {
-                key: {name: str(file[name].attrs[key]) for name in file}
-                for key in ("unit", "description")
-            }
+            texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
     # h5py fails with OSError, KeyError or RuntimeError, depending on where the damage lies.
     except Exception as error:
         refuse("series", path, error, _REMEDY)

@@ -106,11 +106,10 @@ def local_packing(
     return LocalPacking(volumes=volumes, interior=interior, value=value)
 
 
-def _sample(
-    vertices: NDArray[np.float64], spacing: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points (n, 3) evenly along each link, none at a hinge, and their smarticles (n,)."""
-    cuts = np.ceil(link_lengths(vertices) / spacing).astype(int).ravel()
+    # Lengths differ by rounding, which must not give one link a point more than its equals.
+    cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
     step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
     share = (step + 0.5) / cuts[link]
@@ -119,9 +118,7 @@ def _sample(
     return start + share[:, None] * along, link // 3
 
 
-def _mirrored(
-    points: NDArray[np.float64], container: Cylinder, lid: float, band: float
-) -> NDArray[np.float64]:
+def _mirrored(points: NDArray[np.float64], container: Cylinder, lid: float, band: float) -> NDArray[np.float64]:
     """Images of the points nearer than `band` to floor, lid or wall."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom

@@ -31,14 +31,19 @@ install_debian_packages() {
                 "${missing[*]}; see environment.md, 'Without root'"
         as_root=(sudo)
     fi
-    echo "setup: installing Debian packages: ${missing[*]}"
+    echo "setup: installing Debian packages (minutes): ${missing[*]}"
     local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
         apt-get -qq -o DPkg::Lock::Timeout=600 -o Dpkg::Use-Pty=0)
     local install=("${apt[@]}" install --yes --no-install-recommends "${missing[@]}")
     # Fresh lists only if there are none, or if the present ones lead to packages that are gone.
     apt-cache show "${missing[@]}" >/dev/null 2>&1 || "${apt[@]}" update
-    "${install[@]}" >/dev/null || { "${apt[@]}" update && "${install[@]}" >/dev/null; } ||
+    local log
+    log=$(mktemp)
+    "${install[@]}" >"$log" 2>&1 || { "${apt[@]}" update && "${install[@]}" >"$log" 2>&1; } || {
+        cat "$log" >&2
         fail "apt-get could not install: ${missing[*]}; see environment.md, 'Other systems'"
+    }
+    rm -f "$log"
 }
 
 install_environment() {
@@ -48,7 +53,7 @@ install_environment() {
         sha256sum setup/install.sh requirements*.txt requirements.in pyproject.toml)
     [ "$key" != "$(cat .venv/installed 2>/dev/null)" ] || return 0
 
-    echo "setup: installing Python packages into .venv"
+    echo "setup: installing Python packages into .venv (a minute)"
     # An environment cannot be moved: one that was made elsewhere is made anew.
     grep -qs -- " $(pwd)/.venv\$" .venv/pyvenv.cfg || rm -rf .venv
     rm -f .venv/installed

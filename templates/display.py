@@ -11,7 +11,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from templates.local import Display, Job, Outcome, Progress, Snapshot
+from templates.folder import Entry
+from templates.local import Display, Outcome, Progress, Snapshot
 
 _MARKS = {"done": "[green]✔[/]", "kept": "[dim]=[/]", "failed": "[red]✘[/]", "interrupted": "■"}
 
@@ -38,10 +39,7 @@ def _phi(run: Progress) -> str:
 
 def _totals(snapshot: Snapshot) -> str:
     failed = f", {snapshot.failed} failed" if snapshot.failed else ""
-    return (
-        f"{snapshot.ended} of {snapshot.total} runs ended{failed}, "
-        f"time left {duration(snapshot.left_s)}"
-    )
+    return f"{snapshot.ended} of {snapshot.total} runs ended{failed}, time left {duration(snapshot.left_s)}"
 
 
 def _ending(outcome: Outcome) -> str:
@@ -49,6 +47,10 @@ def _ending(outcome: Outcome) -> str:
     wall = f" after {duration(outcome.wall_s)}" if outcome.wall_s else ""
     cause = f": {outcome.cause}" if outcome.status == "failed" else ""
     return f"{outcome.name} {text}{wall}{cause}"
+
+
+def _stopping(count: int) -> str:
+    return f"stopping {count} runs, which close their files; Ctrl-C again does not wait"
 
 
 class LiveDisplay:
@@ -65,7 +67,7 @@ class LiveDisplay:
     def __exit__(self, *exception: object) -> None:
         self._live.stop()
 
-    def started(self, job: Job) -> None:
+    def started(self, entry: Entry) -> None:
         """Nothing: the next update shows the run."""
 
     def ended(self, outcome: Outcome) -> None:
@@ -77,16 +79,20 @@ class LiveDisplay:
         """Redraw."""
         self._live.update(self.picture(snapshot))
 
+    def stopping(self, count: int) -> None:
+        """Print what is waited for."""
+        self._console.print(_stopping(count))
+
     @staticmethod
     def picture(snapshot: Snapshot) -> Group:
         """What is drawn."""
         table = Table.grid(padding=(0, 2))
         for run in snapshot.running:
-            table.add_row(
-                run.name, run.phase or "", _simulated(run), _phi(run), duration(run.wall_s)
-            )
-        bar = ProgressBar(total=max(snapshot.total, 1), completed=snapshot.ended, width=40)
-        return Group(table, bar, Text(_totals(snapshot)))
+            table.add_row(run.name, run.phase or "", _simulated(run), _phi(run), duration(run.wall_s))
+        bar = ProgressBar(total=max(snapshot.total, 1), completed=snapshot.ended, width=30)
+        total = Table.grid(padding=(0, 2))
+        total.add_row(bar, _totals(snapshot))
+        return Group(table, total)
 
 
 class PlainDisplay:
@@ -108,9 +114,9 @@ class PlainDisplay:
     def __exit__(self, *exception: object) -> None:
         pass
 
-    def started(self, job: Job) -> None:
+    def started(self, entry: Entry) -> None:
         """Print that the run started."""
-        self._print(f"{job.name} started")
+        self._print(f"{entry.name} started")
 
     def ended(self, outcome: Outcome) -> None:
         """Print how the run ended."""
@@ -126,6 +132,10 @@ class PlainDisplay:
             for run in snapshot.running
         )
         self._print(f"{_totals(snapshot)}; {runs}")
+
+    def stopping(self, count: int) -> None:
+        """Print what is waited for."""
+        self._print(_stopping(count))
 
     def _print(self, line: str) -> None:
         self._console.print(line, markup=False, highlight=False, soft_wrap=True)

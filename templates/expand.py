@@ -85,10 +85,7 @@ def _refuse_shared(sweep: Sweep, names: Mapping[str, set[str]]) -> None:
     every = {**names, "derived": set(sweep.content.derived)}
     for (one, first), (other, second) in itertools.combinations(every.items(), 2):
         for name in sorted(first & second):
-            msg = (
-                f"{sweep.path}: {name!r} is set in both {one} and {other}; "
-                "rename or remove one of them"
-            )
+            msg = f"{sweep.path}: {name!r} is set in both {one} and {other}; rename or remove one of them"
             raise InputError(msg)
 
 

@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dem.errors import InputError
+from dem.files import write_json, write_text
 from dem.scene import Scene, dump_scene
 from templates.expand import Point
 from templates.render import Value
 from templates.sweep import Sweep
-from templates.texts import read_json, write_json, write_whole
+from templates.texts import read_json
 
 FORMAT = 1
 MANIFEST = "sweep.json"
@@ -155,9 +156,7 @@ class Folder:
     def status(self) -> list[RunStatus]:
         """State of every run."""
         active = self.is_active()
-        return [
-            run_status(self.run(entry), name=entry.name, active=active) for entry in self.entries
-        ]
+        return [run_status(self.run(entry), name=entry.name, active=active) for entry in self.entries]
 
     def set_aside(self, entry: Entry) -> Path | None:
         """Rename what an unfinished run left, so that the run can start anew; nothing is deleted.
@@ -235,11 +234,17 @@ def create_folder(
         if path.is_dir() and any(path.iterdir()):
             msg = f"{path}: holds other files; give a directory that is new or holds this sweep"
             raise InputError(msg)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            msg = f"--out {path}: cannot be made ({error.strerror}); choose another directory"
+            raise InputError(msg) from error
         write_json(path / MANIFEST, _manifest(sweep, points, command, versions, expected_s))
         folder = open_folder(path)
+    (path / "scenes").mkdir(exist_ok=True)
     for entry, point in zip(folder.entries, points, strict=True):
         if not folder.scene(entry).exists():
-            write_whole(folder.scene(entry), dump_scene(point.scene))
+            write_text(folder.scene(entry), dump_scene(point.scene))
     return folder
 
 

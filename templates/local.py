@@ -12,37 +12,21 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Literal, Protocol
 
-from templates.folder import Folder
+from templates.folder import Entry, Folder
 from templates.texts import read_json
 
 Ending = Literal["done", "kept", "failed", "interrupted"]
 
+RunCommand = Callable[[Path, Path], Sequence[str]]
+"""(scene file, run directory) -> the command of one run."""
+
 # Threads that find no free core spin: one thread per run, set before its interpreter starts.
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Job:
-    """A run to be started.
-
-    Args:
-        name: its name.
-        command: what to start.
-        directory: the run directory it writes.
-        log: file for what it prints.
-        expected_s: expected wall time [s].
-    """
-
-    name: str
-    command: tuple[str, ...]
-    directory: Path
-    log: Path
-    expected_s: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +45,11 @@ class Outcome:
     cause: str | None = None
     wall_s: float = 0.0
 
+    @property
+    def missing(self) -> bool:
+        """Whether the run still has no result."""
+        return self.status not in ("done", "kept")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
@@ -72,7 +61,7 @@ class Progress:
         expected_s: expected wall time [s].
         phase: type of the phase it is in.
         time_s: simulated time [s].
-        end_s: simulated time at which the run ends [s].
+        end_s: simulated time at which the phase ends [s].
         phi: packing fraction so far.
     """
 
@@ -111,7 +100,7 @@ class Display(Protocol):
 
     def __exit__(self, *exception: object) -> None: ...
 
-    def started(self, job: Job) -> None:
+    def started(self, entry: Entry) -> None:
         """A run was started."""
 
     def ended(self, outcome: Outcome) -> None:
@@ -119,6 +108,9 @@ class Display(Protocol):
 
     def update(self, snapshot: Snapshot) -> None:
         """Some time has passed."""
+
+    def stopping(self, count: int) -> None:
+        """So many runs were asked to stop."""
 
 
 def slots_here() -> int:
@@ -140,7 +132,7 @@ def run_folder(
     display: Display,
     *,
     slots: int | None = None,
-    command: Callable[[Path, Path], Sequence[str]] = smarticles_command,
+    command: RunCommand = smarticles_command,
     timing: Timing | None = None,
 ) -> list[Outcome]:
     """Run what a sweep's directory is missing.
@@ -151,7 +143,7 @@ def run_folder(
         folder: the sweep's directory.
         display: shows how it goes.
         slots: how many runs at once; by default one per core.
-        command: (scene file, run directory) -> command of one run.
+        command: the command of one run.
         timing: intervals of the runner.
 
     Returns:
@@ -161,33 +153,16 @@ def run_folder(
         InputError: another process computes this sweep already.
         KeyboardInterrupt: Ctrl-C; all runs were stopped.
     """
-    outcomes: dict[str, Outcome] = {}
-    jobs = []
     with folder.lock() as lock, display:
-        for entry in folder.entries:
-            if folder.is_done(entry):
-                outcomes[entry.name] = Outcome(name=entry.name, status="kept")
-                display.ended(outcomes[entry.name])
-                continue
-            folder.set_aside(entry)
-            jobs.append(
-                Job(
-                    name=entry.name,
-                    command=tuple(command(folder.scene(entry), folder.run(entry))),
-                    directory=folder.run(entry),
-                    log=folder.log(entry),
-                    expected_s=entry.expected_s,
-                )
-            )
         runner = _Runner(
+            folder=folder,
             display=display,
+            command=command,
             slots=slots or slots_here(),
             timing=timing or Timing(),
             inherited=(lock,),
-            kept=len(outcomes),
-            pending=sorted(jobs, key=lambda job: -job.expected_s),
         )
-        outcomes |= {outcome.name: outcome for outcome in runner.run()}
+        outcomes = {outcome.name: outcome for outcome in runner.run()}
     return [outcomes[entry.name] for entry in folder.entries]
 
 
@@ -206,7 +181,7 @@ class Timing:
 
 @dataclass(kw_only=True)
 class _Active:
-    job: Job
+    entry: Entry
     process: subprocess.Popen[bytes]
     output: IO[bytes]
     started: float
@@ -218,18 +193,25 @@ class _Active:
 
 @dataclass(kw_only=True)
 class _Runner:
+    folder: Folder
     display: Display
+    command: RunCommand
     slots: int
     timing: Timing
     inherited: tuple[int, ...]
-    kept: int
-    pending: list[Job]
+    pending: list[Entry] = field(default_factory=list)
     active: list[_Active] = field(default_factory=list)
     outcomes: list[Outcome] = field(default_factory=list)
     # (expected, measured) wall time [s] of the runs that finished here.
     finished: list[tuple[float, float]] = field(default_factory=list)
 
     def run(self) -> list[Outcome]:
+        for entry in self.folder.entries:
+            if self.folder.is_done(entry):
+                self._ended(Outcome(name=entry.name, status="kept"))
+            else:
+                self.pending.append(entry)
+        self.pending.sort(key=lambda entry: -entry.expected_s)
         try:
             while self.pending or self.active:
                 while self.pending and len(self.active) < self.slots:
@@ -242,13 +224,15 @@ class _Runner:
             self._stop()
         return self.outcomes
 
-    def _start(self, job: Job) -> None:
-        job.log.parent.mkdir(parents=True, exist_ok=True)
-        job.directory.parent.mkdir(parents=True, exist_ok=True)
-        output = job.log.open("wb")
+    def _start(self, entry: Entry) -> None:
+        self.folder.set_aside(entry)
+        directory, log = self.folder.run(entry), self.folder.log(entry)
+        for parent in (directory.parent, log.parent):
+            parent.mkdir(parents=True, exist_ok=True)
+        output = log.open("wb")
         try:
             process = subprocess.Popen(
-                job.command,
+                self.command(self.folder.scene(entry), directory),
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -260,23 +244,38 @@ class _Runner:
         except BaseException:
             output.close()
             raise
-        self.active.append(
-            _Active(job=job, process=process, output=output, started=time.monotonic())
-        )
-        self.display.started(job)
+        started = time.monotonic()
+        self.active.append(_Active(entry=entry, process=process, output=output, started=started))
+        self.display.started(entry)
+
+    def _ended(self, outcome: Outcome) -> None:
+        self.outcomes.append(outcome)
+        self.display.ended(outcome)
 
     def _collect(self) -> None:
         for run in [run for run in self.active if run.process.poll() is not None]:
             self.active.remove(run)
             run.output.close()
-            outcome = _outcome(run.job, run.process.returncode, run.wall_s)
+            outcome = self._outcome(run)
             if outcome.status == "done":
-                self.finished.append((run.job.expected_s, outcome.wall_s))
-            self.outcomes.append(outcome)
-            self.display.ended(outcome)
+                self.finished.append((run.entry.expected_s, outcome.wall_s))
+            self._ended(outcome)
+
+    def _outcome(self, run: _Active) -> Outcome:
+        name, directory = run.entry.name, self.folder.run(run.entry)
+        returncode, wall_s = run.process.returncode, run.wall_s
+        if returncode == 0 and (directory / "done.json").is_file():
+            return Outcome(name=name, status="done", wall_s=wall_s)
+        failed = read_json(directory / "failed.json") or {}
+        if failed.get("status") == "interrupted" or returncode in (130, -signal.SIGINT):
+            return Outcome(name=name, status="interrupted", cause="interrupted", wall_s=wall_s)
+        cause = str(failed.get("cause") or _last_words(self.folder.log(run.entry), returncode))
+        return Outcome(name=name, status="failed", cause=cause, wall_s=wall_s)
 
     def _stop(self) -> None:
         """Ask every run to stop, wait, insist; a second Ctrl-C does not wait."""
+        if self.active:
+            self.display.stopping(len(self.active))
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
             for run in self.active:
                 with contextlib.suppress(ProcessLookupError):
@@ -290,8 +289,26 @@ class _Runner:
             if not self.active:
                 return
 
+    def _progress(self, run: _Active) -> Progress:
+        said = read_json(self.folder.run(run.entry) / "progress.json") or {}
+
+        def number(key: str) -> float | None:
+            value = said.get(key)
+            return float(value) if isinstance(value, int | float) else None
+
+        phase = said.get("phase")
+        return Progress(
+            name=run.entry.name,
+            wall_s=run.wall_s,
+            expected_s=run.entry.expected_s,
+            phase=phase if isinstance(phase, str) else None,
+            time_s=number("time_s"),
+            end_s=number("end_s"),
+            phi=number("phi"),
+        )
+
     def _snapshot(self) -> Snapshot:
-        running = tuple(_progress(run) for run in self.active)
+        running = tuple(self._progress(run) for run in self.active)
         # How much slower this machine is than expected: from finished runs, and from those overdue.
         overdue = [(run.expected_s, run.wall_s) for run in running if run.wall_s > run.expected_s]
         known = [*self.finished, *overdue]
@@ -299,13 +316,13 @@ class _Runner:
         ratio = sum(pair[1] for pair in known) / expected if expected > 0 else 1.0
         left = time_left(
             [max(run.expected_s * ratio - run.wall_s, 0.0) for run in running],
-            [job.expected_s * ratio for job in self.pending],
+            [entry.expected_s * ratio for entry in self.pending],
             self.slots,
         )
         return Snapshot(
-            total=self.kept + len(self.outcomes) + len(self.active) + len(self.pending),
-            ended=self.kept + len(self.outcomes),
-            failed=sum(outcome.status != "done" for outcome in self.outcomes),
+            total=len(self.folder.entries),
+            ended=len(self.outcomes),
+            failed=sum(outcome.missing for outcome in self.outcomes),
             running=running,
             left_s=left,
         )
@@ -336,41 +353,10 @@ def _environment() -> dict[str, str]:
     return environment
 
 
-def _progress(run: _Active) -> Progress:
-    said = read_json(run.job.directory / "progress.json") or {}
-
-    def number(key: str) -> float | None:
-        value = said.get(key)
-        return float(value) if isinstance(value, int | float) else None
-
-    phase = said.get("phase")
-    return Progress(
-        name=run.job.name,
-        wall_s=run.wall_s,
-        expected_s=run.job.expected_s,
-        phase=phase if isinstance(phase, str) else None,
-        time_s=number("time_s"),
-        end_s=number("end_s"),
-        phi=number("phi"),
-    )
-
-
-def _outcome(job: Job, returncode: int, wall_s: float) -> Outcome:
-    failed = read_json(job.directory / "failed.json") or {}
-    status: Ending
-    if returncode == 0 and (job.directory / "done.json").is_file():
-        return Outcome(name=job.name, status="done", wall_s=wall_s)
-    if failed.get("status") == "interrupted" or returncode in (130, -signal.SIGINT):
-        status, cause = "interrupted", "interrupted"
-    else:
-        status, cause = "failed", str(failed.get("cause") or _last_words(job, returncode))
-    return Outcome(name=job.name, status=status, cause=cause, wall_s=wall_s)
-
-
-def _last_words(job: Job, returncode: int) -> str:
+def _last_words(log: Path, returncode: int) -> str:
     """Why a process without `failed.json` ended: its error line, else its end and last line."""
     try:
-        lines = job.log.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     for line in lines:
@@ -384,11 +370,4 @@ def _last_words(job: Job, returncode: int) -> str:
     else:
         reason = f"exit status {returncode}"
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return f"{reason}: {last}" if last else f"{reason}, without a word; see {job.log}"
-
-
-def iterate_causes(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """`NAME: cause` for the runs that are not done."""
-    for outcome in outcomes:
-        if outcome.status not in ("done", "kept"):
-            yield f"{outcome.name}: {outcome.cause}"
+    return f"{reason}: {last}" if last else f"{reason}, without a word; see {log}"

@@ -39,7 +39,11 @@ class _Environment(ImmutableSandboxedEnvironment):
                 raise jinja2.TemplateRuntimeError(msg)
         if operator == "*":
             return left * right
-        power = float(left) ** float(right)
+        try:
+            power = float(left) ** float(right)
+        except OverflowError:
+            msg = f"{left} ** {right} is too large a number"
+            raise jinja2.TemplateRuntimeError(msg) from None
         whole = isinstance(left, int) and isinstance(right, int) and right >= 0
         return int(power) if whole else power
 
@@ -72,17 +76,15 @@ def _line(error: BaseException) -> int | None:
     return line
 
 
-def _refuse(error: Exception, source: str, values: Mapping[str, Value]) -> NoReturn:
+def _refuse(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
     """Raise the InputError that explains why a template or an expression failed."""
-    number = getattr(error, "lineno", None) or _line(error)
-    where = f"{source}, line {number}" if number else source
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
         advice = nearest(name[1], values) if name else f"defined: {', '.join(sorted(values))}"
         msg = f"{where}: {text}; {advice}"
     else:
-        msg = f"{where}: {text or type(error).__name__}; correct the template"
+        msg = f"{where}: {text or type(error).__name__}; correct it"
     raise InputError(msg) from error
 
 
@@ -165,7 +167,8 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
             raise jinja2.TemplateSyntaxError(msg, refused.lineno)
         text = environment.from_string(template).render(**values)
     except _FAILURES as error:
-        _refuse(error, source, values)
+        number = getattr(error, "lineno", None) or _line(error)
+        _refuse(error, f"{source}, line {number}" if number else source, values)
     return parse_yaml(text, source, _loader(re.compile(rf"{prefix}(\d+)z"), held))
 
 

@@ -62,9 +62,7 @@ class Table(_Model):
     """Points from the rows of a CSV file."""
 
     file: str = Field(description="CSV file; a relative path starts at the sweep file")
-    only: dict[str, list[Value]] = Field(
-        default={}, description="keep the rows whose column holds one of these values"
-    )
+    only: dict[str, list[Value]] = Field(default={}, description="keep the rows whose column holds one of these values")
 
 
 class Points(_Model):
@@ -187,9 +185,7 @@ def load_sweep(path: Path) -> Sweep:
     )
 
 
-def _read_table(
-    path: Path, table: Table | None
-) -> tuple[list[dict[str, Value]], Path | None, str | None]:
+def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], Path | None, str | None]:
     if table is None:
         return [], None, None
     file = path.parent / table.file
@@ -236,7 +232,9 @@ _MODELS: dict[tuple[str, ...], type[BaseModel]] = {
 
 def _explain(error: ValidationError, path: Path) -> str:
     """One line for the first thing that is wrong: file, key, value, way out."""
-    first = error.errors(include_url=False)[0]
+    # A misspelt key is also a missing one: the spelling tells more.
+    unknown_first = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
+    first = unknown_first[0]
     place = tuple(str(step) for step in first["loc"])
     key = ".".join(place) or "the file"
     if first["type"] == "extra_forbidden":

@@ -1,4 +1,4 @@
-"""Text files in: YAML and CSV read strictly, JSON written whole."""
+"""Text files in: YAML and CSV read strictly, JSON if it is there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import csv
 import difflib
 import io
 import json
-import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -44,14 +43,10 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
                     seen.add(key)
                 except TypeError:
                     problem = f"a key must be plain text or a number: got {key!r}"
-                    raise yaml.constructor.ConstructorError(
-                        None, None, problem, key_node.start_mark
-                    ) from None
+                    raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark) from None
                 if repeated:
                     problem = f"key {key!r} is given twice; keep one of the two"
-                    raise yaml.constructor.ConstructorError(
-                        None, None, problem, key_node.start_mark
-                    )
+                    raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
         return mapping
 
@@ -96,9 +91,7 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        msg = (
-            f"{source}{where}: not valid YAML: {error.problem or error.context}; correct this line"
-        )
+        msg = f"{source}{where}: not valid YAML: {error.problem or error.context}; correct this line"
         raise InputError(msg) from error
     except yaml.YAMLError as error:
         msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
@@ -129,10 +122,7 @@ def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
     table = []
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header) or not all(cell.strip() for cell in row):
-            msg = (
-                f"{source}, row {number}: expected {len(header)} filled cells "
-                f"({', '.join(header)}): got {row!r}"
-            )
+            msg = f"{source}, row {number}: expected {len(header)} filled cells ({', '.join(header)}): got {row!r}"
             raise InputError(msg)
         table.append({name: _cell(cell.strip()) for name, cell in zip(header, row, strict=True)})
     return table
@@ -154,22 +144,6 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean {close[0]!r}?"
     return f"known: {', '.join(words) or 'none'}"
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file so that it is whole or absent: beside, then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.tmp")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
-
-
-def write_json(path: Path, content: object) -> None:
-    """Write JSON so that it is whole or absent."""
-    write_whole(path, json.dumps(content, indent=1, ensure_ascii=False) + os.linesep)
 
 
 def read_json(path: Path) -> dict[str, Any] | None:

@@ -88,9 +88,7 @@ def write_frame(
         "floor_z_m": np.full(3 * count, floor_z),
         "phase": np.full(3 * count, phase, dtype=np.int64),
     }
-    mesh = meshio.Mesh(
-        vertices.reshape(-1, 3), [("line", lines)], cell_data={k: [v] for k, v in data.items()}
-    )
+    mesh = meshio.Mesh(vertices.reshape(-1, 3), [("line", lines)], cell_data={k: [v] for k, v in data.items()})
     meshio.vtu.write(str(path), mesh)
 
 
@@ -120,9 +118,7 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
         timed.append({"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": 1.0})
         start, previous = end, target
     sets = "".join(f'<DataSet timestep="{t!r}" file="{n}"/>' for t, n in map(_plain, entries))
-    (directory / "frames.pvd").write_text(
-        f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>'
-    )
+    (directory / "frames.pvd").write_text(f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>')
     if run.series:
         _write_series(directory, run, np.array(rows))
     if run.status == "done":

@@ -1,0 +1,167 @@
+"""measure, render: what came out of runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.layout import columns
+from cli.parsing import Commands, Parser, add_json
+from dem.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Columns of the summary that a person wants to see first; a table has all.
+_SHOWN = (
+    "run",
+    "phase type",
+    "time [s]",
+    "smarticles [-]",
+    "phi second-highest-com [-]",
+    "phi second-highest-com SE [-]",
+    "crossings mean [-]",
+    "com height [m]",
+)
+_FILM_SUFFIXES = (".gif", ".webp", ".mp4")
+
+
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    measure = commands.add(
+        "measure",
+        measure_runs,
+        summary="packing fraction, crossings, heights, contacts of runs",
+        text="""
+Reads VTK frames and HDF5 series of runs that are done, failed or still going on. One row per phase,
+averaged over its last frames, with standard errors (SE). φ is given by several definitions, each
+named in its column. Of a sweep's directory, all runs that have frames are measured.""",
+        examples="""\
+  smarticles measure runs/a
+  smarticles measure runs/a runs/b --table phases.csv
+  smarticles measure runs/a --frames --table frames.csv     one row per frame
+  smarticles measure runs/a --json
+""",
+    )
+    measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
+    measure.add_argument("--table", type=Path, metavar="FILE.csv", help="write all columns as CSV")
+    measure.add_argument("--frames", action="store_true", help="one row per frame, not per phase")
+    _add_overwrite(measure)
+    add_json(measure)
+
+    render = commands.add(
+        "render",
+        render_run,
+        summary="draw a picture or a film of a run",
+        text="""
+Draws the true boxes of all smarticles in a cylinder that is cut open in front. Needs no display.
+The end of the output's name decides: .png is a picture; .gif, .webp and .mp4 are films.""",
+        examples="""\
+  smarticles render runs/a                                   last frame, runs/a/render.png
+  smarticles render runs/a --time 1.5 --color-by speed --output shaken.png
+  smarticles render runs/a --output film.gif
+""",
+    )
+    render.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    render.add_argument("--output", type=Path, metavar="FILE", help="default: DIR/render.png")
+    render.add_argument("--time", type=float, metavar="S", help="simulated time [s]; default: end")
+    render.add_argument(
+        "--color-by",
+        default="crossings",
+        metavar="WHAT",
+        help="crossings (default; links of others through its plane), contacts, height, speed, id",
+    )
+    render.add_argument("--view", default="front", metavar="VIEW", help="front (default), oblique, top")
+    _add_overwrite(render)
+
+
+def _add_overwrite(parser: Parser) -> None:
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+
+
+def run_directories(directories: Sequence[Path]) -> list[Path]:
+    """Run directories among, or inside, the given ones: a sweep stands for its runs with frames.
+
+    Raises:
+        InputError: a sweep has no run with frames yet.
+    """
+    from templates.folder import MANIFEST, open_folder  # noqa: PLC0415
+
+    found: list[Path] = []
+    for directory in directories:
+        if not (directory / MANIFEST).is_file():
+            found.append(directory)
+            continue
+        folder = open_folder(directory)
+        runs = [folder.run(entry) for entry in folder.entries]
+        begun = [run for run in runs if (run / "frames.pvd").is_file()]
+        if not begun:
+            msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
+            raise InputError(msg)
+        found += begun
+    return found
+
+
+def measure_runs(arguments: argparse.Namespace) -> int:
+    """`smarticles measure`."""
+    import pandas as pd  # noqa: PLC0415
+
+    from postprocess.measure import measure_run, summarise_run  # noqa: PLC0415
+    from postprocess.tables import write_table  # noqa: PLC0415
+
+    output: Path | None = arguments.table
+    if output is not None and output.exists() and not arguments.overwrite:
+        # Said before measuring, not after.
+        msg = f"--table {output}: exists; choose another name or give --overwrite"
+        raise InputError(msg)
+    measure = measure_run if arguments.frames else summarise_run
+    directories = run_directories(arguments.directories)
+    table = pd.concat([measure(directory) for directory in directories], ignore_index=True)
+    if output is not None:
+        write_table(table, output, overwrite=arguments.overwrite)
+    if arguments.json:
+        print(json.dumps(_records(table), indent=2, ensure_ascii=False))
+        return 0
+    shown = [name for name in _SHOWN if name in table.columns]
+    print(columns(shown, table[shown].values.tolist()))
+    if output is not None:
+        print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
+    return 0
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, object]]:
+    """Rows as plain data; JSON has no NaN."""
+    return [
+        {
+            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in row.items()
+        }
+        for row in table.to_dict("records")
+    ]
+
+
+def render_run(arguments: argparse.Namespace) -> int:
+    """`smarticles render`."""
+    from postprocess import render  # noqa: PLC0415  (imports PyVista)
+
+    output: Path | None = arguments.output
+    look = {"color_by": arguments.color_by, "view": arguments.view}
+    if output is not None and output.suffix in _FILM_SUFFIXES:
+        if arguments.time is not None:
+            msg = f"--time {arguments.time:g}: a film shows all times; leave it out, or write .png"
+            raise InputError(msg)
+        written = render.render_film(arguments.directory, output, overwrite=arguments.overwrite, **look)
+    else:
+        written = render.render_run(
+            arguments.directory,
+            output=output,
+            time=arguments.time,
+            overwrite=arguments.overwrite,
+            **look,
+        )
+    print(written)
+    return 0

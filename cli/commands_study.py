@@ -1,0 +1,134 @@
+"""study: a shipped sweep, run, measured and compared with its reference."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.commands_sweep import add_slots, compute, make_folder, refuse_failures
+from cli.layout import columns
+from cli.parsing import Commands
+
+if TYPE_CHECKING:
+    from templates.folder import Entry, Folder
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Study:
+    """What is done with the runs of a study.
+
+    Args:
+        analyse: (run directories, output directory, note, command) -> text for the terminal.
+        pictured: values of the run that a picture is drawn of.
+    """
+
+    analyse: Callable[[Sequence[Path], Path, str, str], str]
+    pictured: Mapping[str, object]
+
+
+def _analyse_gravish(runs: Sequence[Path], output: Path, note: str, command: str) -> str:
+    from postprocess.gravish import analyse_gravish  # noqa: PLC0415
+
+    report = analyse_gravish(runs, output, note=note, command=command)
+    header = ["φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"]
+    rows = [
+        [
+            row["stage"],
+            row["aspect ratio [-]"],
+            row["seeds [-]"],
+            row["phi [-]"],
+            row["phi 95 % [-]"],
+            row["phi Gravish [-]"],
+            round(row["deviation [%]"], 1),
+        ]
+        for row in report.deviations.to_dict("records")
+    ]
+    verdicts = [[verdict.question, verdict.answer, verdict.evidence] for verdict in report.verdicts]
+    figures = [str(path) for path in report.files.values() if path.suffix == ".png"]
+    return "\n".join(
+        [
+            columns(header, rows),
+            "",
+            columns(["question", "answer", "evidence"], verdicts),
+            "",
+            *(f"figure: {figure}" for figure in figures),
+            f"tables, and the origin of every number: {output}",
+        ]
+    )
+
+
+_STUDIES = {"gravish": _Study(analyse=_analyse_gravish, pictured={"l_over_w": 0.7})}
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    study = commands.add(
+        "study",
+        run_study,
+        summary="a shipped sweep: run, measure, compare with its reference",
+        text="""
+gravish: U-shapes of several aspect ratios l/w, poured into a cylinder and shaken at Γ = 2, 30 Hz,
+against the packing fractions that Gravish et al. measured (PRL 108, 208001). --quick takes minutes
+and prints how it differs from the full study, which takes hours.
+
+DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
+same command again goes on where it stopped.""",
+        examples="""\
+  smarticles study gravish --quick --out demo
+  smarticles study gravish --out gravish
+  smarticles status gravish                                  from another terminal
+""",
+    )
+    study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))
+    study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
+    study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
+    add_slots(study)
+
+
+def run_study(arguments: argparse.Namespace) -> int:
+    """`smarticles study`."""
+    from templates.study import study_file  # noqa: PLC0415
+
+    study = _STUDIES[arguments.name]
+    file = study_file(arguments.name, quick=arguments.quick)
+    folder = make_folder(file, arguments.out, arguments.command_line)
+    note = _difference(arguments.name) if arguments.quick else "the full study as shipped"
+    print(note, flush=True)
+    outcomes = compute(folder, arguments)
+    finished = [entry for entry in folder.entries if folder.is_done(entry)]
+    if finished:
+        results = folder.path / "results"
+        # All runs: those that are not done are listed as missing in every table.
+        runs = [folder.run(entry) for entry in folder.entries]
+        print(study.analyse(runs, results, note, arguments.command_line))
+        sys.stdout.flush()
+        _draw(folder, finished, study.pictured, results / "run.png")
+    # Last, so that what is there is shown before what is missing.
+    refuse_failures(folder, outcomes)
+    return 0
+
+
+def _difference(name: str) -> str:
+    """How the quick variant differs from the full study, one line."""
+    from templates.expand import expand  # noqa: PLC0415
+    from templates.study import differences, study_file  # noqa: PLC0415
+    from templates.sweep import load_sweep  # noqa: PLC0415
+
+    quick, full = (expand(load_sweep(study_file(name, quick=variant))) for variant in (True, False))
+    return f"quick variant, not the full study: {'; '.join(differences(quick, full))}"
+
+
+def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:
+    """Draw the first finished run that has these values."""
+    from postprocess.render import render_run  # noqa: PLC0415  (imports PyVista)
+
+    for entry in finished:
+        if all(entry.values.get(name) == value for name, value in values.items()):
+            output.parent.mkdir(parents=True, exist_ok=True)
+            render_run(folder.run(entry), output=output, overwrite=True)
+            print(f"picture of {entry.name}: {output}")
+            return

@@ -1,0 +1,162 @@
+"""What a run would do: phases, effects and why each is on or off, engines, time step, cost. Simulates nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from dem.parts import Deposit, Shake
+from dem.phases import container_height, shake_amplitude
+from dem.scene import Scene
+from dem.timestep import contact_law, stable_time_step, time_step
+
+# Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
+# differ by a factor of two.
+COST_PER_SPHERE_STEP = 3.3e-7
+# A pour costs about half of the same time in the full pile, since the pile grows from nothing; 0.1 s per layer.
+POUR_SHARE = 0.5
+LAYER_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect: whether the scene calls for it, and why."""
+
+    name: str
+    on: bool
+    why: str
+    costs: str
+
+
+@dataclass(frozen=True)
+class PlannedPhase:
+    """One phase: its duration (None where a criterion ends it, then `estimate_s` is a guess) and its cost."""
+
+    index: int
+    type: str
+    duration_s: float | None
+    estimate_s: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything `smarticles plan` says."""
+
+    name: str
+    count: int
+    spheres_per_smarticle: int
+    sphere_diameter_m: float
+    time_step_s: float
+    stable_time_step_s: float
+    container_height_m: float
+    phases: tuple[PlannedPhase, ...]
+    effects: tuple[Effect, ...]
+    engines: tuple[str, ...]
+    frames: int
+    wall_s: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for `--json`."""
+        return asdict(self)
+
+    def to_text(self) -> str:
+        """A table for the terminal."""
+        lines = [
+            f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
+            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, wall {1e3 * self.container_height_m:.0f} mm high",
+            f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)",
+            "",
+            f"{'phase':<12}{'simulated':>12}{'expected wall time':>22}",
+        ]
+        for phase in self.phases:
+            guess = "" if phase.duration_s is not None else "≈ "
+            label = f"{phase.index} {phase.type}"
+            lines.append(f"{label:<12}{f'{guess}{phase.estimate_s:.2f} s':>12}{f'{phase.wall_s:.0f} s':>22}")
+        lines += [
+            f"{'total':<12}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{f'{self.wall_s:.0f} s':>22}",
+            "(one core; machines differ by a factor of two)",
+            "",
+            f"{'effect':<20}{'':<5}why",
+        ]
+        lines += [f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}" for effect in self.effects]
+        lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
+        return "\n".join(lines)
+
+
+def plan(scene: Scene) -> Plan:
+    """Plan a scene.
+
+    Raises:
+        InputError: the scene's time step is above the stable one.
+    """
+    dt = time_step(scene)
+    particle = scene.particle
+    spheres = len(particle.centres)
+    rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
+    phases = []
+    for index, phase in enumerate(scene.phases):
+        if isinstance(phase, Deposit):
+            estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
+            phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
+        else:
+            estimate = phase.duration_s
+            phases.append(PlannedPhase(index, phase.type, estimate, estimate, rate * estimate))
+    simulated = sum(phase.estimate_s for phase in phases)
+    effects = _effects(scene)
+    return Plan(
+        name=scene.name,
+        count=scene.count,
+        spheres_per_smarticle=spheres,
+        sphere_diameter_m=particle.chain.diameter,
+        time_step_s=dt,
+        stable_time_step_s=stable_time_step(particle, contact_law(scene)),
+        container_height_m=container_height(scene),
+        phases=tuple(phases),
+        effects=effects,
+        engines=_engines(effects),
+        frames=round(simulated / scene.recording.frame_interval_s),
+        wall_s=sum(phase.wall_s for phase in phases),
+    )
+
+
+def _effects(scene: Scene) -> tuple[Effect, ...]:
+    contact = scene.contact
+    shakes = [(k, phase) for k, phase in enumerate(scene.phases) if isinstance(phase, Shake)]
+    shaken = bool(shakes)
+    amplitudes = ", ".join(
+        f"phase {k}: Γ = {phase.peak_acceleration_g:g}, f = {phase.frequency_hz:g} Hz, "
+        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm"
+        for k, phase in shakes
+    )
+    return (
+        Effect("gravity", True, f"g = {scene.gravity_m_per_s2:g} m/s²", "part of the integrator"),
+        Effect(
+            "friction",
+            contact.friction_smarticle > 0 or contact.friction_wall > 0,
+            f"μ = {contact.friction_smarticle:g} between smarticles, {contact.friction_wall:g} at the container",
+            "part of the contact law",
+        ),
+        Effect(
+            "dissipation",
+            contact.restitution < 1,
+            f"restitution {contact.restitution:g} at a typical lever",
+            "part of the contact law",
+        ),
+        Effect(
+            "container motion",
+            shaken,
+            amplitudes if shaken else "no phase of type shake",
+            "one engine over the container's bodies",
+        ),
+        Effect("articulation", False, "no phase actuates; each smarticle is one welded clump", "none"),
+    )
+
+
+def _engines(effects: tuple[Effect, ...]) -> tuple[str, ...]:
+    on = {effect.name for effect in effects if effect.on}
+    engines = ["ForceResetter", "InsertionSortCollider", "InteractionLoop"]
+    if "container motion" in on:
+        engines.append("HarmonicMotionEngine")
+    return (*engines, "NewtonIntegrator")

@@ -1,0 +1,332 @@
+"""Small simulations whose answer is known. They run in the worker process of `conftest.py`, never in pytest's own:
+
+YADE keeps one scene per process, installs handlers, and must not meet PyVista's VTK. Each case builds its engine anew and
+returns plain numbers and arrays; the tests compare them with the answer. Lengths in m, times in s, SI throughout.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.engine import Cylinder, Engine, yade_version
+from dem.phases import container_height, shake_amplitude
+from dem.placement import Poses, place_layer
+from dem.scene import Scene, Shake, parse_scene
+from dem.series import SeriesWriter
+from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
+
+UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
+FLAT = Rotation.identity()
+
+
+def load(data: dict[str, Any]) -> Scene:
+    return parse_scene(data, source="case")
+
+
+def build(
+    scene: Scene,
+    *,
+    law: ContactLaw | None = None,
+    gravity: float | None = None,
+    dt: float | None = None,
+    radius: float | None = None,
+    shaken: bool = False,
+) -> Engine:
+    return Engine(
+        particle=scene.particle,
+        cylinder=Cylinder(
+            radius=radius or scene.container.radius_m, height=container_height(scene), facets=64
+        ),
+        law=law or contact_law(scene),
+        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
+        time_step=dt or time_step(scene),
+        shaken=shaken,
+    )
+
+
+def add(engine: Engine, position: Any, rotation: Rotation = FLAT) -> None:
+    engine.add(Poses(np.array([position], dtype=float), (rotation,)))
+
+
+def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> None:
+    """Give a smarticle a velocity; YADE integrates the angular momentum, so that is set too."""
+    clump = engine._clumps[k]
+    rotation = engine.state().rotations[k]
+    momentum = (
+        rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
+    )
+    clump.vel = engine._vector(*map(float, velocity))
+    clump.angVel = engine._vector(*map(float, spin))
+    clump.angMom = engine._vector(*momentum)
+
+
+def version() -> str:
+    return yade_version()
+
+
+def fall(data: dict[str, Any], *, height: float, steps: list[int]) -> dict[str, Any]:
+    engine = build(load(data))
+    add(engine, (0, 0, height), Rotation.from_rotvec([0.3, -0.5, 0.2]))
+    times, heights, speeds = [], [], []
+    for n in steps:
+        engine.advance(n - engine.steps)
+        state = engine.state()
+        times.append(engine.time)
+        heights.append(state.positions[0, 2])
+        speeds.append(state.velocities[0, 2])
+    return {
+        "time": np.array(times),
+        "z": np.array(heights),
+        "v": np.array(speeds),
+        "dt": engine.time_step,
+        "xy": engine.state().positions[0, :2],
+        "rotation": engine.state().rotations[0],
+    }
+
+
+def spin(data: dict[str, Any], *, spin: list[float], dt: float, samples: int, every: int) -> dict:
+    """A free spin; `before` is the rotation one step earlier: YADE's spin belongs to the middle of the step."""
+    engine = build(load(data), gravity=0.0, dt=dt)
+    add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
+    push(engine, 0, spin=spin)
+    out: dict[str, list[Any]] = {"time": [], "before": [], "rotation": [], "spin": [], "z": []}
+    start = engine.state()
+    for _ in range(samples):
+        engine.advance(every - 1)
+        out["before"].append(engine.state().rotations[0])
+        engine.advance(1)
+        state = engine.state()
+        out["time"].append(engine.time)
+        out["rotation"].append(state.rotations[0])
+        out["spin"].append(state.angular_velocities[0])
+        out["z"].append(state.positions[0])
+    return {
+        **{key: np.array(value) for key, value in out.items()},
+        "start": start.rotations[0],
+        "inertia": engine.particle.boxes.inertia,
+    }
+
+
+def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[str, Any]:
+    """Tensors and sphere positions in the engine against the particle's, at random poses and after some steps."""
+    scene = load(data)
+    engine = build(scene, gravity=0.0, radius=1.0)
+    rng = np.random.default_rng(seed)
+    rotations = tuple(Rotation.random(random_state=rng) for _ in range(count))
+    positions = np.stack([0.06 * np.arange(count) - 0.5, np.zeros(count), np.full(count, 0.05)], 1)
+    engine.add(Poses(positions, rotations))
+    start = engine.state()
+    for k in range(count):
+        push(engine, k, spin=rng.normal(size=3) * 30)
+    engine.advance(steps)
+    state = engine.state()
+    members = {k: [] for k in range(count)}
+    for body, k in engine._smarticle_of.items():
+        members[k].append(np.array(engine._omega.bodies[body].state.pos))
+    tensors = []
+    for clump in engine._clumps:
+        axes = np.array(clump.ori.toRotationMatrix()).reshape(3, 3)
+        tensors.append(axes @ np.diag(np.array(clump.inertia)) @ axes.T)
+    return {
+        "asked": np.array([r.as_matrix() for r in rotations]),
+        "asked_positions": positions,
+        "start": start.rotations,
+        "start_positions": start.positions,
+        "rotations": state.rotations,
+        "tensors": np.array(tensors),
+        "masses": np.array([clump.mass for clump in engine._clumps]),
+        "spheres": np.array([members[k] for k in range(count)]),
+        "expected_spheres": state.points(scene.particle.centres),
+    }
+
+
+def rebound(data: dict[str, Any], *, speed: float, refine: float) -> dict[str, Any]:
+    """An upright bar falls on its end: the contact force passes through the centre of mass."""
+    scene = load(data)
+    law = contact_law(scene)
+    engine = build(scene, gravity=0.0, dt=time_step(scene) / refine)
+    add(engine, (0, 0, scene.smarticle.middle_length_m / 2 + 1e-4), UPRIGHT)
+    push(engine, 0, velocity=(0, 0, -speed))
+    engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
+    state = engine.state()
+    return {
+        "after": state.velocities[0],
+        "spin": state.angular_velocities[0],
+        "mass": engine.particle.boxes.mass,
+        "law": dataclasses.asdict(law),
+    }
+
+
+def collide(data: dict[str, Any], *, speed: float, refine: float) -> dict[str, Any]:
+    """Two upright bars in free space, end to end: the reduced mass is half of one."""
+    scene = load(data)
+    engine = build(scene, gravity=0.0, dt=time_step(scene) / refine)
+    w = scene.smarticle.middle_length_m
+    add(engine, (0, 0, 0.05), UPRIGHT)
+    add(engine, (0, 0, 0.05 + w + 1e-4), UPRIGHT)
+    push(engine, 0, velocity=(0, 0, speed / 2))
+    push(engine, 1, velocity=(0, 0, -speed / 2))
+    engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
+    v = engine.state().velocities
+    return {
+        "after": v,
+        "mass": engine.particle.boxes.mass,
+        "law": dataclasses.asdict(contact_law(scene)),
+    }
+
+
+def slide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
+    """A smarticle lying flat is pushed along the floor, in the direction of its axis of symmetry."""
+    scene = load(data)
+    engine = build(scene, radius=0.1)
+    law, particle = contact_law(scene), scene.particle
+    sunk = (
+        particle.boxes.mass
+        * scene.gravity_m_per_s2
+        / (len(particle.centres) * law.normal_stiffness)
+    )
+    lowest = particle.centres[:, 2].min() - particle.radius
+    add(engine, (0, -0.03, -lowest - sunk))
+    push(engine, 0, velocity=(0, speed, 0))
+    times, ys, vs = [0.0], [-0.03], [speed]
+    while engine.time < duration:
+        engine.advance(max(1, round(2e-3 / engine.time_step)))
+        state = engine.state()
+        times.append(engine.time)
+        ys.append(state.positions[0, 1])
+        vs.append(state.velocities[0, 1])
+    return {
+        "time": np.array(times),
+        "y": np.array(ys),
+        "v": np.array(vs),
+        "x": state.positions[0, 0],
+        "spin": state.angular_velocities[0],
+    }
+
+
+def _pour(engine: Engine, scene: Scene, count: int) -> None:
+    poses = place_layer(
+        scene.particle,
+        count=count,
+        radius=scene.container.radius_m,
+        bottom=1e-4,
+        height=2e-2,
+        obstacles=np.empty((0, 3)),
+        rng=np.random.default_rng(scene.seed),
+    )
+    engine.add(poses)
+
+
+def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict[str, Any]:
+    scene = load(data)
+    engine = build(scene)
+    _pour(engine, scene, count)
+    engine.advance(round(settle / engine.time_step))
+    writer = SeriesWriter(
+        Path(), scene.container.radius_m, scene.gravity_m_per_s2, {}
+    )
+    writer.sample(engine, engine.state(), 0)
+    forces = []
+    for _ in range(watch):
+        engine.advance(1)
+        forces.append(engine.container_force())
+    state = engine.state()
+    writer.sample(engine, state, 0)
+    return {
+        "forces": np.array(forces),
+        "balance": writer._rows["container_force_N"][-1],
+        "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
+        "speed": np.linalg.norm(state.velocities, axis=1).max(),
+        "unbalanced": engine.unbalanced_force(),
+        "touches": engine.touches(),
+        "contacts": engine.contacts(),
+    }
+
+
+def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0) -> dict[str, Any]:
+    """Position and velocity of an empty container at every step."""
+    scene = load(data)
+    engine = build(scene, shaken=True)
+    phase = next(p for p in scene.phases if isinstance(p, Shake))
+    amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
+    engine.advance(delay)
+    begun, start = engine.time, engine.floor
+    engine.shake(amplitude=amplitude, frequency=phase.frequency_hz)
+    times, floors, speeds = [], [], []
+    for _ in range(math.ceil(periods / phase.frequency_hz / engine.time_step)):
+        engine.advance(1)
+        times.append(engine.time - begun)
+        floors.append(engine.floor)
+        speeds.append(engine.container_velocity)
+    wall = np.array(engine._omega.bodies[engine._container[0]].state.pos)[2]
+    last = engine.floor
+    engine.stop_container()
+    engine.advance(rest)
+    return {
+        "time": np.array(times),
+        "z": np.array(floors) - start,
+        "v": np.array(speeds),
+        "dt": engine.time_step,
+        "amplitude": amplitude,
+        "wall_moved": wall - start,
+        "crept": engine.floor - last,
+        "rest_velocity": engine.container_velocity,
+    }
+
+
+def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) -> dict[str, Any]:
+    """The momentum balance against the contact force of every step, in a pile that is thrown about."""
+    scene = load(data)
+    engine = build(scene, shaken=True)
+    _pour(engine, scene, count)
+    engine.advance(round(0.15 / engine.time_step))
+    phase = next(p for p in scene.phases if isinstance(p, Shake))
+    engine.shake(
+        amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz
+    )
+    writer = SeriesWriter(
+        Path(), scene.container.radius_m, scene.gravity_m_per_s2, {}
+    )
+    writer.sample(engine, engine.state(), 0)
+    means = []
+    for _ in range(samples):
+        total = np.zeros(3)
+        for _ in range(every):
+            engine.advance(1)
+            total += engine.container_force()
+        means.append(total / every)
+        writer.sample(engine, engine.state(), 0)
+    return {
+        "steps": np.array(means),
+        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
+    }
+
+
+def stack(
+    data: dict[str, Any], *, layers: int, settle: float, watch: float, times_stable: float | None
+) -> dict[str, Any]:
+    """Smarticles lying flat on each other, let go from a slight height; largest speed after they settled."""
+    scene = load(data)
+    dt = None
+    if times_stable is not None:
+        dt = times_stable * stable_time_step(scene.particle, contact_law(scene))
+    engine = build(scene, dt=dt)
+    particle = scene.particle
+    thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
+    for k in range(layers):
+        add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
+    engine.advance(round(settle / engine.time_step))
+    fastest = 0.0
+    rounds = 20
+    for _ in range(rounds):
+        engine.advance(max(1, round(watch / rounds / engine.time_step)))
+        fastest = max(fastest, float(np.linalg.norm(engine.state().velocities, axis=1).max()))
+    state = engine.state()
+    return {"fastest": fastest, "z": state.positions[:, 2], "thick": thick, "dt": engine.time_step}

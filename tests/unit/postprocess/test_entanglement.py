@@ -1,0 +1,243 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from dem.errors import InputError
+from postprocess import crossing_pairs, entanglement, has_plane, link_crossings, linking_pairs
+
+U = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
+
+
+def triangle_sign(start, end, a, b, c):
+    """Möller–Trumbore: +1 or -1 if the segment passes the triangle, by the side it comes from."""
+    along = end - start
+    normal_part = np.cross(along, c - a)
+    determinant = (b - a) @ normal_part
+    if determinant == 0:
+        return 0
+    u = (start - a) @ normal_part / determinant
+    other = np.cross(start - a, b - a)
+    v = along @ other / determinant
+    t = (c - a) @ other / determinant
+    return int(np.sign(determinant)) if min(u, v, 1 - u - v, t, 1 - t) > 0 else 0
+
+
+def brute_force_pairs(vertices):
+    """Every link against a fan of two signed triangles, whose sum is the outline's winding."""
+    found = {}
+    for i, quad in enumerate(vertices):
+        lengths = np.linalg.norm(np.diff(quad, axis=0), axis=1)
+        if np.linalg.norm(quad[3] - quad[0]) > 0.99 * lengths.sum():
+            continue
+        for j, other in enumerate(vertices):
+            passing = sum(
+                triangle_sign(p, q, *quad[[0, 1, 2]]) + triangle_sign(p, q, *quad[[0, 2, 3]]) != 0
+                for p, q in pairwise(other)
+            )
+            if i != j and passing:
+                found[i, j] = passing
+    return found
+
+
+def gauss_linking(first, second):
+    """Linking number of two closed polygons from solid angles (Klenin and Langowski 2000)."""
+
+    def unit(vector):
+        return vector / np.linalg.norm(vector)
+
+    total = 0.0
+    for p0, p1 in zip(first, np.roll(first, -1, axis=0), strict=True):
+        for q0, q1 in zip(second, np.roll(second, -1, axis=0), strict=True):
+            r = [q0 - p0, q1 - p0, q1 - p1, q0 - p1]
+            normals = [unit(np.cross(r[k], r[(k + 1) % 4])) for k in range(4)]
+            dots = [np.clip(normals[k] @ normals[(k + 1) % 4], -1, 1) for k in range(4)]
+            sign = np.sign(np.cross(q1 - q0, p1 - p0) @ (q0 - p0))
+            total += sign * np.arcsin(dots).sum()
+    return total / (4 * np.pi)
+
+
+def self_crossing(quad):
+    """Whether the mouth cuts the middle link, seen in the plane of the shape."""
+    frame = np.linalg.svd(quad - quad.mean(axis=0))[2][:2]
+    tip, left, right, other = (quad - quad.mean(axis=0)) @ frame.T
+
+    def side(a, b, c):
+        return np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+    return side(left, right, tip) != side(left, right, other) and side(tip, other, left) != side(tip, other, right)
+
+
+@pytest.mark.parametrize("angles", [None, (90, 90), (60, 60), (105, 105)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_random_scenes_match_brute_force(scene, angles, seed):
+    vertices = scene(18, seed, box=1.2, angles=angles)
+    expected = brute_force_pairs(vertices)
+    assert len(expected) > 20
+    pairs = crossing_pairs(vertices)
+    found = {(i, j): n for i, j, n in zip(*(p.tolist() for p in pairs), strict=True)}
+    assert found == expected
+    counts = np.zeros(18, dtype=int)
+    for (i, _), number in expected.items():
+        counts[i] += number
+    np.testing.assert_array_equal(link_crossings(vertices), counts)
+
+
+def test_self_crossing_outlines_match_brute_force(scene):
+    vertices = np.concatenate([scene(15, 2, box=1.2, angles=(-60, 100)), scene(15, 3, box=1.2, angles=(90, 90))])
+    assert self_crossing(vertices[0])
+    expected = brute_force_pairs(vertices)
+    assert any(i < 15 for i, _ in expected)
+    pairs = crossing_pairs(vertices)
+    assert dict(zip(zip(pairs.i, pairs.j, strict=True), pairs.links, strict=True)) == expected
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_linking_numbers_match_the_gauss_integral(scene, seed):
+    vertices = scene(10, seed, box=1.0)
+    found = {(i, j): n for i, j, n in zip(*linking_pairs(vertices), strict=True)}
+    planes = has_plane(vertices)
+    linked = 0
+    for i in range(10):
+        for j in range(i + 1, 10):
+            if planes[i] and planes[j]:
+                number = gauss_linking(vertices[i], vertices[j])
+                assert number == pytest.approx(round(number), abs=1e-6)
+                assert found.get((i, j), 0) == round(number)
+                linked += round(number) != 0
+    assert linked > 0
+
+
+def test_hooked_both_ways():
+    # Mouths face each other: each middle link passes through the other's plane.
+    other = np.array([[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]])
+    np.testing.assert_array_equal(link_crossings([U, other]), [1, 1])
+    assert abs(linking_pairs([U, other]).number).tolist() == [1]
+
+
+def test_hooked_one_way():
+    # Mouths face the same way: only the closing edge of U passes through the other's plane.
+    other = np.array([[0.0, 3, -1], [0, 1, -1], [0, 1, 1], [0, 3, 1]])
+    np.testing.assert_array_equal(link_crossings([U, other]), [1, 0])
+    assert abs(linking_pairs([U, other]).number).tolist() == [1]
+
+
+def test_both_barbs_through_count_twice_but_link_nothing():
+    other = np.array([[-0.5, 1, -1], [-0.5, 1, 1], [0.5, 1, 1], [0.5, 1, -1]])
+    np.testing.assert_array_equal(link_crossings([U, other]), [2, 0])
+    pairs = crossing_pairs([U, other])
+    assert (pairs.i.tolist(), pairs.j.tolist(), pairs.links.tolist()) == ([0], [1], [2])
+    assert len(linking_pairs([U, other]).number) == 0
+
+
+def test_side_by_side_is_not_entangled():
+    shifts = [[0, 0, 0], [0, 0, 0.1], [0, 0, 0.2], [2.5, 0, 0]]
+    stacked = [U + np.array(shift) for shift in shifts]
+    np.testing.assert_array_equal(link_crossings(stacked), [0, 0, 0, 0])
+    assert len(linking_pairs(stacked).i) == 0
+
+
+def pin(x, y, low=-1.0, high=1.0):
+    """A smarticle with a barb along z from `low` to `high` at x, y and the rest far off."""
+    return np.array([[x, y, low], [x, y, high], [x, y + 4, high], [x, y + 4, low]])
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        (pin(0, 1), 1),
+        (pin(0, 1e-6), 1),
+        (pin(0, 0), 0),  # meets the middle link
+        (pin(1, 1), 0),  # meets a barb
+        (pin(-1, 2), 0),  # meets a tip
+        (pin(0.3, 2), 0),  # meets the closing edge of the mouth
+        (pin(0.3, 1.999), 1),
+        (pin(0, -1e-6), 0),
+        (pin(0, 1, low=0.0), 0),  # ends in the plane
+        (pin(0, 1, low=0.5), 0),  # ends short of it
+        (np.array([[0.0, 1, 0], [0.5, 1, 0], [0.5, 1.5, 0], [0, 1.5, 0]]), 0),  # lies in it
+    ],
+)
+def test_touching_is_not_passing(other, expected):
+    turn = Rotation.from_rotvec([0.3, -0.7, 0.2]).as_matrix()
+    assert link_crossings([U, other])[0] == expected
+    # Rounding must not decide: the same after a turn, and with A's vertices in reverse order.
+    assert link_crossings(np.array([U, other]) @ turn.T)[0] == expected
+    assert link_crossings([U[::-1], other])[0] == expected
+
+
+def test_concave_outline_excludes_its_notch():
+    # Barbs folded inwards make the mouth's edge leave a notch at the right barb.
+    notched = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [-0.5, 0.5, 0]])
+    points = {(-0.8, 0.5): 1, (0.8, 0.5): 0, (0.0, 0.1): 1, (-0.4, 0.8): 0}
+    for (x, y), expected in points.items():
+        assert link_crossings([notched, pin(x, y)])[0] == expected
+
+
+def test_straight_smarticles_have_no_plane(shape):
+    straight = shape(1.0, 0.7, (0, 0))
+    nearly = shape(1.0, 0.7, (5, 5))
+    bars = shape(1.0, 0.0, (90, 90))
+    bent = shape(1.0, 0.7, (30, 30))
+    np.testing.assert_array_equal(has_plane([straight, nearly, bars, bent]), [False, False, False, True])
+
+
+def test_straight_smarticles_pass_but_are_skipped_in_the_mean(shape):
+    needle = np.array([[0.0, 1, -2], [0, 1, -0.5], [0, 1, 0.5], [0, 1, 2]])
+    result = entanglement([U, needle, U + np.array([9, 0, 0])])
+    np.testing.assert_array_equal(result.crossings, [1, 0, 0])
+    np.testing.assert_array_equal(result.has_plane, [True, False, True])
+    assert result.mean == 0.5
+    assert np.isnan(entanglement([needle, needle + 0.1]).mean)
+
+
+def test_bars_without_barbs_pass_through_others(shape):
+    bar = shape(2.0, 0.0) @ Rotation.from_euler("y", 90, degrees=True).as_matrix().T + [0, 1, 0]
+    # The links of no length pass through nothing.
+    np.testing.assert_array_equal(link_crossings([U, bar]), [1, 0])
+
+
+def test_slightly_bent_out_of_plane(scene):
+    vertices = scene(25, 5, box=1.6, angles=(90, 90))
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(vertices.shape)
+    np.testing.assert_array_equal(link_crossings(vertices + noise), link_crossings(vertices))
+
+
+def test_few_smarticles():
+    assert link_crossings(np.empty((0, 4, 3))).shape == (0,)
+    assert link_crossings([U]).tolist() == [0]
+    assert np.isnan(entanglement(np.empty((0, 4, 3))).mean)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    rotation=st.tuples(*[st.floats(-3, 3)] * 3),
+    shift=st.tuples(*[st.floats(-10, 10)] * 3),
+    scale=st.floats(1e-3, 10),
+    seed=st.integers(0, 50),
+)
+def test_rigid_motion_scale_and_order_change_nothing(scene, rotation, shift, scale, seed):
+    vertices = scene(12, seed, box=1.2)
+    expected = link_crossings(vertices)
+    turn = Rotation.from_rotvec(rotation).as_matrix()
+    moved = scale * (vertices @ turn.T + shift)
+    np.testing.assert_array_equal(link_crossings(moved), expected)
+    np.testing.assert_array_equal(link_crossings(moved[:, ::-1]), expected)
+    np.testing.assert_array_equal(link_crossings(moved[::-1]), expected[::-1])
+    np.testing.assert_array_equal(linking_pairs(moved).number, linking_pairs(vertices).number)
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (np.zeros((4, 3)), r"must be \(N, 4, 3\) \[m\]: got \(4, 3\)"),
+        (np.full((1, 4, 3), np.nan), "smarticle 0 is not"),
+        (np.zeros((2, 4, 3)), "coincide"),
+    ],
+)
+def test_bad_vertices(bad, message):
+    with pytest.raises(InputError, match=message):
+        link_crossings(bad)

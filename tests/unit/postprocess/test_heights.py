@@ -1,0 +1,65 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dem.errors import InputError
+from postprocess import UndefinedMeasureError, centres_of_mass, heights, material_height
+
+
+def test_centre_of_mass_weighs_links_by_length(shape):
+    # Barbs of 0.7 at half their length, middle link of 1 at 0.
+    assert centres_of_mass([shape(1.0, 0.7)])[0] == pytest.approx([0, 2 * 0.7 * 0.35 / 2.4, 0])
+    # Not the mean of the vertices, and not that of the links' centres.
+    lopsided = np.array([[[0.0, 0, 1], [0, 0, 0], [3, 0, 0], [3, 0, 0]]])
+    assert centres_of_mass(lopsided)[0] == pytest.approx([4.5 / 4, 0, 0.5 / 4])
+
+
+def test_heights_above_a_moved_floor(shape):
+    flat = shape(1.0)
+    levels = heights([flat + np.array([0, 0, z]) for z in (1.0, 4.0, 2.0)], floor_z=0.5)
+    assert levels.mean_com == pytest.approx(7 / 3 - 0.5)
+    assert levels.highest_com == pytest.approx(3.5)
+    assert levels.second_highest_com == pytest.approx(1.5)
+    assert levels.top == pytest.approx(3.5)
+    assert levels.percentile == 95
+
+
+@pytest.mark.parametrize("percentile", [1, 30, 50, 95, 100])
+def test_material_of_an_upright_bar_is_spread_evenly(percentile):
+    bar = np.array([[[0.0, 0, 0], [0, 0, 1], [0, 0, 3], [0, 0, 4]]])
+    assert material_height(bar, percentile=percentile) == pytest.approx(0.04 * percentile)
+
+
+def test_material_height_matches_sampled_points(scene):
+    vertices = scene(20, 4)
+    share = (np.arange(2000) + 0.5) / 2000
+    samples, weights = [], []
+    for smarticle in vertices:
+        for start, end in pairwise(smarticle):
+            samples.append(start[2] + share * (end[2] - start[2]))
+            weights.append(np.full(2000, np.linalg.norm(end - start)))
+    samples, weights = np.concatenate(samples), np.concatenate(weights)
+    order = np.argsort(samples)
+    total = np.cumsum(weights[order]) / weights.sum()
+    expected = samples[order][np.searchsorted(total, 0.95)]
+    assert material_height(vertices, percentile=95) == pytest.approx(expected, abs=1e-3)
+
+
+def test_level_links_are_a_step(shape):
+    pair = [shape(1.0), shape(1.0) + np.array([0, 0, 1])]
+    assert material_height(pair, percentile=49) == pytest.approx(0, abs=1e-9)
+    assert material_height(pair, percentile=51) == pytest.approx(1)
+
+
+def test_one_and_no_smarticle(shape):
+    assert np.isnan(heights([shape()]).second_highest_com)
+    for measure in (heights, material_height):
+        with pytest.raises(UndefinedMeasureError, match="at least 1 smarticle"):
+            measure(np.empty((0, 4, 3)))
+
+
+@pytest.mark.parametrize("percentile", [0, -5, 101, np.nan])
+def test_bad_percentile(shape, percentile):
+    with pytest.raises(InputError, match="percentile must be"):
+        material_height([shape()], percentile=percentile)

@@ -1,0 +1,194 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+import postprocess
+from dem.errors import InputError
+from postprocess import (
+    link_crossings,
+    mean_with_error,
+    measure_run,
+    packing_change,
+    packing_fraction,
+    read_frames,
+    read_run,
+    summarise_run,
+    write_table,
+)
+from postprocess.packing import COSTLY_DEFINITIONS
+
+CHEAP = [name for name in postprocess.DEFINITIONS if name not in COSTLY_DEFINITIONS]
+PHI = "phi second-highest-com [-]"
+
+
+def test_mean_of_independent_samples():
+    samples = np.random.default_rng(1).normal(3.0, 2.0, 4000)
+    mean = mean_with_error(samples)
+    assert mean.value == samples.mean()
+    assert mean.standard_error == pytest.approx(2 / 4000**0.5, rel=0.15)
+    assert mean.count == 4000
+
+
+def test_error_allows_for_correlation():
+    # AR(1) with a = 0.8: correlation time (1 + a) / (1 - a) = 9 samples.
+    noise = np.random.default_rng(2).standard_normal(20000)
+    samples = np.zeros(20000)
+    for k in range(1, 20000):
+        samples[k] = 0.8 * samples[k - 1] + noise[k]
+    mean = mean_with_error(samples)
+    assert mean.effective_count == pytest.approx(20000 / 9, rel=0.2)
+    naive = samples.std(ddof=1) / 20000**0.5
+    assert mean.standard_error == pytest.approx(3 * naive, rel=0.1)
+
+
+def test_mean_of_few_samples():
+    assert mean_with_error([1.0, np.nan]).count == 1
+    assert np.isnan(mean_with_error([1.0]).standard_error)
+    assert np.isnan(mean_with_error([]).value)
+    assert mean_with_error([2.0, 2.0, 2.0]).standard_error == 0
+
+
+def test_one_row_per_frame_with_every_measure(make_run):
+    directory = make_run()
+    table = measure_run(directory)
+    frame, manifest = read_frames(directory)[2], read_run(directory)
+    row = table.iloc[2]
+    assert len(table) == 3
+    assert (row["name"], row["seed"], row["phase type"], row["frame"]) == ("pile", 7, "shake", 2)
+    assert (row["scene_sha256"], row["fidelity"], row["count"]) == ("abc", "draft", 6)
+    assert row["aspect ratio [-]"] == 0.7
+    assert row["time [s]"] == pytest.approx(0.2)
+    assert row["crossings mean [-]"] == link_crossings(frame.vertices).mean() > 0
+    assert row["contacts mean [-]"] == 2.5
+    assert row["escaped [-]"] == 0
+    expected = packing_fraction(
+        frame.vertices,
+        radius=manifest.container_radius,
+        solid_volume=manifest.solid_volume,
+        floor_z=-0.002,
+    )
+    assert row[PHI] == expected.value
+    assert row["second-highest com height [m]"] == expected.height
+    assert row["kinetic energy [J]"] == pytest.approx(2.0)
+    assert row["container force z [N]"] == pytest.approx(0.6)
+    # One smarticle has no packing fraction.
+    assert np.isnan(table[PHI][0])
+
+
+def test_costly_definitions_only_where_asked_for(make_run):
+    directory = make_run([(0, 0.0), (1, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
+    taken = {
+        mode: measure_run(directory, definitions=["voxel"], costly=mode)["phi voxel [-]"].notna()
+        for mode in ("never", "phase-end", "every-frame")
+    }
+    assert taken["never"].tolist() == [False] * 5
+    assert taken["phase-end"].tolist() == [False, False, True, False, True]
+    assert taken["every-frame"].tolist() == [False, True, True, True, True]
+
+
+def test_run_without_series(make_run):
+    table = measure_run(make_run(series=False), definitions=CHEAP)
+    assert len(table) == 3
+    assert "kinetic energy [J]" not in table
+
+
+def test_escaped_smarticles_are_counted(make_run):
+    table = measure_run(make_run([(0, 0.0), (1, -0.1)]), definitions=CHEAP)
+    assert table["escaped [-]"].tolist() == [0, 6]
+
+
+def test_summary_averages_the_last_frames_of_each_phase(make_run):
+    plan = [(0, 0.0), (1, 0.0), *((2, 0.001 * k) for k in range(5))]
+    directory = make_run(plan)
+    frames, summary = measure_run(directory), summarise_run(directory, last=3)
+    assert summary["phase type"].tolist() == ["deposit", "relax", "shake"]
+    assert summary["frames averaged"].tolist() == [1, 1, 3]
+    last = frames[frames["phase"] == 2][-3:]
+    shake = summary.iloc[2]
+    assert shake[PHI] == pytest.approx(last[PHI].mean())
+    assert shake["phi second-highest-com SE [-]"] > 0
+    assert shake["phi voxel [-]"] == pytest.approx(last["phi voxel [-]"].iloc[-1], nan_ok=True)
+    assert np.isnan(summary["com height SE [m]"][1])
+    assert (shake["name"], shake["seed"]) == ("pile", 7)
+
+
+def test_packing_before_and_after_activity(make_run):
+    lifts = [(0, 0.0), (0, 0.005), (1, 0.0), (1, 0.001), (2, 0.002), (2, 0.003), (3, 0.009)]
+    directory = make_run(lifts)
+    table = measure_run(directory, definitions=CHEAP)
+    change = packing_change(directory, last=20)
+    # Only the relaxation before the shake, and not the one after it.
+    assert (change.phase_before, change.phase_after) == (1, 2)
+    assert change.before.value == pytest.approx(table[PHI][[2, 3]].mean())
+    assert change.after.value == pytest.approx(table[PHI][[4, 5]].mean())
+    assert (change.before.count, change.after.count) == (2, 2)
+    assert change.definition == "second-highest-com"
+    assert change.before.standard_error > 0
+    shorter = packing_change(directory, last=1, definition="top-percentile")
+    assert shorter.after.value == table["phi top-percentile [-]"][5]
+
+
+def test_packing_change_needs_activity(make_run):
+    with pytest.raises(InputError, match=r"no frame of phase 2 \(shake\) yet"):
+        packing_change(make_run([(0, 0.0), (1, 0.0)]))
+    with pytest.raises(InputError, match="no activity with a phase before it"):
+        packing_change(make_run(), activity=["pull"])
+    with pytest.raises(InputError, match="last must be 1 frame or more: got 0"):
+        packing_change(make_run(), last=0)
+
+
+def test_phase_unknown_to_the_manifest(make_run):
+    with pytest.raises(InputError, match=r"phases that run\.json does not have"):
+        measure_run(make_run([(0, 0.0), (9, 0.0)]))
+
+
+def test_unknown_definition_is_refused_before_any_work(tmp_path):
+    with pytest.raises(InputError, match=r"unknown definition .* 'guess'"):
+        measure_run(tmp_path, definitions=["guess"])
+
+
+def test_truncated_frame_stops_the_table(make_run):
+    directory = make_run()
+    path = directory / "frames" / "frame_000001.vtu"
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(InputError, match="frame_000001"):
+        measure_run(directory)
+
+
+def test_table_comes_back_as_written(tmp_path, make_run):
+    table = measure_run(make_run(), definitions=CHEAP)
+    path = write_table(table, tmp_path / "table.csv")
+    pd.testing.assert_frame_equal(pd.read_csv(path), table, check_exact=True)
+    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_table_is_not_overwritten_unless_asked(tmp_path):
+    path = tmp_path / "table.csv"
+    write_table(pd.DataFrame({"a": [1]}), path)
+    with pytest.raises(InputError, match=r"table\.csv: it exists"):
+        write_table(pd.DataFrame({"a": [2]}), path)
+    assert path.read_text() == "a\n1\n"
+    write_table(pd.DataFrame({"a": [2]}), path, overwrite=True)
+    assert path.read_text() == "a\n2\n"
+
+
+class Unwritable:
+    def to_csv(self, file, **_):
+        file.write("half a ta")
+        message = "disk full"
+        raise OSError(message)
+
+
+def test_failed_write_leaves_the_old_table(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+    with pytest.raises(OSError, match="disk full"):
+        write_table(Unwritable(), path, overwrite=True)
+    assert path.read_text() == "old"
+    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
+
+
+@pytest.mark.parametrize("name", ["table.txt", "none/table.csv"])
+def test_table_that_cannot_be_placed(tmp_path, name):
+    with pytest.raises(InputError, match="cannot write table"):
+        write_table(pd.DataFrame({"a": [1]}), tmp_path / name)

@@ -1,0 +1,63 @@
+"""Stands for `smarticles run`: writes what the runner reads, as its first argument says.
+
+fake_run.py BEHAVIOUR SCENE DIR
+"""
+
+import hashlib
+import json
+import os
+import re
+import signal
+import sys
+import time
+from pathlib import Path
+
+
+def main() -> int:
+    behaviour, scene, directory = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+    if behaviour == "refuse":
+        print("smarticles: error: scene.yaml: count: -1 is negative; use 1", file=sys.stderr)
+        return 2
+    if directory.exists() and any(directory.iterdir()):
+        print("smarticles: error: --out: holds another run", file=sys.stderr)
+        return 2
+    directory.mkdir(parents=True, exist_ok=True)
+    sha256 = re.search(r"# sha256 (\w+)", scene.read_text())
+    assert sha256 is not None
+    (directory / "run.json").write_text(json.dumps({"scene_sha256": sha256[1]}))
+    (directory / "threads").write_text(os.environ["OMP_NUM_THREADS"])
+    (directory / "id").write_text(hashlib.sha256(os.urandom(8)).hexdigest())
+    if behaviour == "fail":
+        failed = {"status": "failed", "cause": "left through the wall", "time_s": 0.1}
+        (directory / "failed.json").write_text(json.dumps(failed))
+        return 1
+    if behaviour == "crash":
+        print("Segmentation something", flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+    if behaviour == "silent":
+        return 0
+    if behaviour == "wait":
+        return wait(directory)
+    if behaviour == "deaf":
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        (directory / "progress.json").write_text("{}")
+        time.sleep(60)
+    (directory / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0}))
+    return 0
+
+
+def wait(directory: Path) -> int:
+    """Until Ctrl-C; then close the files, as a run does."""
+    progress = {"phase": "shake", "phase_index": 2, "time_s": 1.25, "end_s": 5.5, "phi": 0.123}
+    try:
+        temporary = directory / "temporary"
+        temporary.write_text(json.dumps(progress))
+        temporary.replace(directory / "progress.json")
+        time.sleep(60)
+    except KeyboardInterrupt:
+        (directory / "failed.json").write_text(json.dumps({"status": "interrupted", "cause": "…"}))
+        return 130
+    return 0
+
+
+sys.exit(main())

@@ -1,0 +1,213 @@
+"""Sweep files: what they may say, and the points they give."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from sweep_cases import SCENE, SWEEP, WriteSweep
+
+from dem.errors import InputError
+from templates.expand import Point, expand
+from templates.sweep import load_sweep
+
+COUNTS = "l_over_w,n,label\n0.4,494,long\n0.7,270,middle\n1.0,192,short\n"
+
+
+def points(sweep: str, write_sweep: WriteSweep, **others: str) -> list[Point]:
+    return expand(load_sweep(write_sweep(sweep, **others)))
+
+
+def sweep_with(points_text: str, run_name: str = "{{ count }}-{{ seed }}", more: str = "") -> str:
+    return f"""\
+schema_version: 1
+name: test
+template: scene.yaml.j2
+run_name: "{run_name}"
+points: {points_text}
+{more}
+"""
+
+
+def test_grid_is_crossed_with_the_seeds(write_sweep: WriteSweep) -> None:
+    found = points(SWEEP, write_sweep)
+    assert [point.name for point in found] == ["n10_seed1", "n10_seed2", "n20_seed1", "n20_seed2"]
+    assert [(point.scene.count, point.scene.seed) for point in found] == [
+        (10, 1),
+        (10, 2),
+        (20, 1),
+        (20, 2),
+    ]
+    assert len({point.scene_sha256 for point in found}) == 4
+
+
+def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:
+    found = points(
+        sweep_with("{zip: {count: [10, 20], seed_: [3, 4]}}").replace("{{ seed }}", "{{ seed_ }}"),
+        write_sweep,
+        scene=SCENE.replace("seed }}", "seed_ }}"),
+    )
+    assert [(p.values["count"], p.values["seed_"]) for p in found] == [(10, 3), (20, 4)]
+
+
+def test_list_gives_the_points_as_written(write_sweep: WriteSweep) -> None:
+    text = sweep_with("{list: [{count: 7}, {count: 5}]}", more="repeats: {seeds: [9]}")
+    assert [point.name for point in points(text, write_sweep)] == ["7-9", "5-9"]
+
+
+def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep) -> None:
+    text = sweep_with(
+        "{table: {file: counts.csv}}",
+        more="derived: {half: n / 2, count: half | int, fixed: 3}\nrepeats: {seeds: [1]}",
+    )
+    found = points(text, write_sweep, counts_csv=COUNTS)
+    assert [point.scene.count for point in found] == [247, 135, 96]
+    assert found[0].values == {
+        "l_over_w": 0.4,
+        "n": 494,
+        "label": "long",
+        "half": 247.0,
+        "count": 247,
+        "fixed": 3,
+        "seed": 1,
+    }
+
+
+def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
+    text = sweep_with(
+        "{table: {file: counts.csv, only: {l_over_w: [1.0, 0.4]}}}",
+        more="derived: {count: n}\nrepeats: {seeds: [1]}",
+    )
+    found = points(text, write_sweep, counts_csv=COUNTS)
+    assert [point.values["l_over_w"] for point in found] == [0.4, 1.0]
+
+
+def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep) -> None:
+    text = sweep_with(
+        "{grid: {count: [1, 2]}, list: [{a: 1}, {a: 2}]}",
+        run_name="{{ a }}{{ count }}",
+        more="constants: {seed_: 5}",
+    )
+    scene = SCENE.replace("seed }}", "seed_ }}").replace("name: test", "name: t{{ a }}")
+    found = points(text, write_sweep, scene=scene)
+    assert [point.name for point in found] == ["11", "12", "21", "22"]
+    assert {point.scene.seed for point in found} == {5}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a sweep file holds keys such as template and points: got None"),
+        ("a: [", "line 1, column 5: not valid YAML"),
+        (SWEEP.replace("run_name", "runname"), r"runname: unknown key; did you mean 'run_name'?"),
+        (SWEEP.replace("grid", "gird"), "points.gird: unknown key; did you mean 'grid'?"),
+        (SWEEP.replace("seeds", "seed"), "repeats.seed: unknown key; did you mean 'seeds'?"),
+        (SWEEP.replace("schema_version: 1", "schema_version: 2"), "schema_version: .*got 2"),
+        (SWEEP.replace("name: test\n", ""), "name: missing"),
+        (SWEEP.replace("{count: [10, 20]}", "{count: []}"), "grid: count has no values"),
+        (SWEEP.replace("[1, 2]}", "[]}"), "repeats.seeds: .*got \\[\\]"),
+        (SWEEP.replace("[1, 2]", "[1, 1]"), r"a seed is given twice: got \[1, 1\]"),
+        (SWEEP.replace("[10, 20]", "[10, .nan]"), "nan is not a finite number"),
+        (SWEEP.replace("{count:", "{co-unt:"), "'co-unt' cannot name a variable"),
+        (SWEEP.replace("{count:", "{seed:"), "'seed' cannot name a variable"),
+        (sweep_with("{}"), "no points: give at least one of table, list, zip, grid"),
+        (sweep_with("{zip: {a: [1], b: [1, 2]}}"), "zip: lists of unequal length"),
+        (sweep_with("{list: [{a: 1}, {b: 1}]}"), "every point needs the same variables"),
+        (SWEEP.replace("scene.yaml.j2", "absent.j2"), "absent.j2: cannot read the scene template"),
+        (sweep_with("{table: {file: absent.csv}}"), "absent.csv: cannot read the table"),
+        (
+            sweep_with("{table: {file: counts.csv, only: {l_over: [1]}}}"),
+            "points.table.only.l_over: no such column; did you mean 'l_over_w'?",
+        ),
+        (
+            sweep_with("{table: {file: counts.csv, only: {l_over_w: [0.5]}}}"),
+            "0.5 is not in .*counts.csv; it has 0.4, 0.7, 1.0",
+        ),
+        (sweep_with("{table: {file: ragged.csv}}"), r"ragged.csv, row 3: expected 2 filled cells"),
+        (sweep_with("{table: {file: empty.csv}}"), "empty.csv: the table has no rows"),
+        (sweep_with("{table: {file: header.csv}}"), "line 1: column 'l/w' cannot be a variable"),
+    ],
+)
+def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: WriteSweep) -> None:
+    file = write_sweep(
+        text,
+        counts_csv=COUNTS,
+        ragged_csv="a,b\n1,2\n3\n",
+        empty_csv="a,b\n",
+        header_csv="l/w,n\n1,2\n",
+    )
+    with pytest.raises(InputError, match=message) as caught:
+        load_sweep(file)
+    assert "\n" not in str(caught.value)
+    assert str(file.parent) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("n{{ count }}_", "n{{ cuont }}_", "run_name.*'cuont' is undefined; did you mean 'count'?"),
+        (
+            "n{{ count }}_",
+            "n_",
+            "two runs are called 'n_seed1': count 10 and 20; put what differs into run_name",
+        ),
+        ("n{{ count }}_", "{{ 'N' if count > 10 else 'n' }}_", "two runs are called 'N_seed1'"),
+        ("n{{ count }}_", "../{{ count }}", "gives '../10seed1', which cannot be a directory"),
+        ("n{{ count }}_", "-n{{ count }}", "gives '-n10seed1', which cannot be a directory"),
+        ("n{{ count }}_", ".n{{ count }}", "gives '.n10seed1', which cannot be a directory"),
+        ("n{{ count }}_", "n {{ count }}", "gives 'n 10seed1', which cannot be a directory"),
+        ("n{{ count }}_", "{{ 'n' ~ 'x' * count }}_", "takes numbers"),
+        (
+            "repeats:",
+            "derived: {count: 3}\nrepeats:",
+            "'count' is set in both points.grid and derived",
+        ),
+        ("repeats:", "constants: {count: 3}\nrepeats:", "'count' is set in both constants and"),
+        ("repeats:", "derived: {x: contu}\nrepeats:", "derived.x = 'contu': 'contu' is undefined"),
+        ("[10, 20]", "[10, -20]", r"scene.yaml.j2, rendered for run n-20_seed1: count: .*-20"),
+        ("[10, 20]", "[10, '20: x']", r"cannot be a directory"),
+    ],
+)
+def test_bad_points_are_input_errors(old: str, new: str, message: str, write_sweep: WriteSweep) -> None:
+    assert old in SWEEP
+    sweep = load_sweep(write_sweep(SWEEP.replace(old, new)))
+    with pytest.raises(InputError, match=message) as caught:
+        expand(sweep)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_variable_that_changes_nothing_is_an_error(write_sweep: WriteSweep) -> None:
+    sweep = load_sweep(write_sweep(scene=SCENE.replace("{{ count }}", "10")))
+    with pytest.raises(InputError, match=r"n10_seed1 and n20_seed1 are the same scene .*count 10"):
+        expand(sweep)
+
+
+def test_an_undefined_variable_in_the_scene_is_an_error(write_sweep: WriteSweep) -> None:
+    sweep = load_sweep(write_sweep(scene=SCENE.replace("{{ count }}", "{{ cuont }}")))
+    with pytest.raises(InputError, match=r"scene.yaml.j2, line 4: 'cuont' is undefined; did you"):
+        expand(sweep)
+
+
+def test_a_scene_with_an_unknown_key_is_an_error(write_sweep: WriteSweep) -> None:
+    sweep = load_sweep(write_sweep(scene=f"{SCENE}gravitty: 3\n"))
+    with pytest.raises(InputError, match=r"rendered for run n10_seed1: .*gravitty"):
+        expand(sweep)
+
+
+def test_a_hostile_value_reaches_the_scene_as_it_is(write_sweep: WriteSweep) -> None:
+    hostile = "x: 1\nseed: 99 # '\"{{ 1 }}"
+    text = sweep_with("{grid: {count: [5]}}", more="repeats: {seeds: [1]}").replace(
+        "points:", f"constants: {{title: {hostile!r}}}\npoints:"
+    )
+    text = text.replace(repr(hostile), '"x: 1\\nseed: 99 # \'\\"{{ 1 }}"')
+    scene = SCENE.replace("name: test", "name: {{ title }}")
+    (point,) = points(text, write_sweep, scene=scene)
+    assert point.scene.name == hostile
+    assert point.scene.seed == 1
+
+
+def test_not_text_is_an_input_error(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.yaml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"sweep.yaml: not UTF-8 text \(byte 0\)"):
+        load_sweep(file)

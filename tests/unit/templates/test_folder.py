@@ -1,0 +1,137 @@
+"""The directory of a sweep: manifest, scenes, states, refusals."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sweep_cases import SWEEP, MakeFolder
+
+from dem.errors import InputError
+from dem.scene import load_scene, scene_hash
+from templates.folder import Folder, count_states, open_folder, run_status
+
+
+def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    content = json.loads((folder.path / "sweep.json").read_text(encoding="utf-8"))
+    assert content["name"] == "test"
+    assert content["command"] == "smarticles sweep sweep.yaml --out out"
+    assert content["versions"] == {"smarticles": "0"}
+    files = {Path(name).name: text for name, text in content["files"].items()}
+    assert files["sweep.yaml"] == SWEEP
+    assert "{{ count }}" in files["scene.yaml.j2"]
+    assert content["points"][0]["name"] == "n10_seed1"
+    assert content["points"][0]["values"] == {"count": 10, "seed": 1}
+    assert content["points"][0]["expected_s"] == 10.0
+
+
+def test_scene_files_are_the_scenes_of_the_manifest(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    assert len(folder.entries) == 4
+    for entry in folder.entries:
+        assert scene_hash(load_scene(folder.scene(entry))) == entry.scene_sha256
+
+
+def test_the_same_sweep_takes_up_its_directory(make_folder: MakeFolder) -> None:
+    first = make_folder()
+    before = (first.path / "sweep.json").read_text(encoding="utf-8")
+    first.scene(first.entries[0]).unlink()
+    second = make_folder()
+    assert second == first
+    assert (first.path / "sweep.json").read_text(encoding="utf-8") == before
+    assert first.scene(first.entries[0]).exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[1, 2]", "[1, 3]", "run n10_seed3 is only in one of them"),
+        ("[1, 2]", "[1]", "run n10_seed2 is only in one of them"),
+        ("[1, 2]", "[1, 2, 3]", "run n10_seed3 is only in one of them"),
+    ],
+)
+def test_another_sweep_is_refused(make_folder: MakeFolder, old: str, new: str, message: str) -> None:
+    folder = make_folder()
+    before = (folder.path / "sweep.json").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match=rf"holds another sweep \('test'\): {message}"):
+        make_folder(SWEEP.replace(old, new))
+    assert (folder.path / "sweep.json").read_text(encoding="utf-8") == before
+
+
+def test_the_same_names_with_other_scenes_are_refused(make_folder: MakeFolder) -> None:
+    make_folder()
+    other = SWEEP.replace("points:", "constants: {k: 1}\npoints:").replace("[10, 20]", "[30, 20]")
+    with pytest.raises(InputError, match="run n10_seed1 has another scene"):
+        make_folder(other.replace("n{{ count }}", "n{{ 10 if count == 30 else count }}"))
+
+
+def test_foreign_directories_and_files_are_refused(make_folder: MakeFolder, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("years of work")
+    with pytest.raises(InputError, match="out: holds other files; give a directory"):
+        make_folder()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.tex"]
+    with pytest.raises(InputError, match=r"thesis.tex: is a file; give a directory"):
+        make_folder(out="out/thesis.tex")
+
+
+def test_an_empty_directory_is_used(make_folder: MakeFolder, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    assert len(make_folder().entries) == 4
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 2}', '{"format": 1, "points": [{}]}'])
+def test_a_damaged_manifest_is_an_input_error(tmp_path: Path, text: str) -> None:
+    (tmp_path / "sweep.json").write_text(text)
+    with pytest.raises(InputError, match=r"sweep.json: not a sweep manifest of format 1"):
+        open_folder(tmp_path)
+
+
+def test_no_manifest_is_an_input_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no sweep.json; give the directory that"):
+        open_folder(tmp_path)
+
+
+def write_run(directory: Path, **files: dict[str, object]) -> Path:
+    directory.mkdir(parents=True)
+    for name, content in files.items():
+        (directory / f"{name}.json").write_text(json.dumps(content))
+    return directory
+
+
+def test_states_of_a_run(tmp_path: Path) -> None:
+    manifest: dict[str, object] = {"scene_sha256": "x"}
+    progress: dict[str, object] = {"phase": "shake", "time_s": 1.5, "wall_s": 20.0}
+    done = write_run(tmp_path / "a", run=manifest, done={"time_s": 6.0, "wall_s": 99.0})
+    failed = write_run(tmp_path / "b", run=manifest, failed={"status": "failed", "cause": "why", "time_s": 2.0})
+    interrupted = write_run(tmp_path / "c", run=manifest, failed={"status": "interrupted"})
+    killed = write_run(tmp_path / "d", run=manifest, progress=progress)
+    empty = write_run(tmp_path / "e")
+    found = [run_status(path) for path in (done, failed, interrupted, killed, empty)]
+    found += [run_status(tmp_path / "absent"), run_status(killed, active=True)]
+    states = [status.state for status in found]
+    assert states == ["done", "failed", "interrupted", "stopped", "missing", "missing", "running"]
+    assert (found[0].time_s, found[0].wall_s) == (6.0, 99.0)
+    assert (found[1].cause, found[1].time_s) == ("why", 2.0)
+    assert (found[3].phase, found[3].time_s, found[3].wall_s) == ("shake", 1.5, 20.0)
+    assert count_states(found)["missing"] == 2
+    assert json.loads(json.dumps(found[3].to_dict()))["state"] == "stopped"
+
+
+def test_runs_left_behind_by_a_killed_runner_still_hold_the_sweep(make_folder: MakeFolder) -> None:
+    folder: Folder = make_folder()
+    with folder.lock() as lock:
+        left = subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", "input()"],
+            stdin=subprocess.PIPE,
+            pass_fds=(lock,),
+        )
+    try:
+        assert folder.is_active()
+    finally:
+        left.communicate(b"\n")
+    assert not folder.is_active()

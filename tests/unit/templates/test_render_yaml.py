@@ -1,0 +1,184 @@
+"""Templates: values keep their type, cannot break out, and a misspelt name is an error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dem.errors import InputError
+from templates.render import evaluate, render_text, render_yaml
+
+HOSTILE = [
+    'a: b\ninjected: "yes"',
+    "x # a comment",
+    "'; } ] --- ...",
+    '"quoted" and \\ back',
+    "{{ 7 * 7 }}",
+    "{% raw %}",
+    "- item",
+    "*alias &anchor !!python/object:os.system",
+    "yes",
+    "null",
+    "1e3",
+    "",
+    "  padded  ",
+    "tab\tnew\nline\r\n",
+    "value0z",
+    "\u2028\u00e9\U0001f600",
+]
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("place", ["{{ s }}", '"{{ s }}"', "'{{ s }}'"])
+def test_a_hostile_string_stays_one_string(text: str, place: str) -> None:
+    data = render_yaml(f"before: 1\nkey: {place}\nflow: {{a: {place}, b: 2}}\n", {"s": text}, "t")
+    assert data == {"before": 1, "key": text, "flow": {"a": text, "b": 2}}
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+        lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+        max_leaves=8,
+    )
+)
+def test_every_plain_value_survives(value: Any) -> None:
+    data = render_yaml("key: {{ v }}\nlist: [{{ v }}, 1]\n", {"v": value}, "t")
+    assert data == {"key": value, "list": [value, 1]}
+    assert type(data["key"]) is type(value)
+
+
+def test_a_value_within_text_becomes_text() -> None:
+    data = render_yaml('name: lw{{ x }}-{{ s }}\nquoted: "{{ x }}"', {"x": 0.7, "s": "#a: b"}, "t")
+    assert data == {"name": "lw0.7-#a: b", "quoted": "0.7"}
+
+
+def test_a_list_within_text_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^t, line 1.*list or mapping within text: \[1\]"):
+        render_yaml("name: lw{{ x }}", {"x": [1]}, "t")
+
+
+def test_a_key_can_be_a_value() -> None:
+    assert render_yaml("{{ k }}: 1", {"k": "a: b"}, "t") == {"a: b": 1}
+
+
+def test_loops_and_conditions_shape_the_scene() -> None:
+    template = """\
+phases:
+{% for duration in durations %}
+  - {type: relax, duration_s: {{ duration }}}
+{% endfor %}
+{% if shaken %}
+  - {type: shake}
+{% endif %}
+"""
+    data = render_yaml(template, {"durations": [0.5, 1.0], "shaken": False}, "t")
+    assert data["phases"] == [
+        {"type": "relax", "duration_s": 0.5},
+        {"type": "relax", "duration_s": 1.0},
+    ]
+
+
+def test_constants_and_filters_work() -> None:
+    template = "a: {{ 3 }}\nb: {{ '%.2f' | format(x) }}\nc: {{ x | round | int }}\n# {{ x }}\n"
+    assert render_yaml(template, {"x": 0.7}, "t") == {"a": 3, "b": "0.70", "c": 1}
+
+
+def test_numbers_in_exponent_form_are_numbers() -> None:
+    assert render_yaml("a: 1e-3\nb: 1.27e-3\nc: -2E6", {}, "t") == {
+        "a": 1e-3,
+        "b": 1.27e-3,
+        "c": -2e6,
+    }
+
+
+def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
+    with pytest.raises(InputError) as caught:
+        render_yaml("a: 1\nb: {{ cuont }}\n", {"count": 3, "seed": 1}, "scene.yaml.j2")
+    assert str(caught.value) == ("scene.yaml.j2, line 2: 'cuont' is undefined; did you mean 'count'?")
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        ("a: {{ x", "t, line 1: unexpected end of template"),
+        ("a: 1\nb: [1,\n", "t, line 3, column 1: not valid YAML"),
+        ("a: 1\na: 2\n", r"t, line 2, column 1: not valid YAML: key 'a' is given twice"),
+        ("a: {{ x.y }}", "has no attribute 'y'"),
+        ("a: {{ x / 0 }}", "t, line 1: .*division"),
+        ("a: {{ range }}", "gives function; it must give numbers, text or lists"),
+        ("{% macro m() %}1{% endmacro %}a: {{ m() }}", "t, line 1: macro, call, filter and set"),
+        ("{% set y %}1{% endset %}a: {{ y }}", "t, line 1: macro, call, filter and set"),
+        ("{% include 'other' %}", "t, line 1: no loader"),
+        ("a: {{ x.__class__.__mro__ }}", "unsafe"),
+        ("? [a]\n: 1", "a key must be plain"),
+    ],
+)
+def test_mistakes_in_a_template_are_input_errors(template: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        render_yaml(template, {"x": 1}, "t")
+
+
+def test_yaml_cannot_make_python_objects() -> None:
+    with pytest.raises(InputError, match="could not determine a constructor"):
+        render_yaml("a: !!python/object/apply:os.getcwd []", {}, "t")
+
+
+@pytest.mark.parametrize(
+    ("expression", "value"),
+    [
+        ("n", 270),
+        ("(n / 4) | round | int", 68),
+        ("n // 2", 135),
+        ("2 ** 3", 8),
+        ("'a' ~ n", "a270"),
+        ("[n, 1]", [270, 1]),
+        ("n if n > 5 else 5", 270),
+    ],
+)
+def test_expressions(expression: str, value: Any) -> None:
+    result = evaluate(expression, {"n": 270}, "f: derived.x")
+    assert result == value
+    assert type(result) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        ("m", "f: derived.x = 'm': 'm' is undefined; known: n"),
+        ("m + 1", "'m' is undefined"),
+        ("n.__class__", "unsafe"),
+        ("n.__class__.__base__.__subclasses__()", "unsafe"),
+        ("(n", "derived.x = '\\(n'"),
+        ("9 ** 9 ** 9 ** 9", "too large"),
+        ("'a' * 10 ** 12", "takes numbers: got 'a'"),
+        ("range(3)", "gives range; it must give numbers or text"),
+        ("n / 0", "division by zero"),
+        ("(-1) ** 0.5", "gives complex"),
+    ],
+)
+def test_bad_expressions_are_input_errors(expression: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        evaluate(expression, {"n": 270}, "f: derived.x")
+
+
+def test_names_are_rendered_as_text() -> None:
+    assert render_text("lw{{ '%.2f' | format(x) }}", {"x": 0.7}, "t") == "lw0.70"
+    with pytest.raises(InputError, match="'y' is undefined"):
+        render_text("lw{{ y }}", {"x": 0.7}, "t")
+
+
+def test_the_oracle_would_notice_plain_substitution() -> None:
+    """What string formatting does to the hostile strings: the tests above are not empty."""
+    broken = 0
+    for text in HOSTILE:
+        try:
+            data = yaml.safe_load(f"key: {text}")
+        except yaml.YAMLError:
+            data = None
+        broken += data != {"key": text}
+    assert broken > len(HOSTILE) / 2
