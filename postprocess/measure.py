@@ -317,7 +317,9 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
     for name, values in series.data.items():
         if name in _SERIES_MEASURED:
             continue
-        label, unit = _SERIES_COLUMNS.get(name, name), series.units[name]
+        label = _SERIES_COLUMNS.get(name, name)
+        # The recorder writes the SI unit one; the tables write a dash.
+        unit = "-" if series.units[name] in {"1", ""} else series.units[name]
         if values.ndim == 1:
             columns[f"{label} [{unit}]"] = float(values[index])
         else:

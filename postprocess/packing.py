@@ -85,7 +85,7 @@ def packing_fraction(
         low: Lower end of the inner cylinder as a share of the height [-].
         high: Upper end of the inner cylinder as a share of the height [-].
         spacing: Distance of grid points ("voxel") or of points along links ("voronoi") [m]; half
-            the smaller thickness, or w/12, if not given.
+            the smaller thickness, or w/8, if not given.
 
     Returns:
         The packing fraction with its definition and the height it used.

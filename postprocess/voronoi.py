@@ -61,7 +61,8 @@ def local_packing(
         container: The container from its floor to the pile's height.
         region: The smarticles with their centre of mass in here are counted.
         solid_volume: Volume of one smarticle [m³].
-        spacing: Largest distance of points along a link [m]; w/12 if not given.
+        spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the
+            limit of close points in piles of 270.
 
     Returns:
         The cells and the packing fraction.
@@ -80,7 +81,7 @@ def local_packing(
         msg = "no smarticle has its centre of mass in the inner region of the pile"
         raise UndefinedMeasureError(msg)
     if spacing is None:
-        spacing = float(np.median(link_lengths(vertices)[:, 1])) / 12
+        spacing = float(np.median(link_lengths(vertices)[:, 1])) / 8
     if not spacing > 0:
         msg = f"spacing of the points along the links must be above 0 m: got {spacing} m"
         raise InputError(msg)

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from dem.engine import Cylinder, Engine, yade_version
 from dem.phases import container_height, shake_amplitude
 from dem.placement import Poses, place_layer
-from dem.scene import Scene, Shake, parse_scene
+from dem.scene import Scene, parse_scene
 from dem.series import SeriesWriter
 from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
 
@@ -253,7 +253,7 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     """Position and velocity of an empty container at every step."""
     scene = load(data)
     engine = build(scene, shaken=True)
-    phase = next(p for p in scene.phases if isinstance(p, Shake))
+    phase = next(p for p in scene.phases if p.type == "shake")
     amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
     engine.advance(delay)
     begun, start = engine.time, engine.floor
@@ -286,7 +286,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     engine = build(scene, shaken=True)
     _pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
-    phase = next(p for p in scene.phases if isinstance(p, Shake))
+    phase = next(p for p in scene.phases if p.type == "shake")
     engine.shake(
         amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz
     )

@@ -112,6 +112,7 @@ def write_series(directory, times):
         "time_s": (times, "s"),
         "phase": (np.zeros(len(times), dtype=int), "-"),
         "kinetic_energy_J": (10.0 * times, "J"),
+        "unbalanced_force": (1.0 - times, "1"),
         "container_force_N": (np.outer(times, [1.0, 2.0, 3.0]), "N"),
     }
     with h5py.File(directory / "series.h5", "w") as file:

@@ -71,6 +71,7 @@ def test_one_row_per_frame_with_every_measure(make_run):
     assert row["second-highest com height [m]"] == expected.height
     assert row["kinetic energy [J]"] == pytest.approx(2.0)
     assert row["container force z [N]"] == pytest.approx(0.6)
+    assert row["unbalanced force [-]"] == pytest.approx(0.8)
     # One smarticle has no packing fraction.
     assert np.isnan(table[PHI][0])
 

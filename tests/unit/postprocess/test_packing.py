@@ -36,14 +36,14 @@ FLOOR, AXIS = 3.0, (2.0, -1.0)
 
 @pytest.fixture(scope="module")
 def pile(shape):
-    """Smarticles of known density, turned oddly, in a cylinder of radius 5 off the origin."""
+    """Smarticles of known density, turned oddly, in a cylinder of radius 4 off the origin."""
     turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
-    return lattice(shape, CELL, radius=5.0, layers=6, floor_z=FLOOR, turn=turn, axis=AXIS)
+    return lattice(shape, CELL, radius=4.0, layers=6, floor_z=FLOOR, turn=turn, axis=AXIS)
 
 
 def phi(pile, definition, **changes):
     arguments = {
-        "radius": 5.0,
+        "radius": 4.0,
         "solid_volume": SOLID,
         "floor_z": FLOOR,
         "axis": AXIS,
@@ -71,8 +71,8 @@ def test_voxels_find_the_lattice_density(shape):
     # Cuts a whole number of layers apart, so that it does not matter where they split them, and
     # an inner radius of many cells.
     turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
-    pile = lattice(shape, CELL, radius=9.0, layers=6, turn=turn)
-    region = Cylinder(radius=7.5, bottom=1.3, top=1.3 + 3 * CELL[2])
+    pile = lattice(shape, CELL, radius=8.0, layers=5, turn=turn)
+    region = Cylinder(radius=6.5, bottom=1.1, top=1.1 + 2 * CELL[2])
     value = solid_fraction(pile, region, thickness_normal=T1, thickness_in_plane=T2)
     assert value == pytest.approx(DENSITY * UNION / SOLID, rel=0.02)
 
@@ -148,7 +148,7 @@ def test_voxels_of_bars_without_barbs(shape):
 
 def test_voronoi_cells_of_a_lattice_are_its_cells(pile):
     # Wall, floor and lid further off than any void of the lattice is wide.
-    container = Cylinder(radius=6.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
+    container = Cylinder(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
     region = inner_region(container, inner=0.4, low=0.4, high=0.6)
     local = local_packing(pile, container, region, solid_volume=SOLID, spacing=0.25)
     assert 10 < local.interior.sum() < len(pile) / 4
@@ -194,7 +194,7 @@ def test_pile_below_its_floor_is_refused(pile, definition):
 
 @pytest.mark.parametrize("definition", ["voxel", "voronoi"])
 def test_empty_inner_region_is_refused_instead_of_zero(shape, definition):
-    ring = [shape(1.0) + np.array([7, 0, z]) for z in (3.5, 4.0, 5.0)]
+    ring = [shape(1.0) + np.array([3, 0, z]) for z in (3.5, 4.0, 5.0)]
     with pytest.raises(UndefinedMeasureError, match="inner region"):
         phi(np.array(ring), definition, axis=(0.0, 0.0), inner=0.3)
 
