@@ -12,12 +12,12 @@ PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: ## install everything into the system and .venv (6 min the first time, then at once)
+setup: ## install everything into the system and .venv (5 min the first time, then at once)
 	@setup/install.sh
 
 demo: setup ## quick comparison with Gravish et al. 2012, figure included (TIME)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
-	@echo "figures:" && find out/demo-$(STAMP) -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.svg'
+	@echo "tables and figures: $(CURDIR)/out/demo-$(STAMP)/results"
 
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)

@@ -40,20 +40,19 @@ def _analyse_gravish(runs: Sequence[Path], output: Path, note: str, command: str
             row["stage"],
             row["aspect ratio [-]"],
             row["seeds [-]"],
-            row["phi [-]"],
-            row["phi 95 % [-]"],
-            row["phi Gravish [-]"],
-            round(row["deviation [%]"], 1),
+            f"{row['phi [-]']:.4f}",
+            f"{row['phi 95 % [-]']:.4f}",
+            f"{row['phi Gravish [-]']:.4f}",
+            f"{row['deviation [%]']:+.1f}",
         ]
         for row in report.deviations.to_dict("records")
     ]
-    verdicts = [[verdict.question, verdict.answer, verdict.evidence] for verdict in report.verdicts]
     figures = [str(path) for path in report.files.values() if path.suffix == ".png"]
     return "\n".join(
         [
             columns(header, rows),
             "",
-            columns(["question", "answer", "evidence"], verdicts),
+            *(f"{v.question} {v.answer.upper()}\n    {v.evidence}" for v in report.verdicts),
             "",
             *(f"figure: {figure}" for figure in figures),
             f"tables, and the origin of every number: {output}",
@@ -76,11 +75,11 @@ against the packing fractions that Gravish et al. measured (PRL 108, 208001). --
 and prints how it differs from the full study, which takes hours.
 
 DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
-same command again goes on where it stopped.""",
+same command again goes on where it stopped. `smarticles status DIR` tells how far it is.""",
         examples="""\
   smarticles study gravish --quick --out demo
   smarticles study gravish --out gravish
-  smarticles status gravish                                  from another terminal
+  smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
 """,
     )
     study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))

@@ -6,11 +6,14 @@ process-wide singleton.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
 import math
 import os
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -86,8 +89,9 @@ def import_yade() -> Any:
         if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
             sys.path.append(str(folder))
     try:
-        sys.stdout.flush()
-        return importlib.import_module("yade")
+        # YADE greets on standard output, which belongs to the command's own answer.
+        with contextlib.redirect_stdout(io.StringIO()):
+            return importlib.import_module("yade")
     except ImportError as error:
         msg = (
             f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, "
@@ -138,7 +142,7 @@ class Engine:
         self._omega.reset()
         self._clumps: list[Any] = []
         self._clump_ids: list[int] = []
-        self._to_body: list[Any] = []
+        self._to_body: Any = None
         self._smarticle_of: dict[int, int] = {}
         self._add_materials(law)
         self._add_container(cylinder)
@@ -182,12 +186,11 @@ class Engine:
         # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
         bodies.append(self._utils.wall(0, axis=2, sense=1, material="wall"))
         self._container = [self._omega.bodies.append(body) for body in bodies]
-        self._floor = self._omega.bodies[self._container[-1]].state
 
     def _assemble(self, law: ContactLaw, *, shaken: bool) -> None:
         yade = self._yade
         friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
-        self._shaker = yade.HarmonicMotionEngine(ids=self._container, dead=True) if shaken else None
+        shaker = [yade.HarmonicMotionEngine(ids=self._container, dead=True)] if shaken else []
         collider = yade.InsertionSortCollider(
             [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb()],
             verletDist=VERLET_DISTANCE * self.particle.radius,
@@ -204,10 +207,46 @@ class Engine:
                 [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)],
                 [yade.Law2_ScGeom_ViscElPhys_Basic()],
             ),
-            *([self._shaker] if shaken else []),
+            *shaker,
             yade.NewtonIntegrator(damping=0, gravity=self._vector(0, 0, -self._gravity), exactAsphericalRot=True),
         ]
         self._omega.dt = self.time_step
+        self._bind()
+
+    def _bind(self) -> None:
+        """Take hold of YADE's objects; loading replaces them all."""
+        bodies, engines = self._omega.bodies, self._omega.engines
+        self._floor = bodies[self._container[-1]].state
+        self._clumps = [bodies[clump].state for clump in self._clump_ids]
+        self._smarticle_of = {
+            sphere: k for k, clump in enumerate(self._clump_ids) for sphere in bodies[clump].shape.members
+        }
+        self._shaker = next((e for e in engines if isinstance(e, self._yade.HarmonicMotionEngine)), None)
+
+    def save(self, path: Path) -> dict[str, Any]:
+        """Save the simulation into a file.
+
+        Returns:
+            Plain data that `load` needs besides the file.
+        """
+        self._omega.save(str(path))
+        axes = [] if self._to_body is None else [self._to_body[k] for k in range(4)]
+        return {"clumps": self._clump_ids, "to_body": axes}
+
+    def load(self, path: Path, memory: Mapping[str, Any]) -> None:
+        """Replace the simulation by a saved one of the same scene.
+
+        Args:
+            path: the file.
+            memory: what `save` returned.
+        """
+        self._omega.load(str(path), quiet=True)
+        self._clump_ids = list(memory["clumps"])
+        if memory["to_body"]:
+            x, y, z, w = memory["to_body"]
+            # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
+            self._to_body = self._quaternion(w, x, y, z)
+        self._bind()
 
     def add(self, poses: Poses) -> None:
         """Add smarticles at rest."""
@@ -232,7 +271,8 @@ class Engine:
         clump_id = omega.bodies.clump([*spheres, ballast_id], discretization=0)
         omega.bodies.erase(ballast_id)
         clump = omega.bodies[clump_id].state
-        principal = clump.ori  # YADE sorts the principal axes: a permutation of ours
+        # YADE sorts the principal axes: a permutation of ours, the same for every smarticle.
+        principal = clump.ori
         x, y, z, w = rotation.as_quat()
         clump.ori = self._quaternion(w, x, y, z) * principal
         clump.pos = self._vector(*position)
@@ -241,7 +281,7 @@ class Engine:
             self._smarticle_of[sphere] = len(self._clumps)
         self._clumps.append(clump)
         self._clump_ids.append(clump_id)
-        self._to_body.append(principal.inverse())
+        self._to_body = principal.inverse()
 
     # -- time --------------------------------------------------------------------------------------------------
 
@@ -322,11 +362,11 @@ class Engine:
         n = self.count
         positions, velocities, spins = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
         quaternions = np.empty((n, 4))
-        for k, (clump, to_body) in enumerate(zip(self._clumps, self._to_body, strict=True)):
+        for k, clump in enumerate(self._clumps):
             positions[k] = clump.pos
             velocities[k] = clump.vel
             spins[k] = clump.angVel
-            q = clump.ori * to_body
+            q = clump.ori * self._to_body
             quaternions[k] = q[0], q[1], q[2], q[3]
         rotations = Rotation.from_quat(quaternions).as_matrix() if n else np.empty((0, 3, 3))
         return State(positions, rotations, velocities, spins)

@@ -5,6 +5,7 @@ The format is the contract with `postprocess`; ARCHITECTURE.md describes it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -84,16 +85,28 @@ class FrameWriter:
         Raises:
             RunError: it cannot be written.
         """
-        name = f"frames/frame_{len(self.times):06d}.vtu"
+        name = _name(len(self.times))
         (self.folder / "frames").mkdir(exist_ok=True)
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
         write_text(self.folder / "frames.pvd", self._collection())
 
+    def truncate(self, times: Sequence[float]) -> None:
+        """Keep the first frames only, of the given times [s]; later files are removed."""
+        self.times = list(times)
+        kept = {self.folder / _name(k) for k in range(len(self.times))}
+        for path in set((self.folder / "frames").glob("*.vtu")) - kept:
+            path.unlink()
+        write_text(self.folder / "frames.pvd", self._collection())
+
     def _collection(self) -> str:
         rows = [
-            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(f"frames/frame_{k:06d}.vtu")}/>'
+            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(_name(k))}/>'
             for k, time in enumerate(self.times)
         ]
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
+
+
+def _name(number: int) -> str:
+    return f"frames/frame_{number:06d}.vtu"

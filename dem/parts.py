@@ -261,3 +261,9 @@ class Recording(Part):
         description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
     )
     series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
+    checkpoint_interval_s: float | None = Field(
+        0.4,
+        gt=0,
+        description="simulated time between checkpoints [s]; null: none. At a checkpoint the run reloads itself, so "
+        "that a resumed run has the same bits; runs with other intervals differ in their last bits",
+    )

@@ -1,71 +1,143 @@
-"""The stages of a run: pour, rest, shake. Each drives the engine through a `Clock` and ends by a stated criterion."""
+"""The stages of a run: pour, rest, shake.
+
+A stage is asked again and again when it wants to be asked next; in between, time passes and everything due is recorded.
+All that it remembers is plain data, so that a run can be stopped between any two steps and go on as if it had not been.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import singledispatch
+from typing import Any, Protocol
 
 import numpy as np
 
 from dem.engine import Engine
 from dem.errors import RunError
-from dem.parts import Deposit, Relax, Settle, Shake
+from dem.parts import Deposit, Phase, Relax, Settle, Shake
 from dem.placement import place_layer
 from dem.scene import Scene, derive_seed
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down or a pile has settled
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
 
-
-@dataclass(frozen=True)
-class Clock:
-    """What a phase may do with time.
-
-    Args:
-        engine: the simulation.
-        advance: lets time pass [s], with everything recorded that is due meanwhile.
-    """
-
-    engine: Engine
-    advance: Callable[[float], None]
+Memory = dict[str, Any]
 
 
-@singledispatch
-def perform(phase: object, scene: Scene, clock: Clock) -> None:
-    """Run one phase to its end.
+class Stage(Protocol):
+    """One phase while it runs."""
 
-    Raises:
-        RunError: it did not end as it should; the message says by how much.
-    """
-    msg = f"no such phase: {phase!r}"
-    raise TypeError(msg)
+    memory: Memory
+    """All that the stage remembers: plain data, JSON-able without loss."""
 
+    def proceed(self, engine: Engine) -> float:
+        """Do what is due now.
 
-@perform.register
-def _(phase: Relax, scene: Scene, clock: Clock) -> None:
-    clock.advance(phase.duration_s)
+        Returns:
+            Time [s] after which to be asked again; 0: the phase is over.
 
-
-@perform.register
-def _(phase: Shake, scene: Scene, clock: Clock) -> None:
-    amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
-    clock.engine.shake(amplitude=amplitude, frequency=phase.frequency_hz)
-    clock.advance(phase.duration_s)
-    clock.engine.stop_container()
+        Raises:
+            RunError: the phase did not end as it should; the message says by how much.
+        """
 
 
-@perform.register
-def _(phase: Deposit, scene: Scene, clock: Clock) -> None:
-    rng = np.random.default_rng(derive_seed(scene.seed, "deposit"))
-    left = scene.count
-    while left:
-        size = min(phase.per_layer, left)
-        _pour_layer(phase, scene, clock.engine, size, rng)
-        left -= size
-        _await_landing(phase, clock, size)
-    _await_settling(phase.settle, clock)
+def begin(phase: Phase, scene: Scene) -> Stage:
+    """The stage of a phase, at its beginning."""
+    if isinstance(phase, Deposit):
+        return Pouring(phase, scene)
+    if isinstance(phase, Shake):
+        return Shaking(phase, scene.gravity_m_per_s2)
+    return Resting(phase)
+
+
+class Resting:
+    """Nothing acts but gravity."""
+
+    def __init__(self, phase: Relax) -> None:
+        self._phase = phase
+        self.memory: Memory = {"begun": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        if self.memory["begun"]:
+            return 0.0
+        self.memory["begun"] = True
+        return self._phase.duration_s
+
+
+class Shaking:
+    """The container moves."""
+
+    def __init__(self, phase: Shake, gravity: float) -> None:
+        self._phase = phase
+        self._amplitude = shake_amplitude(phase, gravity)
+        self.memory: Memory = {"begun": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        if self.memory["begun"]:
+            engine.stop_container()
+            return 0.0
+        self.memory["begun"] = True
+        engine.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)
+        return self._phase.duration_s
+
+
+class Pouring:
+    """Layers of random poses just above the pile, the next when the last has come down; then the pile settles."""
+
+    def __init__(self, phase: Deposit, scene: Scene) -> None:
+        self._phase = phase
+        self._scene = scene
+        rng = np.random.default_rng(derive_seed(scene.seed, "deposit"))
+        # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile.
+        self.memory: Memory = {"left": scene.count, "layer": 0, "waited": 0.0, "random": rng.bit_generator.state}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory = self.memory
+        if memory["layer"]:
+            self._look_at_layer(engine)
+        elif not memory["left"] and self._has_settled(engine):
+            return 0.0
+        if memory["left"] and not memory["layer"]:
+            self._pour(engine)
+        memory["waited"] += CHECK_INTERVAL
+        return CHECK_INTERVAL
+
+    def _pour(self, engine: Engine) -> None:
+        memory = self.memory
+        size = min(self._phase.per_layer, memory["left"])
+        rng = np.random.default_rng()
+        rng.bit_generator.state = memory["random"]
+        _pour_layer(self._phase, self._scene, engine, size, rng)
+        memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)
+
+    def _look_at_layer(self, engine: Engine) -> None:
+        size, limit = self.memory["layer"], self._phase.landed_speed_m_per_s
+        fastest = float(-engine.state().velocities[-size:, 2].min())
+        if fastest < limit and engine.touches()[-size:].min() > 0:
+            self.memory.update(layer=0, waited=0.0)
+        elif self.memory["waited"] > LAYER_TIMEOUT:
+            msg = (
+                f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
+                f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
+            )
+            raise RunError(msg)
+
+    def _has_settled(self, engine: Engine) -> bool:
+        settle: Settle = self._phase.settle
+        speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
+        unbalanced = engine.unbalanced_force()
+        if speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force:
+            return True
+        if self.memory["waited"] > settle.timeout_s:
+            msg = (
+                f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
+                f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
+                f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
+            )
+            raise RunError(msg)
+        return False
 
 
 def shake_amplitude(phase: Shake, gravity: float) -> float:
@@ -77,7 +149,7 @@ def container_height(scene: Scene) -> float:
     """Height of the wall [m]: given, or enough for the loosest pile plus a layer being poured.
 
     A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0, 0.7
-    and 1.4, with d the mean-width diameter); half of that is taken as the loosest.
+    and 1.4, with d the mean width of the section); half of that is taken as the loosest.
     """
     given = scene.container.height_m
     if given is not None:
@@ -93,15 +165,13 @@ def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np
     tops = state.points(particle.boxes.vertices)[..., 2].max(axis=1) if engine.count else np.zeros(0)
     top = tops.max(initial=engine.floor)
     near = tops > top - 2 * particle.radius
-    obstacles = state.points(particle.centres)[near].reshape(-1, 3)
-    height = phase.layer_height_w * scene.smarticle.middle_length_m
     poses = place_layer(
         particle,
         count=size,
         radius=scene.container.radius_m,
         bottom=top + particle.radius,
-        height=height,
-        obstacles=obstacles,
+        height=phase.layer_height_w * scene.smarticle.middle_length_m,
+        obstacles=state.points(particle.centres)[near].reshape(-1, 3),
         rng=rng,
     )
     highest = poses.positions[:, 2].max() + particle.reach
@@ -113,35 +183,3 @@ def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np
         )
         raise RunError(msg)
     engine.add(poses)
-
-
-def _await_landing(phase: Deposit, clock: Clock, size: int) -> None:
-    waited = 0.0
-    while waited < LAYER_TIMEOUT:
-        clock.advance(CHECK_INTERVAL)
-        waited += CHECK_INTERVAL
-        falling = -clock.engine.state().velocities[-size:, 2]
-        if falling.max() < phase.landed_speed_m_per_s and clock.engine.touches()[-size:].min() > 0:
-            return
-    msg = (
-        f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: fastest falls at "
-        f"{falling.max():.3g} m/s, limit {phase.landed_speed_m_per_s:g} m/s (phases.0.landed_speed_m_per_s)"
-    )
-    raise RunError(msg)
-
-
-def _await_settling(settle: Settle, clock: Clock) -> None:
-    waited = 0.0
-    while waited < settle.timeout_s:
-        clock.advance(CHECK_INTERVAL)
-        waited += CHECK_INTERVAL
-        speed = float(np.linalg.norm(clock.engine.state().velocities, axis=1).max())
-        unbalanced = clock.engine.unbalanced_force()
-        if speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force:
-            return
-    msg = (
-        f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
-        f"{settle.speed_m_per_s:g}), unbalanced force {unbalanced:.3g} (limit {settle.unbalanced_force:g}); "
-        "raise phases.0.settle.timeout_s or its limits, or lower contact.restitution"
-    )
-    raise RunError(msg)

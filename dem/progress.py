@@ -30,21 +30,27 @@ class Progress:
     _index: int = 0
     _end: float | None = None
     _begun: float = field(default_factory=time.monotonic)
-    _phase_begun: tuple[float, float] = (0.0, 0.0)
+    _start: float = 0.0
+    _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
 
-    def begin(self, *, index: int, phase: str, start: float, end: float | None) -> None:
-        """A phase begins.
+    def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
+        """A phase begins, or is gone on with.
 
         Args:
             index: number of the phase.
             phase: its type.
-            start: simulated time [s].
+            start: simulated time at which it began [s].
+            now: simulated time [s].
             end: when it will end [s], if that is known.
         """
-        self._index, self._phase, self._end = index, phase, end
-        self._phase_begun = (time.monotonic(), start)
+        self._index, self._phase, self._start, self._end = index, phase, start, end
+        self._here_since = (time.monotonic(), now)
         self._last = -math.inf
+
+    def warn(self, message: str) -> None:
+        """Tell the person at the terminal at once."""
+        sys.stderr.write(f"\r\x1b[Ksmarticles: warning: {message}\n")
 
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""
@@ -80,19 +86,19 @@ class Progress:
             sys.stderr.flush()
 
     def _draw(self, simulated: float, phi: float | None, count: int, now: float) -> None:
-        wall_begun, start = self._phase_begun
+        wall_since, since = self._here_since
         done, left = "", ""
-        if self._end is not None and simulated > start:
-            fraction = (simulated - start) / (self._end - start)
+        if self._end is not None and simulated > since:
+            fraction = (simulated - self._start) / (self._end - self._start)
             bar = "█" * round(20 * fraction)
             done = f" {bar:<20} {100 * fraction:3.0f} %"
-            left = f"  {(now - wall_begun) * (1 - fraction) / fraction:.0f} s left in this phase"
+            left = f"  {(now - wall_since) * (self._end - simulated) / (simulated - since):.0f} s left in this phase"
         elif self._phase == "deposit":
             fraction = count / self.total
             done = f" {'█' * round(20 * fraction):<20} {count}/{self.total}"
             if 0 < fraction < 1:
                 # The pile grows, and each layer costs as much as the pile under it: time goes as the square.
-                left = f"  about {(now - wall_begun) * (1 / fraction**2 - 1):.0f} s left in this phase"
+                left = f"  about {(now - wall_since) * (1 / fraction**2 - 1):.0f} s left in this phase"
         packing = f"  φ {phi:.3f}" if phi is not None else ""
         line = f"{self._phase:<8}{done}  t = {simulated:.2f} s{packing}{left}"
         sys.stderr.write(f"\r\x1b[K{line}")

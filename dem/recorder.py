@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
 
 from dem.engine import Engine
 from dem.frames import FrameWriter, frame_mesh
@@ -40,8 +44,7 @@ class Recorder:
         """
         state = engine.state()
         phi = self.series.sample(engine, state, phase)
-        due = engine.steps % self.frame_steps == 0
-        if due and engine.count:
+        if engine.count and engine.steps % self.frame_steps == 0:
             mesh = frame_mesh(
                 engine.particle.boxes,
                 state,
@@ -56,3 +59,15 @@ class Recorder:
         self.watchdog.check(state, floor=engine.floor, time=engine.time)
         self.progress.update(time=engine.time, phi=phi, count=engine.count)
         self.next_step = engine.steps + self.series_steps
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs besides the columns of the series."""
+        return {"next_step": self.next_step, "frames": self.frames.times, "series": self.series.memory}
+
+    def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
+        self.next_step = memory["next_step"]
+        self.frames.truncate(memory["frames"])
+        self.series.restore(memory["series"], columns)
+        self.series.write()

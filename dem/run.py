@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import platform
 import subprocess
-import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -16,16 +16,19 @@ import h5py
 import meshio
 import numpy as np
 
+from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Cylinder, Engine, yade_version
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
 from dem.parts import Shake
-from dem.phases import Clock, container_height, perform, shake_amplitude
+from dem.phases import container_height, shake_amplitude
 from dem.progress import Progress
 from dem.recorder import Recorder
+from dem.rundir import DONE, FAILED, MANIFEST, SCENE, claimed, log_of, mark_done, mark_failed, recorded_scene_hash
 from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
+from dem.simulation import Simulation, StopRequestedError
 from dem.timestep import contact_law, time_step
 from dem.watchdog import Watchdog
 
@@ -50,56 +53,102 @@ class RunOutcome:
     wall_s: float
 
 
-def run_scene(scene: Scene, out: Path, *, command: str, progress: bool) -> RunOutcome:
-    """Run a scene into a new run directory.
+def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False) -> RunOutcome | None:
+    """Run a scene into a run directory.
 
     Args:
         scene: what to run.
-        out: the run directory; must not exist, or be empty.
+        out: the run directory; must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
         progress: whether to draw progress on standard error.
+        resume: go on from the newest checkpoint that is whole, or from the start where none was written.
+
+    Returns:
+        The outcome; None where the run was done already and there was nothing to resume.
 
     Raises:
-        InputError: `out` holds something already.
+        InputError: `out` holds something else, or another process runs in it.
         RunError: the run failed; `failed.json` tells the cause and everything recorded before stays.
-        KeyboardInterrupt: the run was interrupted; `failed.json` says so and what was recorded is whole.
+        StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
+        KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
     dt = time_step(scene)
-    version_of_yade = yade_version()
-    _claim(out)
-    write_text(out / "scene.yaml", dump_scene(scene))
-    write_json(out / "run.json", manifest(scene, dt=dt, command=command, yade=version_of_yade))
-    log = _open_log(out)
+    yade = yade_version()
+    with claimed(out, resume=resume):
+        if resume and (out / DONE).exists():
+            return None
+        if resume:
+            _check_scene(scene, out)
+        else:
+            write_text(out / SCENE, dump_scene(scene))
+            write_json(out / MANIFEST, manifest(scene, dt=dt, command=command, yade=yade))
+        (out / FAILED).unlink(missing_ok=True)
+        with log_of(out) as log:
+            return _run(scene, out, log, dt=dt, yade=yade, progress=progress, resume=resume)
+
+
+def _check_scene(scene: Scene, out: Path) -> None:
+    made, wanted = recorded_scene_hash(out), scene_hash(scene)
+    if made != wanted:
+        msg = (
+            f"--out {out}: was made from another scene (hash {made[:12]}, this one {wanted[:12]}); "
+            f"resume with {out / SCENE}, or run the changed scene in another directory"
+        )
+        raise InputError(msg)
+
+
+def _run(
+    scene: Scene, out: Path, log: logging.Logger, *, dt: float, yade: str, progress: bool, resume: bool
+) -> RunOutcome:
     bar = Progress(out, scene.count, show=progress)
-    begun = time.monotonic()
-    engine: Engine | None = None
-    recorder: Recorder | None = None
+    simulation: Simulation | None = None
     try:
         engine = _build_engine(scene, dt)
-        recorder = _build_recorder(scene, engine, out, bar)
-        phases = _perform_all(scene, engine, recorder, log)
-        recorder.series.write()
-    except (RunError, KeyboardInterrupt) as error:
-        interrupted = isinstance(error, KeyboardInterrupt)
-        cause = "interrupted by the user" if interrupted else str(error)
+        simulation = Simulation(
+            scene=scene,
+            engine=engine,
+            recorder=_build_recorder(scene, engine, out, bar),
+            folder=out,
+            log=log,
+            yade=yade,
+            checkpoint_steps=round((scene.recording.checkpoint_interval_s or 0.0) / dt),
+        )
+        if resume:
+            _restore(simulation, scene, out, log, yade)
+        phases = simulation.run()
+        mark_done(out, {"time_s": engine.time, "steps": engine.steps, "wall_s": simulation.wall, "phases": phases})
+    except (RunError, KeyboardInterrupt, StopRequestedError) as error:
+        status = "failed" if isinstance(error, RunError) else "interrupted"
+        cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
         log.error("%s", cause)
-        _leave_usable(out, recorder, engine, status="interrupted" if interrupted else "failed", cause=cause)
+        if simulation is not None and not isinstance(error, StopRequestedError):
+            _keep_series(simulation)
+        mark_failed(out, status=status, cause=cause, time=simulation.engine.time if simulation else 0.0)
         raise
     finally:
         bar.finish()
-        for handler in log.handlers:
-            handler.close()
-        log.handlers.clear()
-    wall = time.monotonic() - begun
-    done = {
-        "status": "done",
-        "time_s": engine.time,
-        "steps": engine.steps,
-        "wall_s": wall,
-        "phases": phases,
-    }
-    write_json(out / "done.json", done)
-    return RunOutcome(out, engine.time, engine.steps, wall)
+    return RunOutcome(out, engine.time, engine.steps, simulation.wall)
+
+
+def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, yade: str) -> None:
+    if not has_checkpoint(out):
+        log.info("resumed from the start: no checkpoint was written")
+        simulation.recorder.frames.truncate([])
+        return
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
+    if warning:
+        log.warning("%s", warning)
+        simulation.recorder.progress.warn(warning)
+    simulation.restore(checkpoint)
+    log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
+
+
+def _keep_series(simulation: Simulation) -> None:
+    try:
+        simulation.recorder.series.write()
+    except RunError:
+        # The disk is full: the cause is on the terminal, and what was written before is whole.
+        return
 
 
 def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, Any]:
@@ -139,24 +188,9 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
     }
 
 
-def _claim(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        held = next(out.iterdir(), None)
-    except OSError as error:
-        msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
-        raise InputError(msg) from None
-    if held is not None:
-        what = "another run" if (out / "run.json").exists() else f"files ({held.name}, …)"
-        msg = f"--out {out}: holds {what} and is left as it is; choose another directory"
-        raise InputError(msg)
-
-
 def _build_engine(scene: Scene, dt: float) -> Engine:
     cylinder = Cylinder(
-        radius=scene.container.radius_m,
-        height=container_height(scene),
-        facets=scene.fidelity.wall_facets,
+        radius=scene.container.radius_m, height=container_height(scene), facets=scene.fidelity.wall_facets
     )
     return Engine(
         particle=scene.particle,
@@ -171,10 +205,10 @@ def _build_engine(scene: Scene, dt: float) -> Engine:
 def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
     radius, gravity, dt = scene.container.radius_m, scene.gravity_m_per_s2, engine.time_step
     height = container_height(scene)
-    fall = (2 * gravity * height) ** 0.5
+    fall = math.sqrt(2 * gravity * height)
     shaking = max(
         (
-            shake_amplitude(phase, gravity) * 2 * np.pi * phase.frequency_hz
+            shake_amplitude(phase, gravity) * 2 * math.pi * phase.frequency_hz
             for phase in scene.phases
             if isinstance(phase, Shake)
         ),
@@ -190,72 +224,6 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
     )
 
 
-def _perform_all(scene: Scene, engine: Engine, recorder: Recorder, log: logging.Logger) -> list[dict[str, Any]]:
-    performed = []
-    for index, phase in enumerate(scene.phases):
-        start, wall = engine.time, time.monotonic()
-        duration = getattr(phase, "duration_s", None)
-        end = start + duration if duration is not None else None
-        recorder.progress.begin(index=index, phase=phase.type, start=start, end=end)
-        log.info("phase %d %s begins at t = %.4f s", index, phase.type, start)
-
-        def advance(seconds: float, index: int = index) -> None:
-            target = engine.steps + max(1, round(seconds / engine.time_step))
-            while engine.steps < target:
-                engine.advance(min(target, recorder.next_step) - engine.steps)
-                if engine.steps == recorder.next_step:
-                    recorder.record(engine, index)
-
-        if recorder.next_step == 0:
-            recorder.record(engine, index)
-        perform(phase, scene, Clock(engine, advance))
-        spent = time.monotonic() - wall
-        log.info(
-            "phase %d %s ended at t = %.4f s after %.1f s of wall time",
-            index,
-            phase.type,
-            engine.time,
-            spent,
-        )
-        performed.append(
-            {
-                "index": index,
-                "type": phase.type,
-                "start_s": start,
-                "end_s": engine.time,
-                "wall_s": spent,
-            }
-        )
-    return performed
-
-
-def _leave_usable(out: Path, recorder: Recorder | None, engine: Engine | None, *, status: str, cause: str) -> None:
-    try:
-        if recorder is not None:
-            recorder.series.write()
-        write_json(
-            out / "failed.json",
-            {
-                "status": status,
-                "cause": cause,
-                "time_s": engine.time if engine is not None else 0.0,
-            },
-        )
-    except RunError:
-        # The disk is full: the cause is on the terminal, and what was written before is whole.
-        return
-
-
-def _open_log(out: Path) -> logging.Logger:
-    log = logging.getLogger(f"smarticles.{out.resolve()}")
-    log.setLevel(logging.INFO)
-    log.propagate = False
-    handler = logging.FileHandler(out / "log.txt", encoding="utf-8")
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    log.addHandler(handler)
-    return log
-
-
 def _own_version() -> str:
     try:
         return version("smarticles")
@@ -268,12 +236,7 @@ def _git_revision() -> str:
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         answer = subprocess.run(
-            command,
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=10,
+            command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True, timeout=10
         )
     except (OSError, subprocess.SubprocessError):
         return "unknown"

@@ -102,13 +102,17 @@ class Scene(Part):
                 raise ValueError(msg)
 
     def _check_recording(self) -> None:
-        frame, series = self.recording.frame_interval_s, self.recording.series_interval_s
-        if abs(frame / series - round(frame / series)) > 1e-6 or frame < series:
-            msg = (
-                f"recording.frame_interval_s: {frame:g} s is not a whole multiple of series_interval_s = {series:g} s; "
-                f"use e.g. {max(1, round(frame / series)) * series:g} s"
-            )
-            raise ValueError(msg)
+        series = self.recording.series_interval_s
+        for key in ("frame_interval_s", "checkpoint_interval_s"):
+            interval = getattr(self.recording, key)
+            if interval is None:
+                continue
+            if abs(interval / series - round(interval / series)) > 1e-6 or interval < series:
+                msg = (
+                    f"recording.{key}: {interval:g} s is not a whole multiple of series_interval_s = {series:g} s; "
+                    f"use e.g. {max(1, round(interval / series)) * series:g} s"
+                )
+                raise ValueError(msg)
         for number, phase in enumerate(self.phases):
             if not isinstance(phase, Deposit) and phase.duration_s < series:
                 msg = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,23 @@ class SeriesWriter:
         mean: NDArray[np.float64] = -(momentum - before[1]) / (time - before[0]) - weight
         return mean
 
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs besides the columns."""
+        before = self._before
+        return {"before": None if before is None else [before[0], before[1].tolist()]}
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The series so far: (n,) or (n, 3) arrays by name."""
+        return {name: np.array(values) for name, values in self._rows.items()}
+
+    def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from where `memory` and `columns` were taken."""
+        before = memory["before"]
+        self._before = None if before is None else (before[0], np.array(before[1]))
+        self._rows = {name: list(columns[name]) for name in COLUMNS}
+
     def write(self) -> None:
         """Rewrite the file with all samples.
 
@@ -120,7 +138,8 @@ class SeriesWriter:
             file.attrs["format"] = FORMAT
             for name, value in self.attributes.items():
                 file.attrs[name] = value
+            columns = self.columns
             for name, (unit, description) in COLUMNS.items():
-                dataset = file.create_dataset(name, data=np.array(self._rows[name]))
+                dataset = file.create_dataset(name, data=columns[name])
                 dataset.attrs["unit"] = unit
                 dataset.attrs["description"] = description

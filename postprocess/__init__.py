@@ -1,7 +1,8 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
 Readers take a run directory (see ARCHITECTURE.md); measures are pure functions of NumPy arrays and
-return frozen results. Lengths are in metres, times in seconds.
+return frozen results. Lengths are in metres, times in seconds. `heights` and `entanglement` are
+functions of the modules of the same name and are imported from there.
 """
 
 from postprocess.averages import Mean, mean_with_error
@@ -11,7 +12,6 @@ from postprocess.entanglement import (
     Entanglement,
     LinkedPairs,
     crossing_pairs,
-    entanglement,
     has_plane,
     link_crossings,
     linking_pairs,
@@ -19,7 +19,7 @@ from postprocess.entanglement import (
 from postprocess.errors import UndefinedMeasureError
 from postprocess.frames import Frame, FrameSequence, read_frame, read_frames
 from postprocess.geometry import centres_of_mass
-from postprocess.heights import Heights, heights, material_height
+from postprocess.heights import Heights, material_height
 from postprocess.manifest import PhaseRecord, RunManifest, read_run
 from postprocess.measure import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.packing import DEFINITIONS, PackingFraction, packing_fraction
@@ -45,9 +45,7 @@ __all__ = [
     "centres_of_mass",
     "contact_pairs",
     "crossing_pairs",
-    "entanglement",
     "has_plane",
-    "heights",
     "link_crossings",
     "linking_pairs",
     "material_height",

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, to_hex
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 COLUMN_WIDTH = 3.5
 """Width of a journal column [inch]."""
@@ -41,11 +42,12 @@ RESOLUTION = 300
 
 BLACK = "#1a1a1a"
 BLUE = "#0072b2"
+SKY = "#56b4e9"
 ORANGE = "#d55e00"
 GREY = "#6e6e6e"
 """Okabe and Ito's colours: told apart with every common colour blindness, and in grey print."""
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "axes.edgecolor": BLACK,
     "axes.grid": True,
     "axes.axisbelow": True,
@@ -76,13 +78,13 @@ _STYLE = {
 
 _FOOTER_SIZE = 4.6
 _FOOTER_LINE = 0.082  # inch per line of footer
-_FOOTER_COLUMNS = 104  # characters of that size across one column width
+_FOOTER_COLUMNS = 97  # characters of that size across one column width
 
 
 @contextmanager
 def style() -> Iterator[None]:
     """Matplotlib's settings for our figures, restored afterwards."""
-    with rc_context({**_STYLE}):
+    with rc_context(_STYLE):
         yield
 
 
@@ -96,9 +98,31 @@ def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Fig
     Returns:
         The figure and its axes.
     """
-    figure = matplotlib.figure.Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    figure = blank_figure(width, height)
     return figure, figure.add_subplot()
+
+
+def blank_figure(width: float, height: float, *, dpi: int = RESOLUTION) -> Figure:
+    """A figure without axes.
+
+    Args:
+        width: [inch].
+        height: [inch].
+        dpi: Pixels per inch on screen.
+
+    Returns:
+        The figure.
+    """
+    figure = matplotlib.figure.Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """The figure as (height, width, 3) colours, 0 to 255."""
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
 
 
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
@@ -128,9 +152,7 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
     )
 
 
-def save(
-    figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")
-) -> list[Path]:
+def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:
     """Write a figure in several formats, each beside and then renamed.
 
     The files hold no date: the same figure gives the same bytes.
@@ -216,7 +238,7 @@ def sequence(colours: int, *, first: float = 0.16, last: float = 1.0) -> list[st
     return [to_hex(colour) for colour in 1 - 0.86 * (1 - plain)]
 
 
-def count_colours(largest: int, *, classes: int = 9) -> CountColours:
+def count_colours(largest: int, *, classes: int = 13) -> CountColours:
     """One colour per whole number, with a neutral grey for zero.
 
     Args:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +24,7 @@ _ASPECT = "aspect ratio [-]"
 _SERIES = "packing_fraction"
 _LEAST_BIN = 0.1  # s: three periods of shaking at 30 Hz
 _BINS = 100
+_SHIFT = 0.005  # in l/w, to keep error bars apart
 
 
 def draw(
@@ -38,8 +41,8 @@ def draw(
 
     Args:
         output: Folder.
-        summary: See `gravish.summarise_runs`.
-        reference: See `gravish.read_reference`.
+        summary: See `gravish_answers.summarise_runs`.
+        reference: See `gravish_answers.read_reference`.
         manifests: The runs behind the summary.
         definition: Of the packing fraction that is compared.
         reading_error: Of the reference's points [-].
@@ -82,14 +85,17 @@ def _draw_packing(
             reference[column],
             yerr=reading_error,
             **_marker("o", figures.ORANGE, face),
+            markersize=5.5,
             linestyle="none",
             label=label,
         )
-    for stage, face, label in (
-        ("phi_0", "white", r"simulation, $\phi_0$"),
-        ("phi_f", figures.BLUE, r"simulation, $\phi_\mathrm{f}$"),
+    blue, sky = figures.BLUE, figures.SKY
+    for stage, shape, colour, face, label in (
+        ("phi_0", "D", blue, "white", r"simulation, $\phi_0$ before shaking"),
+        ("phi_f relaxed", "^", sky, sky, r"simulation, $\phi_\mathrm{f}$ at rest again"),
+        ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
     ):
-        _draw_means(axes, summary, f"{stage} {definition}", _marker("s", figures.BLUE, face), label)
+        _draw_means(axes, summary, f"{stage} {definition}", _marker(shape, colour, face), label)
     axes.set_xlabel(r"aspect ratio $l/w$ [-]")
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
@@ -99,106 +105,126 @@ def _draw_packing(
 
 def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     figure, axes = figures.new_figure(height=2.4)
-    for quantity, face, label in (
-        ("crossings before", "white", "before shaking"),
-        ("crossings after", figures.BLUE, "at the end of shaking"),
+    for quantity, face, label, shift in (
+        ("crossings before", "white", "before shaking", -_SHIFT),
+        ("crossings after", figures.BLUE, "at the end of shaking", _SHIFT),
     ):
-        _draw_means(axes, summary, quantity, _marker("s", figures.BLUE, face), label)
+        marker = _marker("D", figures.BLUE, face)
+        _draw_means(axes, summary, quantity, marker, label, shift=shift)
     axes.set_xlabel(r"aspect ratio $l/w$ [-]")
     axes.set_ylabel(r"links through a plane $\langle N\rangle$ [-]")
     axes.set_ylim(bottom=0)
     axes.legend(loc="best")
-    return _finished(figure, path, footer)
+    return _finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])
 
 
 def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence[str]) -> list[Path]:
     figure, axes = figures.new_figure(height=2.7)
-    ratios = sorted({round(run.aspect_ratio, 6) for run in manifests})
-    without: list[str] = []
-    width = 0.0
-    for ratio, colour in zip(ratios, figures.sequence(len(ratios), last=0.9), strict=True):
-        runs = [run for run in manifests if round(run.aspect_ratio, 6) == ratio]
-        histories = []
-        for run in runs:
-            try:
-                histories.append(_history(run))
-            except InputError:
-                without.append(run.directory.name)
-        if not histories:
-            continue
-        start = max(times[0] for times, _ in histories)
-        end = min(times[-1] for times, _ in histories)
-        width = max(width, (end - max(start, 0.0)) / _BINS, _LEAST_BIN)
-        centres, means = _binned(histories, start, end, max((end - start) / _BINS, _LEAST_BIN))
-        axes.plot(centres, means.mean(axis=0), color=colour, label=f"{ratio:g}")
+    histories: dict[float, list[_History]] = {}
+    without, ends = [], [0.0]
+    for run in manifests:
+        try:
+            history = _history(run)
+        except InputError:
+            without.append(run.directory.name)
+        else:
+            histories.setdefault(round(run.aspect_ratio, 6), []).append(history)
+            ends.append(history.shaken)
+    width = max(max(ends) / _BINS, _LEAST_BIN)
+    decimals = 1 if all(round(ratio, 1) == ratio for ratio in histories) else 2
+    colours = figures.sequence(len(histories), last=0.9)
+    for (ratio, seeds), colour in zip(sorted(histories.items()), colours, strict=True):
+        centres, means = _binned(seeds, width)
+        axes.plot(centres, means.mean(axis=0), color=colour, label=f"{ratio:.{decimals}f}")
         if len(means) > 1:
-            axes.fill_between(
-                centres,
-                means.min(axis=0),
-                means.max(axis=0),
-                color=colour,
-                alpha=0.25,
-                linewidth=0,
-            )
-    axes.axvline(0, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
+            low, high = means.min(axis=0), means.max(axis=0)
+            axes.fill_between(centres, low, high, color=colour, alpha=0.25, linewidth=0)
+    for time in sorted(set(ends)):
+        axes.axvline(time, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
     axes.set_xlabel("time since shaking began [s]")
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
-    axes.set_ylim(bottom=0)
-    if axes.lines[:-1]:
+    if histories:
         axes.legend(title=r"$l/w$", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    told = [f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed."]
+    told = [
+        f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed. "
+        "Shaking begins and ends at the broken lines."
+    ]
     if without:
         told.append(f"No time series of φ: {', '.join(without)}.")
     return _finished(figure, path, [*told, *footer])
 
 
-def _history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time since shaking began [s] and φ, from the phase before shaking to its end."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _History:
+    """φ of one run from the phase before shaking to the end.
+
+    Attributes:
+        times: (n,) since shaking began [s].
+        values: (n,) φ [-].
+        shaken: Time at which shaking ended [s].
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    shaken: float
+
+
+def _history(run: RunManifest) -> _History:
+    """Reads one run's history.
+
+    Raises:
+        InputError: There is none.
+    """
     series = read_series(run.directory)
-    shakes = [phase.index for phase in run.phases if phase.type == "shake"]
-    phase, phi = series["phase"], np.asarray(series[_SERIES], dtype=np.float64)
-    shown = (phase >= shakes[0] - 1) & (phase <= shakes[-1]) & np.isfinite(phi)
-    origin = run.phases[shakes[0]].start
-    if origin is None or not shown.any():
+    shakes = [phase for phase in run.phases if phase.type == "shake"]
+    start, end = shakes[0].start, shakes[-1].end
+    values = np.asarray(series[_SERIES], dtype=np.float64)
+    shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
+    if start is None or end is None or not shown.any():
         msg = f"{run.directory}: no packing fraction was recorded while shaking"
         raise InputError(msg)
-    return series.time[shown] - origin, phi[shown]
+    return _History(times=series.time[shown] - start, values=values[shown], shaken=end - start)
 
 
-def _binned(
-    histories: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
-    start: float,
-    end: float,
-    width: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _binned(histories: Sequence[_History], width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Means over equal intervals of time: centres (n,) [s] and values (seeds, n).
 
     No interval reaches across the beginning of shaking; those that lack a sample of any seed are
     left out.
     """
-    before = -np.arange(0, -min(start, 0.0) + width / 2, width)[::-1]
-    edges = np.concatenate([before[:-1], np.arange(0, end + width / 2, width)])
+    first = math.floor(min(history.times[0] for history in histories) / width)
+    last = math.ceil(max(history.times[-1] for history in histories) / width)
+    count = max(last - first, 1)
     rows = []
-    for times, values in histories:
-        place = np.digitize(times, edges) - 1
-        inside = (place >= 0) & (place < len(edges) - 1)
-        sums = np.bincount(place[inside], values[inside], len(edges) - 1)
-        counts = np.bincount(place[inside], minlength=len(edges) - 1)
-        rows.append(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
+    for history in histories:
+        # A sample at the very end belongs to the last interval.
+        place = np.clip(np.floor(history.times / width).astype(int) - first, 0, count - 1)
+        samples = np.bincount(place, minlength=count)
+        sums = np.bincount(place, history.values, count)
+        rows.append(np.where(samples > 0, sums / np.maximum(samples, 1), np.nan))
     means = np.array(rows)
     whole = np.isfinite(means).all(axis=0)
-    return ((edges[:-1] + edges[1:]) / 2)[whole], means[:, whole]
+    return (first + np.arange(count) + 0.5)[whole] * width, means[:, whole]
 
 
-def _draw_means(axes: Axes, summary: pd.DataFrame, quantity: str, marker: Mapping[str, Any], label: str) -> None:
+def _draw_means(
+    axes: Axes,
+    summary: pd.DataFrame,
+    quantity: str,
+    marker: Mapping[str, Any],
+    label: str,
+    *,
+    shift: float = 0.0,
+) -> None:
     """Means over seeds with their error bars; a mean over one seed has none."""
     if f"{quantity} [-]" not in summary.columns:
         return
     axes.errorbar(
-        summary[_ASPECT],
+        summary[_ASPECT] + shift,
         summary[f"{quantity} [-]"],
         yerr=summary[f"{quantity} 95 % [-]"].to_numpy(),
         **marker,
+        markersize=3.4,
         linewidth=0.7,
         label=label,
     )

@@ -6,28 +6,25 @@ bar are set by matplotlib around it. No display is needed: VTK falls back to EGL
 
 from __future__ import annotations
 
-import importlib
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess import figures
-from postprocess.entanglement import entanglement, link_crossings
+from postprocess import figures, film
+from postprocess.colouring import COLOURINGS, Colouring, ColourScale
+from postprocess.entanglement import entanglement
 from postprocess.errors import UndefinedMeasureError
 from postprocess.frames import Frame, FrameSequence, read_frames
-from postprocess.geometry import centres_of_mass, checked_vertices, link_lengths, plane_frames
+from postprocess.geometry import checked_vertices, link_lengths, plane_frames
 from postprocess.manifest import RunManifest, read_run
 from postprocess.packing import packing_fraction
 
@@ -40,7 +37,6 @@ with warnings.catch_warnings():
 from vtkmodules.vtkCommonCore import vtkLogger
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
@@ -58,60 +54,10 @@ _MOST_FILM_FRAMES = 150
 
 # Corners of a box (along, in plane, normal) and its faces, seen from outside.
 _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
-_FACES = np.array(
-    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-)
+_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 
 
-@dataclass(frozen=True, kw_only=True)
-class Colouring:
-    """What the colour of a smarticle means.
-
-    Attributes:
-        label: For the colour bar, with the unit.
-        kind: "count" for whole numbers, "value" for a continuous quantity, "name" for identity.
-        values: (N,) of a frame.
-    """
-
-    label: str
-    kind: str
-    values: Callable[[Frame], NDArray[Any]]
-
-
-def _height(frame: Frame) -> NDArray[np.float64]:
-    return (centres_of_mass(frame.vertices)[:, 2] - frame.floor_z) * _MILLIMETRE
-
-
-def _speed(frame: Frame) -> NDArray[np.float64]:
-    weights = link_lengths(frame.vertices)[:, :, None]
-    velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
-    speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
-    return speed
-
-
-COLOURINGS: Mapping[str, Colouring] = MappingProxyType(
-    {
-        "crossings": Colouring(
-            label="links of others through its plane",
-            kind="count",
-            values=lambda frame: link_crossings(frame.vertices),
-        ),
-        "contacts": Colouring(
-            label="smarticles that it touches", kind="count", values=lambda frame: frame.contacts
-        ),
-        "height": Colouring(
-            label="height of its centre of mass [mm]", kind="value", values=_height
-        ),
-        "speed": Colouring(label="speed of its centre of mass [m/s]", kind="value", values=_speed),
-        "id": Colouring(label="smarticle", kind="name", values=lambda frame: frame.smarticle_ids),
-    }
-)
-"""What `color_by` can be."""
-
-
-def link_boxes(
-    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float
-) -> pv.PolyData:
+def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float) -> pv.PolyData:
     """The links of all smarticles as one mesh of boxes.
 
     The section of a straight smarticle, or of one without barbs, is turned about its length by an
@@ -144,8 +90,8 @@ def link_boxes(
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     edges = np.stack([along, thickness_in_plane * across, thickness_normal * normal], axis=1)
     points = ((start + end) / 2)[:, None] + np.einsum("ce,bex->bcx", _CORNERS, edges)
-    faces = _FACES + 8 * np.arange(len(points))[:, None, None]
-    mesh = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
+    faces: Any = _FACES + 8 * np.arange(len(points))[:, None, None]
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
     mesh.cell_data["smarticle"] = np.repeat(smarticle, len(_FACES))
     mesh.cell_data["link"] = np.repeat(link, len(_FACES))
     return mesh
@@ -229,8 +175,7 @@ def render_film(
         InputError: Fewer than two frames, a kind of file that cannot be written here, an output
             that exists, or as in `render_run`.
     """
-    kinds = (".gif", ".webp", ".mp4")
-    output = _checked_output(directory, output, "film.gif", kinds, overwrite=overwrite)
+    output = _checked_output(directory, output, "film.gif", film.KINDS, overwrite=overwrite)
     look = _Look.checked(color_by=color_by, size=size, view=view)
     if not (math.isfinite(frames_per_second) and frames_per_second > 0 and most_frames >= 2):
         msg = (
@@ -238,7 +183,7 @@ def render_film(
             f"got {frames_per_second} 1/s, {most_frames}"
         )
         raise InputError(msg)
-    write = _film_writer(output.suffix, size)
+    film.check_film(output, size)
     run, frames = read_run(directory), read_frames(directory)
     if len(frames) < 2:
         msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; use render_run"
@@ -250,16 +195,16 @@ def render_film(
         extents.append(_extent(frame, run, look))
         values.append(look.colouring.values(frame))
 
-    def pictures(stage: _Stage) -> Iterator[Image.Image]:
-        for index, colours in zip(shown, values, strict=True):
-            yield stage.picture(frames[int(index)], colours)
-
     with (
         _Stage(run, look, np.concatenate(extents), _span(np.concatenate(values))) as stage,
         figures.whole_file(output, overwrite=overwrite) as temporary,
-        closing(pictures(stage)) as images,
     ):
-        write(temporary, images, frames_per_second)
+
+        def picture(number: int) -> Image.Image:
+            return stage.picture(frames[int(shown[number])], values[number])
+
+        samples = [picture(number) for number in sorted({0, len(shown) // 3, 2 * len(shown) // 3, len(shown) - 1})]
+        film.write_film(temporary, map(picture, range(len(shown))), frames_per_second, samples)
     return output
 
 
@@ -314,10 +259,7 @@ class _Look:
             msg = f"view must be one of {', '.join(VIEWS)}: got '{view}'"
             raise InputError(msg)
         if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
-            msg = (
-                f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: "
-                f"got {size[0]} x {size[1]}"
-            )
+            msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"
             raise InputError(msg)
         azimuth, elevation = VIEWS[view]
         return cls(colouring=COLOURINGS[color_by], size=size, azimuth=azimuth, elevation=elevation)
@@ -385,7 +327,13 @@ def _fitted_camera(
     high = (x / tangents - depth[:, None]).max(axis=0)
     low = (-x / tangents - depth[:, None]).max(axis=0)
     distance = float(((high + low) / 2).max())
-    centre = tangents * (high - low) / 2
+    # The other direction has room to spare, which goes to both sides alike.
+    low, high = x.min(axis=0), x.max(axis=0)
+    for _ in range(60):
+        centre = (low + high) / 2
+        share = (x - centre) / (distance + depth)[:, None]
+        right = share.max(axis=0) + share.min(axis=0) > 0
+        low, high = np.where(right, centre, low), np.where(right, high, centre)
     middle = (depth.min() + depth.max()) / 2
     focus = centre @ axes[:2] + middle * axes[2]
     return focus - (distance + middle) * axes[2], focus
@@ -403,10 +351,10 @@ class _Stage:
     ) -> None:
         self._run = run
         self._look = look
-        self._scale = _scale(look.colouring, span)
+        self._scale = ColourScale.of(look.colouring, *span)
         with _quiet_vtk():
             width, height = look.panel
-            self._plotter = pv.Plotter(
+            self._plotter: Any = pv.Plotter(
                 off_screen=True,
                 window_size=[_OVERSAMPLING * width, _OVERSAMPLING * height],
                 lighting="none",
@@ -432,8 +380,7 @@ class _Stage:
             thickness_in_plane=self._run.thickness_in_plane,
         )
         boxes.points *= _MILLIMETRE
-        colours = self._scale.to_rgba(values[boxes.cell_data["smarticle"]], bytes=True)
-        boxes.cell_data["colour"] = colours[:, :3]
+        boxes.cell_data["colour"] = self._scale.colours(values[boxes.cell_data["smarticle"]])
         with _quiet_vtk():
             self._plotter.add_mesh(
                 boxes,
@@ -451,6 +398,7 @@ class _Stage:
                 reset_camera=False,
                 render=False,
             )
+            self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
         panel = Image.fromarray(pixels).resize(self._look.panel, Image.Resampling.LANCZOS)
         return self._composed(np.asarray(panel), self._caption(frame))
@@ -464,10 +412,7 @@ class _Stage:
         plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
         arc = _back_arc(radius, axes[2])
         if arc is not None:
-            wall = pv.StructuredGrid(
-                *(np.stack([arc[:, i], arc[:, i]]) for i in range(2)),
-                np.repeat([[0.0], [top]], len(arc), axis=1),
-            )
+            wall = pv.MultipleLines(arc).extrude((0.0, 0.0, top), capping=False)
             plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False)
             upper = arc + np.array([0.0, 0.0, top])
             self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]]))
@@ -540,15 +485,10 @@ class _Stage:
         width, height = self._look.size
         unit = min(width, height) / 100  # pixel; text scales with the picture
         with figures.style():
-            figure: Figure = figures.matplotlib.figure.Figure(
-                figsize=(width / 72, height / 72), dpi=72, facecolor="white"
-            )
-            FigureCanvasAgg(figure)
+            figure = figures.blank_figure(width / 72, height / 72, dpi=72)
             figure.figimage(panel, xo=0, yo=0, origin="upper")
             rows = ((2.0, 2.4, "bold", figures.BLACK), (5.4, 1.85, "normal", figures.GREY))
-            for text, (below, points, weight, colour) in zip(
-                (caption[0], "\n".join(caption[1:])), rows, strict=True
-            ):
+            for text, (below, points, weight, colour) in zip((caption[0], "\n".join(caption[1:])), rows, strict=True):
                 figure.text(
                     2.6 * unit / width,
                     1 - below * unit / height,
@@ -561,10 +501,7 @@ class _Stage:
                     parse_math=False,
                 )
             self._scale.draw(figure, self._look.colouring.label, unit)
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            pixels = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        return Image.fromarray(pixels)
+            return Image.fromarray(figures.pixels(figure))
 
 
 def _back_arc(radius: float, forward: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -576,61 +513,6 @@ def _back_arc(radius: float, forward: NDArray[np.float64]) -> NDArray[np.float64
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
 
 
-class _Scale:
-    """Turns values into colours and draws the colour bar that says so."""
-
-    def __init__(
-        self,
-        mappable: ScalarMappable | None,
-        ticks: tuple[int, ...] = (),
-        labels: tuple[str, ...] = (),
-    ) -> None:
-        self._mappable = mappable
-        self._ticks = ticks
-        self._labels = labels
-
-    def to_rgba(self, values: NDArray[Any], *, bytes: bool) -> NDArray[Any]:  # noqa: A002
-        if self._mappable is None:
-            return _identity_colours(values)
-        colours: NDArray[Any] = self._mappable.to_rgba(values, bytes=bytes)
-        return colours
-
-    def draw(self, figure: Figure, label: str, unit: float) -> None:
-        """Draws the bar to the right of the panel, unless the colours only tell identity."""
-        if self._mappable is None:
-            return
-        height = min(0.055 * len(self._ticks), 0.46) if self._ticks else 0.46
-        axes = figure.add_axes((0.885, 0.47 - height / 2, 0.024, height))
-        bar = figure.colorbar(self._mappable, cax=axes)
-        bar.minorticks_off()
-        bar.outline.set_linewidth(0.08 * unit)
-        axes.tick_params(labelsize=1.8 * unit, length=0.7 * unit, width=0.12 * unit)
-        bar.set_label(label, fontsize=1.9 * unit)
-        if self._ticks:
-            bar.set_ticks(list(self._ticks), labels=list(self._labels))
-            axes.tick_params(length=0)
-
-
-def _scale(colouring: Colouring, span: tuple[float, float]) -> _Scale:
-    if colouring.kind == "count":
-        counts = figures.count_colours(int(span[1]))
-        return _Scale(ScalarMappable(counts.norm, counts.colours), counts.ticks, counts.labels)
-    if colouring.kind == "value":
-        low, high = span
-        if not high > low:  # one smarticle, or all alike
-            low, high = low - 0.5, high + 0.5
-        return _Scale(ScalarMappable(Normalize(low, high), ListedColormap(figures.sequence(256))))
-    return _Scale(None)
-
-
-def _identity_colours(identifiers: NDArray[Any]) -> NDArray[np.uint8]:
-    """Bright colours that differ between neighbours in number: golden-ratio steps of the hue."""
-    hue = (np.asarray(identifiers, dtype=np.float64) * (math.sqrt(5) - 1) / 2) % 1
-    tone = np.stack([hue, np.full_like(hue, 0.50), np.full_like(hue, 0.88)], axis=-1)
-    colours: NDArray[np.uint8] = (255 * hsv_to_rgb(tone)).astype(np.uint8)
-    return colours
-
-
 @contextmanager
 def _quiet_vtk() -> Iterator[None]:
     """Keeps VTK from warning, on standard error, that there is no display."""
@@ -640,51 +522,3 @@ def _quiet_vtk() -> Iterator[None]:
         yield
     finally:
         vtkLogger.SetStderrVerbosity(before)
-
-
-_FilmWriter = Callable[[Path, Iterable[Image.Image], float], None]
-
-
-def _film_writer(suffix: str, size: tuple[int, int]) -> _FilmWriter:
-    """How films of one kind are written here.
-
-    Raises:
-        InputError: They cannot be: a package is missing, or the size does not suit.
-    """
-    if suffix != ".mp4":
-        return _write_with_pillow
-    if any(side % 2 for side in size):
-        msg = f"size must be even for .mp4: got {size[0]} x {size[1]} pixels"
-        raise InputError(msg)
-    try:
-        importlib.import_module("imageio_ffmpeg")
-        imageio = importlib.import_module("imageio.v2")
-    except ImportError as error:
-        msg = f".mp4 needs the package {error.name}: pip install 'imageio[ffmpeg]', or choose .gif"
-        raise InputError(msg) from None
-
-    def write(path: Path, images: Iterable[Image.Image], rate: float) -> None:
-        with imageio.get_writer(
-            path, fps=rate, codec="libx264", quality=8, macro_block_size=2
-        ) as writer:
-            for image in images:
-                writer.append_data(np.asarray(image))
-
-    return write
-
-
-def _write_with_pillow(path: Path, images: Iterable[Image.Image], rate: float) -> None:
-    frames = iter(images)
-    if path.suffix == ".gif":
-        # One palette for the whole film, from its first picture, or colours would flicker.
-        first = next(frames).quantize(256, dither=Image.Dither.NONE)
-        rest = (image.quantize(palette=first, dither=Image.Dither.NONE) for image in frames)
-    else:
-        first, rest = next(frames), frames
-    first.save(
-        path,
-        save_all=True,
-        append_images=rest,
-        duration=round(1000 / rate),
-        loop=0,
-    )

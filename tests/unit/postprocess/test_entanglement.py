@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess import crossing_pairs, entanglement, has_plane, link_crossings, linking_pairs
+from postprocess import crossing_pairs, has_plane, link_crossings, linking_pairs
+from postprocess.entanglement import entanglement
 
 U = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
 
@@ -183,6 +184,14 @@ def test_straight_smarticles_have_no_plane(shape):
     bars = shape(1.0, 0.0, (90, 90))
     bent = shape(1.0, 0.7, (30, 30))
     np.testing.assert_array_equal(has_plane([straight, nearly, bars, bent]), [False, False, False, True])
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(5, 0), (30, 1)])
+def test_nearly_straight_smarticles_are_skipped_as_a(shape, angle, expected):
+    # The pin goes through the thin quadrilateral of both.
+    scene = [shape(1.0, 0.7, (angle, angle)), pin(0, 0.03)]
+    assert link_crossings(scene)[0] == expected
+    assert crossing_pairs(scene).i.tolist() == [0] * expected
 
 
 def test_straight_smarticles_pass_but_are_skipped_in_the_mean(shape):

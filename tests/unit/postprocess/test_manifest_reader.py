@@ -53,6 +53,7 @@ def test_failed_run(make_run):
         ({"count": 0}, "'count' must be a whole number, 1 or more: got 0"),
         ({"container_radius_m": -1}, "'container_radius_m' must be a finite number > 0: got -1"),
         ({"solid_volume_m3": float("nan")}, "'solid_volume_m3' must be a finite number > 0"),
+        ({"time_step_s": 0}, "'time_step_s' must be a finite number > 0: got 0"),
         ({"time_step_s": "1"}, "'time_step_s' must be a finite number > 0: got '1'"),
         ({"name": 3}, "'name' must be text"),
         ({"format": 2}, "'format' must be 1: got 2"),

@@ -26,6 +26,8 @@ def main() -> int:
     assert sha256 is not None
     (directory / "run.json").write_text(json.dumps({"scene_sha256": sha256[1]}))
     (directory / "threads").write_text(os.environ["OMP_NUM_THREADS"])
+    held = [str(fd.readlink()) for fd in descriptors() if fd.is_symlink()]
+    (directory / "held").write_text("\n".join(held))
     (directory / "id").write_text(hashlib.sha256(os.urandom(8)).hexdigest())
     if behaviour == "fail":
         failed = {"status": "failed", "cause": "left through the wall", "time_s": 0.1}
@@ -44,6 +46,11 @@ def main() -> int:
         time.sleep(60)
     (directory / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0}))
     return 0
+
+
+def descriptors() -> list[Path]:
+    """What may be open beside the standard streams."""
+    return [Path(f"/proc/self/fd/{number}") for number in range(3, 64)]
 
 
 def wait(directory: Path) -> int:

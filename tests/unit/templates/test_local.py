@@ -97,6 +97,8 @@ def test_all_runs_run_once_with_one_thread_the_longest_first(folder: Folder) -> 
     assert watcher.stops == []
     for entry in folder.entries:
         assert (folder.run(entry) / "threads").read_text() == "1"
+        # A run that outlives its runner keeps the sweep locked.
+        assert (folder.run(entry) / "held").read_text() == str(folder.path / ".lock")
     last = watcher.snapshots[-1]
     assert (last.total, last.ended, last.failed, last.running) == (4, 4, 0, ())
     assert last.left_s == 0

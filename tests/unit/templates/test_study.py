@@ -9,7 +9,7 @@ import pytest
 
 import templates
 from dem.errors import InputError
-from dem.scene import Deposit, Relax, Shake
+from dem.parts import Deposit, Relax, Shake
 from templates.expand import Point, expand
 from templates.study import differences, study_file, study_names
 from templates.sweep import load_sweep

@@ -1,0 +1,171 @@
+"""The loop of a run: phases in order, time advanced from one recording to the next, checkpoints in between."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from dem.checkpoint import Checkpoint, write_checkpoint
+from dem.engine import Engine
+from dem.phases import Stage, begin
+from dem.recorder import Recorder
+from dem.scene import Scene, scene_hash
+
+
+class StopRequestedError(Exception):
+    """The run was asked to stop at its next checkpoint (SIGUSR1, as from a batch system), and did."""
+
+
+@dataclass
+class Simulation:
+    """One run while it runs.
+
+    Args:
+        scene: what is run.
+        engine: the physics.
+        recorder: what is written.
+        folder: the run directory.
+        log: its log.
+        yade: version of YADE, stored in the checkpoints.
+        checkpoint_steps: steps between checkpoints, 0 for none.
+    """
+
+    scene: Scene
+    engine: Engine
+    recorder: Recorder
+    folder: Path
+    log: logging.Logger
+    yade: str
+    checkpoint_steps: int
+    _phase: int = 0
+    _stage: Stage | None = None
+    _target: int = 0
+    _performed: list[dict[str, Any]] = field(default_factory=list)
+    _spent: float = 0.0
+    _began: float = field(default_factory=time.monotonic)
+    _stop_requested: bool = False
+
+    def run(self) -> list[dict[str, Any]]:
+        """Run to the end of the last phase, from wherever the simulation stands.
+
+        Returns:
+            One entry per phase for `done.json`.
+
+        Raises:
+            RunError: a phase failed.
+            StopRequestedError: SIGUSR1 came; the last checkpoint has everything.
+        """
+        before = signal.signal(signal.SIGUSR1, self._request_stop)
+        try:
+            if not self.engine.steps:
+                self.recorder.record(self.engine, 0)
+            while self._phase < len(self.scene.phases):
+                self._run_phase()
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+        self.recorder.series.write()
+        return self._performed
+
+    def _run_phase(self) -> None:
+        phase = self.scene.phases[self._phase]
+        if self._stage is None:
+            self._stage = begin(phase, self.scene)
+            self._performed.append(
+                {"index": self._phase, "type": phase.type, "start_s": self.engine.time, "wall_s": -self._wall()}
+            )
+            self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
+        entry = self._performed[-1]
+        duration = getattr(phase, "duration_s", None)
+        self.recorder.progress.begin(
+            index=self._phase,
+            phase=phase.type,
+            start=entry["start_s"],
+            now=self.engine.time,
+            end=None if duration is None else entry["start_s"] + duration,
+        )
+        self._advance()
+        while wait := self._stage.proceed(self.engine):
+            self._target = self.engine.steps + max(1, round(wait / self.engine.time_step))
+            self._advance()
+        entry["end_s"] = self.engine.time
+        entry["wall_s"] += self._wall()
+        self.log.info(
+            "phase %d %s ended at t = %.4f s after %.1f s of wall time",
+            self._phase,
+            phase.type,
+            self.engine.time,
+            entry["wall_s"],
+        )
+        self._stage = None
+        self._phase += 1
+
+    def _advance(self) -> None:
+        """Advance to the target step, recording what is due on the way."""
+        engine, recorder = self.engine, self.recorder
+        while engine.steps < self._target:
+            engine.advance(min(self._target, recorder.next_step) - engine.steps)
+            if engine.steps == recorder.next_step:
+                recorder.record(engine, self._phase)
+                if self.checkpoint_steps and engine.steps % self.checkpoint_steps == 0:
+                    self._checkpoint()
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    def _checkpoint(self) -> None:
+        saved = self.folder / ".engine.partial.yade"
+        try:
+            memory = self.engine.save(saved)
+            content = saved.read_bytes()
+            self.engine.load(saved, memory)
+        finally:
+            saved.unlink(missing_ok=True)
+        assert self._stage is not None  # a checkpoint is taken while a phase runs
+        state = {
+            "yade": self.yade,
+            "scene_sha256": scene_hash(self.scene),
+            "engine": memory,
+            "recorder": self.recorder.memory,
+            "phase": self._phase,
+            "stage": self._stage.memory,
+            "target": self._target,
+            "performed": self._performed,
+            "wall_s": self._wall(),
+        }
+        write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
+        if self._stop_requested:
+            msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
+            raise StopRequestedError(msg)
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go on from a checkpoint."""
+        state: Mapping[str, Any] = checkpoint.state
+        saved = self.folder / ".engine.partial.yade"
+        try:
+            saved.write_bytes(checkpoint.engine)
+            self.engine.load(saved, state["engine"])
+        finally:
+            saved.unlink(missing_ok=True)
+        self.recorder.restore(state["recorder"], checkpoint.series)
+        self._phase, self._target = state["phase"], state["target"]
+        self._stage = begin(self.scene.phases[self._phase], self.scene)
+        self._stage.memory = dict(state["stage"])
+        self._performed = [dict(entry) for entry in state["performed"]]
+        self._spent, self._began = state["wall_s"], time.monotonic()
+
+    def _wall(self) -> float:
+        """Wall time spent [s], in the processes before this one too."""
+        return self._spent + time.monotonic() - self._began
+
+    @property
+    def wall(self) -> float:
+        """Wall time spent [s], in the processes before this one too."""
+        return self._wall()
+
+    def _request_stop(self, number: int, frame: FrameType | None) -> None:
+        self._stop_requested = True

@@ -1,0 +1,53 @@
+"""Run directories to measure, a sweep to expand, and the command to call."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+from command_cases import SCENE, SWEEP, Said, Smarticles, WriteRun
+
+from cli.main import main
+
+SYNTHETIC = Path(__file__).parents[1] / "postprocess" / "synthetic.py"
+
+
+@pytest.fixture
+def smarticles(capsys: pytest.CaptureFixture[str]) -> Smarticles:
+    """Calls the command in this process."""
+
+    def call(*words: str | Path) -> Said:
+        status = main([str(word) for word in words])
+        return Said(status, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def sweep_file(tmp_path: Path) -> Path:
+    """A sweep of two runs, n5 and n6."""
+    (tmp_path / "scene.yaml.j2").write_text(SCENE)
+    file = tmp_path / "sweep.yaml"
+    file.write_text(SWEEP)
+    return file
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    """A scene of five smarticles."""
+    file = tmp_path / "scene.yaml"
+    file.write_text(SCENE.replace("{{ count }}", "5"))
+    return file
+
+
+@pytest.fixture(scope="session")
+def write_run() -> WriteRun:
+    """Writes a finished run directory without running anything."""
+    module = runpy.run_path(str(SYNTHETIC), run_name="synthetic")
+
+    def write(directory: Path, **run: object) -> Path:
+        written: Path = module["write_run"](directory, module["SyntheticRun"](**run))
+        return written
+
+    return write

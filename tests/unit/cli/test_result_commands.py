@@ -1,0 +1,111 @@
+"""measure and render: run directories in, tables and pictures out."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles, WriteRun
+
+from cli.layout import columns
+
+
+def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    said = smarticles("measure", run)
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0].startswith("run ")
+    assert "phi second-highest-com [-]" in lines[0]
+    assert [line.split()[1] for line in lines[1:]] == ["deposit", "relax", "shake", "relax"]
+
+
+def test_measure_writes_a_table_of_several_runs(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    table = tmp_path / "table.csv"
+    said = smarticles("measure", *runs, "--table", table)
+    assert said.status == 0
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["run"] for row in rows] == [str(runs[0])] * 4 + [str(runs[1])] * 4
+    assert said.out.splitlines()[-1].startswith(f"{table}: 8 rows, ")
+
+
+def test_measure_does_not_overwrite_unless_told(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run, table = write_run(tmp_path / "a"), tmp_path / "table.csv"
+    table.write_text("precious")
+    said = smarticles("measure", run, "--table", table)
+    assert said.status == 2
+    assert said.err == (f"smarticles: error: --table {table}: exists; choose another name or give --overwrite\n")
+    assert table.read_text() == "precious"
+    assert smarticles("measure", run, "--table", table, "--overwrite").status == 0
+    assert table.read_text(encoding="utf-8").startswith("run,")
+
+
+def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    said = smarticles("measure", run, "--frames", "--json")
+    assert said.status == 0
+
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    rows = json.loads(said.out, parse_constant=refuse)
+    assert [row["frame"] for row in rows] == list(range(16))
+    assert rows[0]["phi voxel [-]"] is None
+    assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
+
+
+def test_measure_takes_the_runs_of_a_sweep(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    said = smarticles("measure", out)
+    assert said.status == 2
+    assert "no run of this sweep has frames yet; start them with: smarticles resume" in said.err
+    write_run(out / "runs" / "n6")
+    rows = json.loads(smarticles("measure", out, "--json").out)
+    assert {row["run"] for row in rows} == {str(out / "runs" / "n6")}
+
+
+def test_measure_of_nothing_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("measure", tmp_path / "absent")
+    assert said.status == 2
+    assert said.err.startswith("smarticles: error: ")
+    assert "absent" in said.err
+
+
+def test_render_refuses_a_time_for_a_film(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("render", tmp_path, "--time", "1", "--output", tmp_path / "film.gif")
+    assert said.status == 2
+    assert said.err.startswith("smarticles: error: --time 1: a film shows all times; ")
+
+
+def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run, picture = write_run(tmp_path / "a"), tmp_path / "picture.png"
+    said = smarticles("render", run, "--output", picture, "--time", "1", "--color-by", "speed", "--view", "top")
+    assert (said.status, said.out, said.err) == (0, f"{picture}\n", "")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    again = smarticles("render", run, "--output", picture)
+    assert again.status == 2
+    assert "--overwrite" in again.err or "exists" in again.err
+
+
+def test_render_help_names_all_it_can_do(smarticles: Smarticles) -> None:
+    render = pytest.importorskip("postprocess.render", reason="needs PyVista")
+    text = smarticles("render", "--help").out
+    assert all(name in text for name in [*render.COLOURINGS, *render.VIEWS])
+
+
+def test_columns() -> None:
+    text = columns(["name", "value", "note"], [["a", 1.23456, "x y"], ["long", None, ""], ["b", float("nan"), ""]])
+    assert text.splitlines() == [
+        "name  value  note",
+        "a     1.235  x y",
+        "long      -",
+        "b         -",
+    ]
+    assert columns(["a", "b"], []) == "a  b"

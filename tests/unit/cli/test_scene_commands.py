@@ -1,0 +1,53 @@
+"""run, plan, schema: one scene, as far as it goes without YADE."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles
+
+
+def test_plan_prints_phases_and_cost(scene_file: Path, smarticles: Smarticles) -> None:
+    said = smarticles("plan", scene_file)
+    assert said.status == 0
+    assert "0 deposit" in said.out
+    assert "1 shake" in said.out
+
+
+def test_plan_in_json_and_with_other_values(scene_file: Path, smarticles: Smarticles) -> None:
+    said = smarticles("plan", scene_file, "--json", "--set", "count=7", "--set", "phases.1.duration_s=3")
+    assert said.status == 0
+    answer = json.loads(said.out)
+    assert answer["count"] == 7
+    assert answer["phases"][1]["duration_s"] == 3
+
+
+def test_schema_is_a_json_schema(smarticles: Smarticles) -> None:
+    schema = json.loads(smarticles("schema").out)
+    assert schema["type"] == "object"
+    assert {"seed", "count", "phases"} <= set(schema["properties"])
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("count=-3", "count"),
+        ("cuont=3", "'cuont'; did you mean 'count'?"),
+        ("count", "--set count: write KEY=VALUE"),
+        ("phases.7.duration_s=1", "phases.7.duration_s=1"),
+    ],
+)
+def test_bad_scenes_are_status_2_before_anything_is_made(
+    command: str, setting: str, message: str, scene_file: Path, smarticles: Smarticles
+) -> None:
+    out = scene_file.parent / "out"
+    place = ["--out", out] if command == "run" else []
+    said = smarticles(command, scene_file, *place, "--set", setting)
+    assert said.status == 2
+    (line,) = said.err.splitlines()
+    assert line.startswith("smarticles: error: ")
+    assert message in line
+    assert not out.exists()

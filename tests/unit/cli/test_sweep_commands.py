@@ -1,0 +1,177 @@
+"""sweep, status, resume, study: from the command line to the directory."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_cases import SWEEP, Smarticles, WriteRun
+
+from templates.expand import expand
+from templates.folder import open_folder
+from templates.study import study_file
+from templates.sweep import load_sweep
+
+
+def finish(directory: Path) -> None:
+    """Make every run of a sweep look finished."""
+    folder = open_folder(directory)
+    for entry in folder.entries:
+        run = folder.run(entry)
+        run.mkdir(parents=True)
+        (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
+        (run / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0, "wall_s": 2.0}))
+
+
+def test_a_dry_run_lists_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
+    before = sorted(sweep_file.parent.iterdir())
+    said = smarticles("sweep", sweep_file, "--dry-run")
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0].split() == ["run", "count", "expected", "wall", "s"]
+    assert [line.split()[:2] for line in lines[1:3]] == [["n5", "5"], ["n6", "6"]]
+    assert lines[3].startswith("2 runs, about ")
+    assert sorted(sweep_file.parent.iterdir()) == before
+
+
+def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "out"
+    said = smarticles("sweep", sweep_file, "--out", out)
+    assert said.status == 0
+    assert said.out == f"{out}: 2 runs written; start them: smarticles resume {out}\n"
+    assert sorted(path.name for path in (out / "scenes").iterdir()) == ["n5.yaml", "n6.yaml"]
+    manifest = json.loads((out / "sweep.json").read_text(encoding="utf-8"))
+    assert manifest["command"] == f"smarticles sweep {sweep_file} --out {out}"
+    assert manifest["versions"]["smarticles"]
+    assert not (out / "runs").exists()
+
+
+def test_a_sweep_needs_a_place(sweep_file: Path, smarticles: Smarticles) -> None:
+    said = smarticles("sweep", sweep_file)
+    assert said.status == 2
+    assert said.err.startswith("smarticles: error: sweep: --out DIR is missing; give a directory")
+
+
+def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> None:
+    sweep_file.write_text(SWEEP.replace("grid", "gird"))
+    said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out")
+    assert said.status == 2
+    assert said.err == (f"smarticles: error: {sweep_file}: points.gird: unknown key; did you mean 'grid'?\n")
+    assert not (sweep_file.parent / "out").exists()
+
+
+def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    said = smarticles("status", out)
+    assert said.status == 0
+    assert said.out.splitlines()[-1] == "counts: 2 runs, 2 missing"
+    finish(out)
+    answer = json.loads(smarticles("status", out, "--json").out)
+    assert answer["counts"] == {"done": 2}
+    assert [(run["name"], run["state"], run["wall_s"]) for run in answer["runs"]] == [
+        ("n5", "done", 2.0),
+        ("n6", "done", 2.0),
+    ]
+
+
+def test_status_of_one_run(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    said = smarticles("status", write_run(tmp_path / "alone"))
+    assert said.status == 0
+    assert said.out.splitlines()[1].split()[:2] == ["alone", "done"]
+
+
+def test_status_of_something_else_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("status", tmp_path)
+    assert said.status == 2
+    assert said.err.startswith(f"smarticles: error: {tmp_path}: holds no sweep.json; ")
+
+
+def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    finish(out)
+    said = smarticles("resume", out)
+    assert said.status == 0
+    assert said.err.splitlines() == ["n5 finished before", "n6 finished before"]
+    assert said.out.startswith(f"{out}: all 2 runs are done")
+
+
+def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    """The real command of a run, given a scene that it refuses before YADE is needed."""
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    finish(out)
+    scene = out / "scenes" / "n5.yaml"
+    scene.write_text(scene.read_text(encoding="utf-8").replace("count: 5", "count: -5"))
+    (out / "runs" / "n5" / "done.json").unlink()
+    said = smarticles("resume", out)
+    assert said.status == 1
+    assert said.out == ""
+    lines = said.err.splitlines()
+    assert lines[:2] == ["n6 finished before", "n5 started"]
+    assert lines[2].startswith("n5 failed after 0:0")
+    assert lines[3].startswith(f"smarticles: error: {out}: 1 of 2 runs are missing: n5: {scene}: count: ")
+    assert "-5" in lines[3]
+    assert lines[3].endswith(f"start them again: smarticles resume {out}")
+    assert (out / "runs" / "n5.stopped-1" / "run.json").exists()
+    assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
+
+
+def test_one_run_cannot_be_resumed(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a run")
+    said = smarticles("resume", run)
+    assert said.status == 2
+    assert f"run it anew: smarticles run '{run}/scene.yaml' --out NEW_DIR" in said.err
+
+
+def test_another_study_in_the_same_directory_is_refused(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    said = smarticles("study", "gravish", "--quick", "--out", out)
+    assert said.status == 2
+    assert said.err.startswith(f"smarticles: error: {out}: holds another sweep ('counts'): ")
+
+
+@pytest.fixture
+def finished_study(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> Path:
+    """The quick study with made-up finished runs, all but one."""
+    out = tmp_path / "study"
+    points = expand(load_sweep(study_file("gravish", quick=True)))
+    smarticles("sweep", study_file("gravish", quick=True), "--out", out)
+    for point in points[:-1]:
+        run = write_run(
+            out / "runs" / point.name,
+            aspect_ratio=point.values["l_over_w"],
+            seed=point.values["seed"],
+            count=6,
+            frames_per_phase=2,
+        )
+        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        manifest["scene_sha256"] = point.scene_sha256
+        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+    # What remains fails before YADE is needed.
+    (out / "scenes" / f"{points[-1].name}.yaml").write_text("count: []")
+    return out
+
+
+def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path, smarticles: Smarticles) -> None:
+    said = smarticles("study", "gravish", "--quick", "--out", finished_study)
+    assert said.status == 1
+    lines = said.out.splitlines()
+    assert lines[0].startswith("quick variant, not the full study: 9 runs instead of 24; ")
+    assert "shake_s: 1.5 instead of 5.0" in lines[0]
+    assert lines[2].split()[:4] == ["phi_0", "0.4", "3", "0.1050"]
+    assert "Is phi_f above phi_0 at every l/w? YES" in lines
+    results = finished_study / "results"
+    figures = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
+    assert figures
+    assert all(Path(figure).is_file() for figure in figures)
+    assert lines[-1] == f"picture of lw0.70_seed1: {results / 'run.png'}"
+    assert (results / "run.png").is_file()
+    assert "1 of 9 runs are missing: lw1.00_seed3: " in said.err.splitlines()[-1]
+    missing = (results / "missing.csv").read_text(encoding="utf-8")
+    assert "lw1.00_seed3" in missing

@@ -1,0 +1,130 @@
+"""A frame on disk is what ARCHITECTURE.md promises to `postprocess`, read back with meshio and with plain XML."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem.engine import State
+from dem.frames import FrameWriter, frame_mesh
+from dem.particle import Boxes
+
+W, RATIO = 0.0117, 0.7
+BOXES = Boxes(
+    middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
+)
+COUNT = 5
+
+
+def make_state(seed: int = 0) -> State:
+    rng = np.random.default_rng(seed)
+    return State(
+        rng.normal(size=(COUNT, 3)),
+        Rotation.random(COUNT, random_state=rng).as_matrix(),
+        rng.normal(size=(COUNT, 3)),
+        rng.normal(size=(COUNT, 3)) * 40,
+    )
+
+
+def written(folder: Path, state: State) -> meshio.Mesh:
+    mesh = frame_mesh(BOXES, state, contacts=np.arange(COUNT) * 2, time=0.125, floor=-0.001, phase=2)
+    FrameWriter(folder).write(mesh, 0.125)
+    return meshio.read(folder / "frames" / "frame_000000.vtu")
+
+
+def test_points_are_tip_hinge_hinge_tip_of_each_smarticle(tmp_path: Path) -> None:
+    state = make_state()
+    mesh = written(tmp_path, state)
+    assert mesh.points.shape == (4 * COUNT, 3)
+    assert mesh.points.dtype == np.float64
+    points = mesh.points.reshape(COUNT, 4, 3)
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    assert lengths == pytest.approx(np.tile([RATIO * W, W, RATIO * W], (COUNT, 1)), rel=1e-12)
+    # The mean of the links, weighted with their lengths, is the centre of mass: which end is which, and the pose.
+    centres = (points[:, 1:] + points[:, :-1]) / 2
+    assert np.average(centres, axis=1, weights=[RATIO, 1, RATIO]) == pytest.approx(state.positions, abs=1e-15)
+    # Body x runs from the first hinge to the second; body y from the middle link to the mouth.
+    assert (points[:, 2] - points[:, 1]) / W == pytest.approx(state.rotations[:, :, 0], abs=1e-12)
+    assert (points[:, 0] - points[:, 1]) / (RATIO * W) == pytest.approx(state.rotations[:, :, 1], abs=1e-12)
+
+
+def test_cells_and_data_follow_the_contract(tmp_path: Path) -> None:
+    mesh = written(tmp_path, make_state())
+    assert [block.type for block in mesh.cells] == ["line"]
+    lines = mesh.cells[0].data
+    expected = [[4 * k + j, 4 * k + j + 1] for k in range(COUNT) for j in range(3)]
+    assert np.array_equal(lines, expected)
+    data = {name: values[0] for name, values in mesh.cell_data.items()}
+    assert set(data) == {
+        "smarticle_id",
+        "link",
+        "velocity_m_per_s",
+        "angular_velocity_rad_per_s",
+        "contacts",
+        "time_s",
+        "floor_z_m",
+        "phase",
+    }
+    for name in ("smarticle_id", "link", "contacts", "phase"):
+        assert data[name].dtype == np.int64
+    assert np.array_equal(data["smarticle_id"], np.repeat(np.arange(COUNT), 3))
+    assert np.array_equal(data["link"], np.tile([0, 1, 2], COUNT))
+    assert np.array_equal(data["contacts"], np.repeat(2 * np.arange(COUNT), 3))
+    assert set(data["phase"]) == {2}
+    assert np.array_equal(data["time_s"], np.full(3 * COUNT, 0.125))
+    assert np.array_equal(data["floor_z_m"], np.full(3 * COUNT, -0.001))
+
+
+def test_velocities_are_those_of_the_link_centres(tmp_path: Path) -> None:
+    # Against a small rigid motion in time, not against a cross product.
+    state, dt = make_state(), 1e-6
+    mesh = written(tmp_path, state)
+    turned = Rotation.from_rotvec(state.angular_velocities * dt).as_matrix() @ state.rotations
+    later = State(state.positions + dt * state.velocities, turned, state.velocities, state.angular_velocities)
+
+    def centres(at: State) -> np.ndarray:
+        points = at.points(BOXES.vertices)
+        return ((points[:, 1:] + points[:, :-1]) / 2).reshape(-1, 3)
+
+    moved = (centres(later) - centres(state)) / dt
+    # Second order in dt: 40 rad/s squared times 6 mm times half of dt is 5e-6 m/s.
+    assert mesh.cell_data["velocity_m_per_s"][0] == pytest.approx(moved, abs=5e-5)
+    assert np.abs(moved - np.repeat(state.velocities, 3, axis=0)).max() > 0.1
+    spins = mesh.cell_data["angular_velocity_rad_per_s"][0]
+    assert np.array_equal(spins, np.repeat(state.angular_velocities, 3, axis=0))
+
+
+def test_bar_without_barbs_still_has_four_points(tmp_path: Path) -> None:
+    boxes = Boxes(middle_length=W, barb_length=0.0, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
+    mesh = frame_mesh(boxes, make_state(), contacts=np.zeros(COUNT, dtype=np.int64), time=0, floor=0, phase=0)
+    FrameWriter(tmp_path).write(mesh, 0)
+    points = meshio.read(tmp_path / "frames" / "frame_000000.vtu").points.reshape(COUNT, 4, 3)
+    assert np.array_equal(points[:, 0], points[:, 1])
+    assert np.linalg.norm(points[:, 2] - points[:, 1], axis=1) == pytest.approx(np.full(COUNT, W))
+
+
+def test_collection_lists_all_frames_in_time_order(tmp_path: Path) -> None:
+    writer = FrameWriter(tmp_path)
+    times = [0.0, 0.04, 0.08, 123.456]
+    for k, time in enumerate(times):
+        mesh = frame_mesh(BOXES, make_state(k), contacts=np.zeros(COUNT, dtype=np.int64), time=time, floor=0, phase=0)
+        writer.write(mesh, time)
+        listed = ElementTree.parse(tmp_path / "frames.pvd").getroot().findall("Collection/DataSet")
+        assert [float(row.attrib["timestep"]) for row in listed] == pytest.approx(times[: k + 1], rel=1e-8)
+    for row, time in zip(listed, times, strict=True):
+        frame = meshio.read(tmp_path / row.attrib["file"])
+        assert frame.cell_data["time_s"][0][0] == time
+        assert math.isfinite(frame.points.sum())
+    assert len(list((tmp_path / "frames").iterdir())) == len(times)
+
+
+def test_frame_is_binary_and_compressed(tmp_path: Path) -> None:
+    written(tmp_path, make_state())
+    head = (tmp_path / "frames" / "frame_000000.vtu").read_bytes()[:600].decode(errors="replace")
+    assert "vtkZLibDataCompressor" in head

@@ -1,0 +1,87 @@
+"""Each reason for which the watchdog stops a run, with its literal text; and a healthy state that passes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dem.engine import State
+from dem.errors import RunError
+from dem.watchdog import Watchdog
+
+WATCHDOG = Watchdog(radius=0.0234, height=0.1, speed=5.0)
+
+
+def healthy() -> State:
+    positions = np.array([[0.0, 0.0, 0.01], [0.02, 0.0, 0.02], [0.0, -0.023, 0.099], [0.0, 0.0, 0.001]])
+    velocities = np.array([[0.0, 0.0, -4.9], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    return State(positions, np.tile(np.eye(3), (4, 1, 1)), velocities, np.zeros((4, 3)))
+
+
+def check(state: State, floor: float = 0.0) -> None:
+    WATCHDOG.check(state, floor=floor, time=1.25)
+
+
+def test_healthy_states_pass() -> None:
+    check(healthy())
+    check(State(*(np.empty((0, 3)) for _ in range(4))))  # nothing poured yet
+    lifted = healthy()
+    lifted.positions[:, 2] += 5.0
+    check(lifted, floor=5.0)  # heights are above the floor, wherever it is
+
+
+def broken_position(state: State) -> None:
+    state.positions[1, 0] = math.nan
+
+
+def broken_velocity(state: State) -> None:
+    state.velocities[1, 2] = math.inf
+
+
+def fast(state: State) -> None:
+    state.velocities[1] = [0.0, 3.0, -4.1]
+
+
+def through_the_wall(state: State) -> None:
+    state.positions[1, :2] = [0.02, 0.02]
+
+
+def through_the_floor(state: State) -> None:
+    state.positions[1, 2] = -1e-6
+
+
+def over_the_wall(state: State) -> None:
+    state.positions[1, 2] = 0.101
+
+
+CAUSES: list[tuple[Callable[[State], None], str]] = [
+    (broken_position, "a position or velocity that is no number; lower fidelity.time_step_fraction"),
+    (broken_velocity, "a position or velocity that is no number; lower fidelity.time_step_fraction"),
+    (
+        fast,
+        "a speed above 5 m/s (fastest 5.08 m/s), which nothing in this scene explains; "
+        "lower fidelity.time_step_fraction",
+    ),
+    (through_the_wall, "left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+    (through_the_floor, "left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+    (over_the_wall, "thrown out over the wall of 0.1 m; raise container.height_m or shake less"),
+]
+
+
+@pytest.mark.parametrize(("harm", "text"), CAUSES, ids=[harm.__name__ for harm, _ in CAUSES])
+def test_each_cause_stops_the_run(harm: Callable[[State], None], text: str) -> None:
+    state = healthy()
+    harm(state)
+    with pytest.raises(RunError) as caught:
+        check(state)
+    assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
+
+
+def test_many_smarticles_are_counted_and_the_first_named() -> None:
+    positions = np.full((8, 3), -0.01)
+    state = State(positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
+    with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
+        check(state)
