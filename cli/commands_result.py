@@ -146,14 +146,15 @@ def _records(table: pd.DataFrame) -> list[dict[str, object]]:
 
 def render_run(arguments: argparse.Namespace) -> int:
     """`smarticles render`."""
+    output: Path | None = arguments.output
+    film = output is not None and output.suffix in _FILM_SUFFIXES
+    if film and arguments.time is not None:
+        msg = f"--time {arguments.time:g}: a film shows all times; leave it out, or write .png"
+        raise InputError(msg)
     from postprocess import render  # noqa: PLC0415  (imports PyVista)
 
-    output: Path | None = arguments.output
     look = {"color_by": arguments.color_by, "view": arguments.view}
-    if output is not None and output.suffix in _FILM_SUFFIXES:
-        if arguments.time is not None:
-            msg = f"--time {arguments.time:g}: a film shows all times; leave it out, or write .png"
-            raise InputError(msg)
+    if film:
         written = render.render_film(arguments.directory, output, overwrite=arguments.overwrite, **look)
     else:
         written = render.render_run(

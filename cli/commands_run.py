@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from cli.parsing import Commands, Parser, add_json
@@ -19,15 +21,22 @@ def add(commands: Commands) -> None:
         text="""
 Pours, shakes and relaxes as the scene says. DIR gets the resolved scene, versions, a log, VTK
 frames (open DIR/frames.pvd in ParaView) and HDF5 series, and done.json at the end. Ctrl-C stops
-the run and leaves what was recorded whole. A directory that holds something is never touched.""",
+the run and leaves what was recorded whole; --resume goes on from the last checkpoint. A directory
+that holds something else is never touched.""",
         examples="""\
   smarticles run scene.yaml --out runs/a
   smarticles run scene.yaml --out runs/b --set seed=2 --set phases.2.duration_s=5
   smarticles run scene.yaml --out runs/c --set fidelity=draft
+  smarticles run scene.yaml --out runs/a --resume
 """,
     )
     _add_scene(run)
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="new run directory")
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on in DIR, which holds an unfinished run of this scene, from its last checkpoint",
+    )
 
     plan = commands.add(
         "plan",
@@ -84,25 +93,44 @@ def _add_scene(parser: Parser) -> None:
 
 def run_scene(arguments: argparse.Namespace) -> int:
     """`smarticles run`."""
+    return compute(arguments.scene, arguments.out, arguments, settings=arguments.set, resume=arguments.resume)
+
+
+def compute(
+    scene_file: Path, out: Path, arguments: argparse.Namespace, *, settings: Sequence[str] = (), resume: bool
+) -> int:
+    """Run a scene in this process.
+
+    Args:
+        scene_file: the scene.
+        out: the run directory.
+        arguments: of the command, for the manifest.
+        settings: keys that differ from the file, `KEY=VALUE`.
+        resume: go on in a run directory that holds an unfinished run.
+
+    Raises:
+        InputError: the scene is not valid, or the directory holds something else.
+        RunError: the run failed.
+        KeyboardInterrupt: it was stopped; the message says how to go on.
+    """
     from dem.scene import load_scene  # noqa: PLC0415
 
-    scene = load_scene(arguments.scene, arguments.set)
-    from dem import run  # noqa: PLC0415  (leads to YADE: not before the scene is known to be good)
+    scene = load_scene(scene_file, settings)
+    # These lead to YADE: not before the scene is known to be good.
+    from dem import run  # noqa: PLC0415
+    from dem.simulation import StopRequestedError  # noqa: PLC0415
 
+    place = shlex.quote(str(out))
     try:
-        outcome = run.run_scene(
-            scene,
-            arguments.out,
-            command=arguments.command_line,
-            progress=sys.stderr.isatty(),
-        )
-    except KeyboardInterrupt:
-        msg = f"what was recorded is whole, measure it with: smarticles measure {arguments.out}"
+        outcome = run.run_scene(scene, out, command=arguments.command_line, progress=sys.stderr.isatty(), resume=resume)
+    except (KeyboardInterrupt, StopRequestedError):
+        msg = f"what was recorded is whole; measure it: smarticles measure {place}; go on: smarticles resume {place}"
         raise KeyboardInterrupt(msg) from None
-    print(
-        f"{arguments.out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s\n"
-        f"next: smarticles measure {arguments.out}, smarticles render {arguments.out}"
-    )
+    if outcome is None:
+        print(f"{out}: was done already")
+    else:
+        print(f"{out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s")
+    print(f"next: smarticles measure {place}, smarticles render {place}")
     return 0
 
 

@@ -84,6 +84,9 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
     )
     study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))
     study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
+    study.add_argument(
+        "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
+    )
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
     add_slots(study)
 
@@ -94,8 +97,11 @@ def run_study(arguments: argparse.Namespace) -> int:
 
     study = _STUDIES[arguments.name]
     file = study_file(arguments.name, quick=arguments.quick)
-    folder = make_folder(file, arguments.out, arguments.command_line)
+    changed = {"fidelity": arguments.fidelity} if arguments.fidelity else {}
+    folder = make_folder(file, arguments.out, arguments.command_line, changed)
     note = _difference(arguments.name) if arguments.quick else "the full study as shipped"
+    if arguments.fidelity:
+        note += f"; fidelity {arguments.fidelity}"
     print(note, flush=True)
     outcomes = compute(folder, arguments)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]

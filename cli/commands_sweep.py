@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cli import commands_run
 from cli.layout import columns
 from cli.parsing import Commands, Parser, add_json, positive_int
 from dem.errors import InputError, RunError
@@ -37,8 +37,7 @@ A sweep file makes many scenes from one template:
   derived: {half: "(count / 2) | round | int"}
   repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
 
-The same command again takes up where it stopped: finished runs are kept, what an unfinished one
-left is renamed to NAME.stopped-1, and the run starts anew."""
+The same command again takes up where it stopped, see `smarticles resume --help`."""
 
 
 def add(commands: Commands) -> None:
@@ -83,15 +82,18 @@ Reads files only. A run is `interrupted` after Ctrl-C, `stopped` when it was kil
     resume = commands.add(
         "resume",
         resume_sweep,
-        summary="run what a sweep is missing",
+        summary="go on with a run, or with what a sweep is missing",
         text="""
-Keeps finished runs. What an unfinished one left is renamed, not deleted, and the run starts anew.
+Finished runs are kept. An unfinished one goes on from its last checkpoint; without a checkpoint, or
+when it failed, what it left is renamed to NAME.stopped-1, not deleted, and the run starts anew.
 For a study, give the study's command again: it also makes the tables and figures.""",
         examples="""\
   smarticles resume friction
+  smarticles resume friction --jobs 1
+  smarticles resume friction/runs/mu0.2_seed1
 """,
     )
-    resume.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
+    resume.add_argument("directory", type=Path, metavar="DIR", help="of a sweep or a run")
     add_slots(resume)
 
 
@@ -120,17 +122,23 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     return _run(folder, arguments)
 
 
-def make_folder(file: Path, out: Path, command: str) -> Folder:
+def make_folder(file: Path, out: Path, command: str, constants: Mapping[str, str] | None = None) -> Folder:
     """Expand a sweep file into its directory, or take up the directory that holds it already.
+
+    Args:
+        file: sweep file.
+        out: directory of the sweep.
+        command: the command line, for the manifest.
+        constants: values that replace those of the file.
 
     Raises:
         InputError: the sweep is not valid, or the directory holds something else.
     """
     from templates.expand import expand  # noqa: PLC0415
     from templates.folder import create_folder  # noqa: PLC0415
-    from templates.sweep import load_sweep  # noqa: PLC0415
+    from templates.sweep import load_sweep, with_constants  # noqa: PLC0415
 
-    sweep = load_sweep(file)
+    sweep = with_constants(load_sweep(file), constants or {})
     return create_folder(
         out,
         sweep,
@@ -208,12 +216,7 @@ def resume_sweep(arguments: argparse.Namespace) -> int:
 
     directory: Path = arguments.directory
     if (directory / "run.json").is_file():
-        scene = shlex.quote(str(directory / "scene.yaml"))
-        msg = (
-            f"{directory}: is a single run, which cannot go on from the middle; "
-            f"run it anew: smarticles run {scene} --out NEW_DIR"
-        )
-        raise InputError(msg)
+        return commands_run.compute(directory / "scene.yaml", directory, arguments, resume=True)
     return _run(open_folder(directory), arguments)
 
 

@@ -131,9 +131,7 @@ def doctor(json_output: bool) -> int:
             print(_row(check), flush=True)
     failed = [check.name for check in checks if check.needed and not check.ok]
     if json_output:
-        print(
-            json.dumps({"ok": not failed, "checks": [asdict(check) for check in checks]}, indent=2)
-        )
+        print(json.dumps({"ok": not failed, "checks": [asdict(check) for check in checks]}, indent=2))
     elif failed:
         print(f"a run needs what fails here: {', '.join(failed)}")
     else:
@@ -304,6 +302,4 @@ def _ask(script: str) -> dict[str, Any] | str:
 
 
 def _output(*command: str) -> str:
-    return subprocess.run(
-        command, check=True, capture_output=True, encoding="utf-8", timeout=10
-    ).stdout.strip()
+    return subprocess.run(command, check=True, capture_output=True, encoding="utf-8", timeout=10).stdout.strip()

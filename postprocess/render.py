@@ -6,7 +6,10 @@ bar are set by matplotlib around it. No display is needed: VTK falls back to EGL
 
 from __future__ import annotations
 
+import ctypes
 import math
+import os
+import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from PIL import Image
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from postprocess import figures, film
 from postprocess.colouring import COLOURINGS, Colouring, ColourScale
 from postprocess.entanglement import entanglement
@@ -127,6 +130,7 @@ def render_run(
     Raises:
         InputError: No frame, unknown colouring or view, a time before the first or after the last
             frame, a bad size, or an output that exists.
+        RunError: This machine lacks the libraries to draw without a display.
 
     Example:
         >>> render_run("runs/pile", color_by="height", view="oblique")  # doctest: +SKIP
@@ -352,6 +356,7 @@ class _Stage:
         self._run = run
         self._look = look
         self._scale = ColourScale.of(look.colouring, *span)
+        _check_graphics()
         with _quiet_vtk():
             width, height = look.panel
             self._plotter: Any = pv.Plotter(
@@ -511,6 +516,26 @@ def _back_arc(radius: float, forward: NDArray[np.float64]) -> NDArray[np.float64
     middle = math.atan2(forward[1], forward[0])
     angle = middle + np.linspace(-math.pi / 2, math.pi / 2, 91)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
+
+
+def _check_graphics() -> None:
+    """Complains where VTK, instead of complaining, would end the process by a segmentation fault.
+
+    Raises:
+        RunError: There is neither a display nor a library to draw without one.
+    """
+    if sys.platform != "linux" or os.environ.get("DISPLAY"):
+        return
+    for library in ("libEGL.so.1", "libOSMesa.so.8"):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return
+    msg = (
+        "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
+    )
+    raise RunError(msg)
 
 
 @contextmanager

@@ -27,6 +27,7 @@ from templates.texts import read_json
 
 FORMAT = 1
 MANIFEST = "sweep.json"
+CHECKPOINT = "checkpoint.zip"
 
 State = Literal["done", "running", "failed", "interrupted", "stopped", "missing"]
 """`interrupted` closed its files after Ctrl-C; `stopped` was killed and says nothing."""
@@ -148,10 +149,17 @@ class Folder:
 
     def is_done(self, entry: Entry) -> bool:
         """Whether the run finished, and with the scene that the manifest lists."""
+        return read_json(self.run(entry) / "done.json") is not None and self._is_of_scene(entry)
+
+    def can_resume(self, entry: Entry) -> bool:
+        """Whether the run was stopped, did not fail, and left a checkpoint to go on from."""
         directory = self.run(entry)
-        manifest = read_json(directory / "run.json") or {}
-        done = read_json(directory / "done.json")
-        return done is not None and manifest.get("scene_sha256") == entry.scene_sha256
+        stopped = run_status(directory).state in ("interrupted", "stopped")
+        return stopped and (directory / CHECKPOINT).is_file() and self._is_of_scene(entry)
+
+    def _is_of_scene(self, entry: Entry) -> bool:
+        manifest = read_json(self.run(entry) / "run.json") or {}
+        return manifest.get("scene_sha256") == entry.scene_sha256
 
     def status(self) -> list[RunStatus]:
         """State of every run."""

@@ -6,7 +6,6 @@ A run that fails does not stop the others. Ctrl-C stops all of them in an orderl
 from __future__ import annotations
 
 import contextlib
-import heapq
 import os
 import signal
 import subprocess
@@ -17,13 +16,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Literal, Protocol
 
+from templates.estimate import PhaseClock, time_left
 from templates.folder import Entry, Folder
 from templates.texts import read_json
 
 Ending = Literal["done", "kept", "failed", "interrupted"]
 
-RunCommand = Callable[[Path, Path], Sequence[str]]
-"""(scene file, run directory) -> the command of one run."""
+RunCommand = Callable[[Path, Path, bool], Sequence[str]]
+"""(scene file, run directory, whether to resume) -> the command of one run."""
 
 # Threads that find no free core spin: one thread per run, set before its interpreter starts.
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
@@ -62,6 +62,7 @@ class Progress:
         phase: type of the phase it is in.
         time_s: simulated time [s].
         end_s: simulated time at which the phase ends [s].
+        left_in_phase_s: wall time until then, at the present pace [s]; 0 if unknown.
         phi: packing fraction so far.
     """
 
@@ -71,6 +72,7 @@ class Progress:
     phase: str | None = None
     time_s: float | None = None
     end_s: float | None = None
+    left_in_phase_s: float = 0.0
     phi: float | None = None
 
 
@@ -118,12 +120,13 @@ def slots_here() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def smarticles_command(scene: Path, directory: Path) -> tuple[str, ...]:
+def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:
     """The command that runs one scene into one run directory, with this interpreter."""
     # -P: a file called like a library in the working directory must not be imported.
     return (
         *(sys.executable, "-P", "-m", "cli", "run", str(scene.resolve())),
         *("--out", str(directory.resolve())),
+        *(("--resume",) if resume else ()),
     )
 
 
@@ -137,7 +140,8 @@ def run_folder(
 ) -> list[Outcome]:
     """Run what a sweep's directory is missing.
 
-    Finished runs are kept, unfinished ones set aside and run anew.
+    Finished runs are kept. Unfinished ones go on from their checkpoint; those without one, and those that failed, are
+    set aside and run anew.
 
     Args:
         folder: the sweep's directory.
@@ -185,6 +189,7 @@ class _Active:
     process: subprocess.Popen[bytes]
     output: IO[bytes]
     started: float
+    clock: PhaseClock = field(default_factory=PhaseClock)
 
     @property
     def wall_s(self) -> float:
@@ -225,14 +230,16 @@ class _Runner:
         return self.outcomes
 
     def _start(self, entry: Entry) -> None:
-        self.folder.set_aside(entry)
+        resume = self.folder.can_resume(entry)
+        if not resume:
+            self.folder.set_aside(entry)
         directory, log = self.folder.run(entry), self.folder.log(entry)
         for parent in (directory.parent, log.parent):
             parent.mkdir(parents=True, exist_ok=True)
         output = log.open("wb")
         try:
             process = subprocess.Popen(
-                self.command(self.folder.scene(entry), directory),
+                self.command(self.folder.scene(entry), directory, resume),
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -296,51 +303,33 @@ class _Runner:
             value = said.get(key)
             return float(value) if isinstance(value, int | float) else None
 
-        phase = said.get("phase")
+        phase, wall_s = said.get("phase"), run.wall_s
+        time_s, end_s = number("time_s"), number("end_s")
         return Progress(
             name=run.entry.name,
-            wall_s=run.wall_s,
+            wall_s=wall_s,
             expected_s=run.entry.expected_s,
             phase=phase if isinstance(phase, str) else None,
-            time_s=number("time_s"),
-            end_s=number("end_s"),
+            time_s=time_s,
+            end_s=end_s,
+            left_in_phase_s=run.clock.left(phase=said.get("phase_index"), wall_s=wall_s, time_s=time_s, end_s=end_s),
             phi=number("phi"),
         )
 
     def _snapshot(self) -> Snapshot:
         running = tuple(self._progress(run) for run in self.active)
-        # How much slower this machine is than expected: from finished runs, and from those overdue.
-        overdue = [(run.expected_s, run.wall_s) for run in running if run.wall_s > run.expected_s]
-        known = [*self.finished, *overdue]
-        expected = sum(pair[0] for pair in known)
-        ratio = sum(pair[1] for pair in known) / expected if expected > 0 else 1.0
-        left = time_left(
-            [max(run.expected_s * ratio - run.wall_s, 0.0) for run in running],
-            [entry.expected_s * ratio for entry in self.pending],
-            self.slots,
-        )
         return Snapshot(
             total=len(self.folder.entries),
             ended=len(self.outcomes),
             failed=sum(outcome.missing for outcome in self.outcomes),
             running=running,
-            left_s=left,
+            left_s=time_left(
+                self.finished,
+                [(run.expected_s, run.wall_s, run.left_in_phase_s) for run in running],
+                [entry.expected_s for entry in self.pending],
+                self.slots,
+            ),
         )
-
-
-def time_left(running: Sequence[float], pending: Sequence[float], slots: int) -> float:
-    """Wall time [s] until all is done; each pending run, in order, takes the slot free first.
-
-    Args:
-        running: wall time that each active run still needs [s].
-        pending: wall time of each run not yet started [s], in the order of their start.
-        slots: how many run at once.
-    """
-    free_at = [*running, *([0.0] * (slots - len(running)))]
-    heapq.heapify(free_at)
-    for wall_s in pending:
-        heapq.heappush(free_at, heapq.heappop(free_at) + wall_s)
-    return max(free_at)
 
 
 def _environment() -> dict[str, str]:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -183,6 +183,20 @@ def load_sweep(path: Path) -> Sweep:
         table_path=table_path,
         table_text=table_text,
     )
+
+
+def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
+    """The same sweep with other values for some of its constants.
+
+    Raises:
+        InputError: the sweep has no such constant.
+    """
+    for name in constants:
+        if name not in sweep.content.constants:
+            msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sweep.content.constants)}"
+            raise InputError(msg)
+    content = sweep.content.model_copy(update={"constants": {**sweep.content.constants, **constants}})
+    return replace(sweep, content=content)
 
 
 def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], Path | None, str | None]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +66,16 @@ def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0
     clump.vel = engine._vector(*map(float, velocity))
     clump.angVel = engine._vector(*map(float, spin))
     clump.angMom = engine._vector(*momentum)
+
+
+def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:
+    """Advance, and call `look` after each step, inside one long run: stops between steps cost milliseconds."""
+    main = sys.modules["__main__"]
+    main.look = look  # type: ignore[attr-defined] # YADE runs the command there
+    before = engine._omega.engines
+    engine._omega.engines = [*before, engine._yade.PyRunner(command="look()", iterPeriod=1, initRun=True)]
+    engine.advance(steps)
+    engine._omega.engines = before
 
 
 def version() -> str:
@@ -232,10 +244,8 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
         Path(), scene.container.radius_m, scene.gravity_m_per_s2, {}
     )
     writer.sample(engine, engine.state(), 0)
-    forces = []
-    for _ in range(watch):
-        engine.advance(1)
-        forces.append(engine.container_force())
+    forces: list[np.ndarray] = []
+    advance_watched(engine, watch, lambda: forces.append(engine.container_force()))
     state = engine.state()
     writer.sample(engine, state, 0)
     return {
@@ -249,6 +259,11 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     }
 
 
+def _wall(engine: Engine) -> float:
+    """Height of the first facet of the wall."""
+    return float(engine._omega.bodies[engine._container[0]].state.pos[2])
+
+
 def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0) -> dict[str, Any]:
     """Position and velocity of an empty container at every step."""
     scene = load(data)
@@ -257,24 +272,24 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
     engine.advance(delay)
     begun, start = engine.time, engine.floor
+    wall_start = _wall(engine)
     engine.shake(amplitude=amplitude, frequency=phase.frequency_hz)
-    times, floors, speeds = [], [], []
-    for _ in range(math.ceil(periods / phase.frequency_hz / engine.time_step)):
-        engine.advance(1)
-        times.append(engine.time - begun)
-        floors.append(engine.floor)
-        speeds.append(engine.container_velocity)
-    wall = np.array(engine._omega.bodies[engine._container[0]].state.pos)[2]
-    last = engine.floor
+    rows: list[tuple[float, float]] = []
+    steps = math.ceil(periods / phase.frequency_hz / engine.time_step)
+    advance_watched(engine, steps, lambda: rows.append((engine.floor, engine.container_velocity)))
+    floors, speeds = np.array(rows).T
+    wall = _wall(engine)
+    last, elapsed = engine.floor, engine.time - begun
     engine.stop_container()
     engine.advance(rest)
     return {
-        "time": np.array(times),
-        "z": np.array(floors) - start,
-        "v": np.array(speeds),
+        "time": np.arange(1, steps + 1) * engine.time_step,
+        "elapsed": elapsed,
+        "z": floors - start,
+        "v": speeds,
         "dt": engine.time_step,
         "amplitude": amplitude,
-        "wall_moved": wall - start,
+        "wall_moved": wall - wall_start,
         "crept": engine.floor - last,
         "rest_velocity": engine.container_velocity,
     }
@@ -296,11 +311,9 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     writer.sample(engine, engine.state(), 0)
     means = []
     for _ in range(samples):
-        total = np.zeros(3)
-        for _ in range(every):
-            engine.advance(1)
-            total += engine.container_force()
-        means.append(total / every)
+        forces: list[np.ndarray] = []
+        advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
+        means.append(np.mean(forces, axis=0))
         writer.sample(engine, engine.state(), 0)
     return {
         "steps": np.array(means),
@@ -324,9 +337,11 @@ def stack(
         add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
     engine.advance(round(settle / engine.time_step))
     fastest = 0.0
-    rounds = 20
-    for _ in range(rounds):
-        engine.advance(max(1, round(watch / rounds / engine.time_step)))
+
+    def look() -> None:
+        nonlocal fastest
         fastest = max(fastest, float(np.linalg.norm(engine.state().velocities, axis=1).max()))
+
+    advance_watched(engine, round(watch / engine.time_step), look)
     state = engine.state()
     return {"fastest": fastest, "z": state.positions[:, 2], "thick": thick, "dt": engine.time_step}

@@ -119,13 +119,6 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
 
 
-def test_one_run_cannot_be_resumed(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a run")
-    said = smarticles("resume", run)
-    assert said.status == 2
-    assert f"run it anew: smarticles run '{run}/scene.yaml' --out NEW_DIR" in said.err
-
-
 def test_another_study_in_the_same_directory_is_refused(
     sweep_file: Path, tmp_path: Path, smarticles: Smarticles
 ) -> None:

@@ -1,6 +1,6 @@
 """Stands for `smarticles run`: writes what the runner reads, as its first argument says.
 
-fake_run.py BEHAVIOUR SCENE DIR
+fake_run.py BEHAVIOUR SCENE DIR [--resume]
 """
 
 import hashlib
@@ -18,7 +18,8 @@ def main() -> int:
     if behaviour == "refuse":
         print("smarticles: error: scene.yaml: count: -1 is negative; use 1", file=sys.stderr)
         return 2
-    if directory.exists() and any(directory.iterdir()):
+    resume = sys.argv[4:] == ["--resume"]
+    if not resume and directory.exists() and any(directory.iterdir()):
         print("smarticles: error: --out: holds another run", file=sys.stderr)
         return 2
     directory.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -22,7 +23,6 @@ from templates.local import (
     run_folder,
     slots_here,
     smarticles_command,
-    time_left,
 )
 
 FAKE = Path(__file__).with_name("fake_run.py")
@@ -65,10 +65,11 @@ class Watcher:
 def fake(behaviours: dict[str, str] | None = None) -> RunCommand:
     """The command of a run; `behaviours` by its name, `ok` for those not named."""
 
-    def command(scene: Path, directory: Path) -> Sequence[str]:
+    def command(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
         behaviour = (behaviours or {}).get(directory.name, "ok")
         # The fake has no scene model to compute a hash with.
-        return (sys.executable, "-I", "-S", str(FAKE), behaviour, str(scene), str(directory))
+        words = (sys.executable, "-I", "-S", str(FAKE), behaviour, str(scene), str(directory))
+        return (*words, "--resume") if resume else words
 
     return command
 
@@ -189,6 +190,26 @@ def test_ctrl_c_stops_all_runs_and_leaves_usable_directories(folder: Folder) -> 
     assert statuses(outcomes) == ["done"] * 4
 
 
+@pytest.mark.parametrize(
+    ("state", "checkpoint", "goes_on"),
+    [("interrupted", True, True), ("interrupted", False, False), ("failed", True, False)],
+)
+def test_stopped_runs_go_on_from_their_checkpoint(folder: Folder, state: str, checkpoint: bool, goes_on: bool) -> None:
+    entry = folder.entries[0]
+    run = folder.run(entry)
+    run.mkdir(parents=True)
+    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
+    (run / "failed.json").write_text(json.dumps({"status": state, "cause": "…"}))
+    (run / "precious").write_text("data")
+    if checkpoint:
+        (run / "checkpoint.zip").write_text("")
+    outcomes = run_folder(folder, Watcher(), slots=4, command=fake(), timing=QUICK)
+    assert statuses(outcomes) == ["done"] * 4
+    aside = run.with_name("n10_seed1.stopped-1")
+    assert (run / "precious").exists() is goes_on
+    assert aside.exists() is not goes_on
+
+
 def test_a_run_that_does_not_listen_is_made_to_stop(folder: Folder) -> None:
     deaf = fake({"n20_seed1": "deaf"})
     progress = folder.run(folder.entries[2]) / "progress.json"
@@ -235,22 +256,9 @@ def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
     assert not (folder.path / "runs").exists()
 
 
-@pytest.mark.parametrize(
-    ("running", "pending", "slots", "left"),
-    [
-        ([], [], 2, 0),
-        ([3.0], [], 2, 3),
-        ([3.0, 1.0], [4.0, 1.0], 2, 5),
-        ([], [5.0, 4.0, 3.0, 3.0], 2, 8),
-        ([0.0], [5.0], 1, 5),
-    ],
-)
-def test_time_left(running: list[float], pending: list[float], slots: int, left: float) -> None:
-    assert time_left(running, pending, slots) == left
-
-
 def test_the_command_of_a_run_is_this_interpreter_and_absolute_paths() -> None:
-    command = smarticles_command(Path("a scene.yaml"), Path("out"))
+    command = smarticles_command(Path("a scene.yaml"), Path("out"), False)
+    assert smarticles_command(Path("a scene.yaml"), Path("out"), True) == (*command, "--resume")
     assert command == (
         sys.executable,
         "-P",
