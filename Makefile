@@ -15,7 +15,7 @@ help: ## list the targets
 setup: ## install everything into the system and .venv (5 min the first time, then at once)
 	@setup/install.sh
 
-demo: setup ## quick comparison with Gravish et al. 2012, figure included (TIME)
+demo: setup ## quick comparison with Gravish et al. 2012, figures included (minutes)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
 	@echo "tables and figures: $(CURDIR)/out/demo-$(STAMP)/results"
 

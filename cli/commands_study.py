@@ -99,9 +99,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     file = study_file(arguments.name, quick=arguments.quick)
     changed = {"fidelity": arguments.fidelity} if arguments.fidelity else {}
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
-    note = _difference(arguments.name) if arguments.quick else "the full study as shipped"
-    if arguments.fidelity:
-        note += f"; fidelity {arguments.fidelity}"
+    note = _note(arguments.name, file, changed)
     print(note, flush=True)
     outcomes = compute(folder, arguments)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
@@ -117,14 +115,15 @@ def run_study(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _difference(name: str) -> str:
-    """How the quick variant differs from the full study, one line."""
+def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
+    """How what is run differs from the full study as it ships, one line."""
     from templates.expand import expand  # noqa: PLC0415
     from templates.study import differences, study_file  # noqa: PLC0415
-    from templates.sweep import load_sweep  # noqa: PLC0415
+    from templates.sweep import load_sweep, with_constants  # noqa: PLC0415
 
-    quick, full = (expand(load_sweep(study_file(name, quick=variant))) for variant in (True, False))
-    return f"quick variant, not the full study: {'; '.join(differences(quick, full))}"
+    here = expand(with_constants(load_sweep(file), changed))
+    lines = differences(here, expand(load_sweep(study_file(name))))
+    return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
 
 
 def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:

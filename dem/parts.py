@@ -197,7 +197,7 @@ class Fidelity(Part):
 
 
 FIDELITIES: Mapping[str, Mapping[str, Any]] = {
-    "draft": {"rows": 1, "pitch": 1.3, "stiffness_N_per_m": 250.0, "time_step_fraction": 0.8},
+    "draft": {"rows": 1, "pitch": 1.3, "stiffness_N_per_m": 250.0, "time_step_fraction": 0.65},
     "standard": {"rows": 1, "pitch": 1.0, "stiffness_N_per_m": 500.0, "time_step_fraction": 0.8},
     "reference": {"rows": 2, "pitch": 1.0, "stiffness_N_per_m": 1000.0, "time_step_fraction": 0.8},
 }

@@ -294,6 +294,7 @@ def _footer(
 ) -> tuple[str, ...]:
     seeds = " ".join(map(str, sorted(set(runs[SEED]))))
     counts = runs.groupby(ASPECT).size()
+    ratios = " ".join(f"{ratio:g}" for ratio in counts.index)
     per_ratio = str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"
     shaken = sorted({f"{time:g}" for time in runs[SHAKEN].round(3)}, key=float)
     lacking = f", {len(missing)} missing" if missing else ""
@@ -304,7 +305,7 @@ def _footer(
     )
     return (
         f"Study gravish, fidelity {manifests[0].fidelity}: {len(manifests)} of "
-        f"{len(manifests) + len(missing)} runs{lacking}; {len(counts)} aspect ratios, seeds "
+        f"{len(manifests) + len(missing)} runs{lacking}; l/w {ratios}, seeds "
         f"{seeds} ({per_ratio} per l/w); shaken for {', '.join(shaken)} s "
         f"(Gravish: {REFERENCE_SHAKE_TIME:g} s).",
         f"φ by {DEFINITION} unless named otherwise; before shaking and at the end of shaking, "

@@ -9,9 +9,9 @@ import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
 
 from templates.expand import expand
-from templates.folder import open_folder
+from templates.folder import create_folder, open_folder
 from templates.study import study_file
-from templates.sweep import load_sweep
+from templates.sweep import load_sweep, with_constants
 
 
 def finish(directory: Path) -> None:
@@ -129,6 +129,29 @@ def test_another_study_in_the_same_directory_is_refused(
     assert said.err.startswith(f"smarticles: error: {out}: holds another sweep ('counts'): ")
 
 
+@pytest.mark.parametrize(
+    ("words", "note"),
+    [
+        ([], "the full study as shipped"),
+        (["--fidelity", "standard"], "the full study as shipped"),
+        (["--fidelity", "reference"], "not the full study: fidelity: reference instead of standard"),
+    ],
+)
+def test_a_study_says_how_it_differs_from_the_full_one(
+    words: list[str], note: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    study = ("study", "gravish", "--out", tmp_path / "out", *words)
+    points = expand(with_constants(load_sweep(study_file("gravish")), {"fidelity": (words or ["standard"])[-1]}))
+    # Held by another process: the command ends before it starts a run.
+    folder = create_folder(
+        tmp_path / "out", load_sweep(study_file("gravish")), points, command="", versions={}, expected_s=lambda _: 1.0
+    )
+    with folder.lock():
+        said = smarticles(*study)
+    assert said.status == 2
+    assert said.out.splitlines() == [note]
+
+
 @pytest.fixture
 def finished_study(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> Path:
     """The quick study with made-up finished runs, all but one."""
@@ -155,7 +178,7 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     said = smarticles("study", "gravish", "--quick", "--out", finished_study)
     assert said.status == 1
     lines = said.out.splitlines()
-    assert lines[0].startswith("quick variant, not the full study: 9 runs instead of 24; ")
+    assert lines[0].startswith("not the full study: 9 runs instead of 24; ")
     assert "shake_s: 1.5 instead of 5.0" in lines[0]
     assert lines[2].split()[:4] == ["phi_0", "0.4", "3", "0.1050"]
     assert "Is phi_f above phi_0 at every l/w? YES" in lines
