@@ -44,6 +44,17 @@ class Cylinder:
     height: float
     facets: int
 
+    @property
+    def corner_radius(self) -> float:
+        """Distance [m] of the wall's edges from the axis: the polygon has the area of the circle."""
+        turn = 2 * math.pi / self.facets
+        return self.radius * math.sqrt(turn / math.sin(turn))
+
+    @property
+    def inner_radius(self) -> float:
+        """Distance [m] of the wall's flats from the axis, a little less than the radius."""
+        return self.corner_radius * math.cos(math.pi / self.facets)
+
 
 @dataclass(frozen=True)
 class State:
@@ -136,6 +147,7 @@ class Engine:
             Quaternion,
         )
         self.particle = particle
+        self.cylinder = cylinder
         self.time_step = time_step
         self._gravity = gravity
         self._omega = wrapper.Omega()
@@ -171,7 +183,7 @@ class Engine:
     def _add_container(self, cylinder: Cylinder) -> None:
         # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
         n = cylinder.facets
-        corner = cylinder.radius * math.sqrt(2 * math.pi / (n * math.sin(2 * math.pi / n)))
+        corner = cylinder.corner_radius
         low, high = -0.1 * cylinder.radius, cylinder.height
         angles = 2 * math.pi * np.arange(n + 1) / n
         ring = np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)

@@ -15,7 +15,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` make a file under a temporary name beside `path`, then rename it.
 
     Args:
-        path: the file that is to appear, or to be replaced.
+        path: the file that is to appear, or to be replaced; its folder is made if needed.
         write: called with the temporary path, which keeps the suffix of `path`.
 
     Raises:
@@ -23,6 +23,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     """
     temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
+        path.parent.mkdir(exist_ok=True)
         write(temporary)
         os.replace(temporary, path)  # noqa: PTH105 - the atomic call by its name
     except OSError as error:

@@ -86,7 +86,6 @@ class FrameWriter:
             RunError: it cannot be written.
         """
         name = _name(len(self.times))
-        (self.folder / "frames").mkdir(exist_ok=True)
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
         write_text(self.folder / "frames.pvd", self._collection())

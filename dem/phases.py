@@ -168,7 +168,7 @@ def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np
     poses = place_layer(
         particle,
         count=size,
-        radius=scene.container.radius_m,
+        radius=engine.cylinder.inner_radius,
         bottom=top + particle.radius,
         height=phase.layer_height_w * scene.smarticle.middle_length_m,
         obstacles=state.points(particle.centres)[near].reshape(-1, 3),

@@ -29,7 +29,7 @@ class Progress:
     _phase: str = ""
     _index: int = 0
     _end: float | None = None
-    _begun: float = field(default_factory=time.monotonic)
+    _begun: float = field(default_factory=lambda: _now())
     _start: float = 0.0
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
@@ -45,7 +45,7 @@ class Progress:
             end: when it will end [s], if that is known.
         """
         self._index, self._phase, self._start, self._end = index, phase, start, end
-        self._here_since = (time.monotonic(), now)
+        self._here_since = (_now(), now)
         self._last = -math.inf
 
     def warn(self, message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -134,7 +135,9 @@ class SeriesWriter:
         write_whole(self.folder / "series.h5", self._write)
 
     def _write(self, path: Path) -> None:
-        with h5py.File(path, "w") as file:
+        # Made in memory: on a full disk HDF5's own library does not fail cleanly but takes the process with it.
+        content = io.BytesIO()
+        with h5py.File(content, "w") as file:
             file.attrs["format"] = FORMAT
             for name, value in self.attributes.items():
                 file.attrs[name] = value
@@ -143,3 +146,4 @@ class SeriesWriter:
                 dataset = file.create_dataset(name, data=columns[name])
                 dataset.attrs["unit"] = unit
                 dataset.attrs["description"] = description
+        path.write_bytes(content.getvalue())

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from dem.errors import InputError
 from dem.particle import Particle
@@ -50,13 +51,29 @@ def typical_effective_mass(particle: Particle) -> float:
     return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
 
 
-def damping_ratio(restitution: float) -> float:
-    """Damping ratio ζ [1] of a linear spring and dashpot whose rebound has the given restitution.
+def restitution_of(damping_ratio: float) -> float:
+    """Restitution [1] of a linear spring and dashpot that never pulls.
 
-    Source: e = exp(-πζ/√(1-ζ²)), solved for ζ; the contact ends where the spring is back at zero length.
+    The contact ends when its force is zero, before the spring is back at zero length.
+
+    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007): with ω = √(1 - ζ²) in units of the undamped frequency,
+    e = exp[-(ζ/ω)(π - arg(ω² - ζ² + 2iζω))] for ζ < 1, and its continuation above.
     """
-    logarithm = math.log(restitution)
-    return -logarithm / math.hypot(math.pi, logarithm)
+    zeta = damping_ratio
+    if zeta < 1:
+        omega = math.sqrt(1 - zeta**2)
+        return math.exp(-zeta / omega * (math.pi - math.atan2(2 * zeta * omega, omega**2 - zeta**2)))
+    if zeta == 1:
+        return math.exp(-2)
+    omega = math.sqrt(zeta**2 - 1)
+    return float(((zeta + omega) / (zeta - omega)) ** (-zeta / omega))
+
+
+def damping_ratio(restitution: float) -> float:
+    """Damping ratio ζ [1] of a contact with the given restitution, the inverse of `restitution_of`."""
+    if restitution == 1:
+        return 0.0
+    return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
 
 
 def contact_law(scene: Scene) -> ContactLaw:
@@ -78,24 +95,21 @@ def contact_law(scene: Scene) -> ContactLaw:
 def stable_time_step(particle: Particle, law: ContactLaw) -> float:
     """Largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
 
-    Four modes, each a mass on parallel springs and dashpots: the lightest points of two smarticles against each other
-    and against the container, `CONTACTS_AT_A_TIP` contacts each; and a smarticle lying flat, every sphere in contact,
-    on the container and on another one. The flat modes rule: a resting smarticle that breaks them does not blow up but
-    chatters for ever, which shakes the pile and lets it compact. YADE takes the dashpot's velocity half a step late,
-    so a mode is stable while ω²dt² + 2c dt ≤ 4 with ω² = K/m, c = C/m.
+    Three modes, each a mass on parallel springs and dashpots: the lightest points of two smarticles against each other
+    and against the container, `CONTACTS_AT_A_TIP` contacts each; and a pile of smarticles lying flat, every sphere in
+    contact with the neighbours above and below that move against it, which is the stiffest mode of any such pile and
+    stiffer than one lying on the container. The flat mode rules: smarticles that break it do not blow up but chatter
+    for ever, which shakes the pile and lets it compact. YADE takes the dashpot's velocity half a step late, so a mode
+    is stable while ω²dt² + 2c dt ≤ 4 with ω² = K/m, c = C/m.
 
-    Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1.
+    Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1; chain of equal masses at the
+    edge of its band, K = 4k.
     """
-    lightest, mass, spheres = (
-        particle.smallest_effective_mass,
-        particle.boxes.mass,
-        len(particle.centres),
-    )
+    lightest, mass, spheres = particle.smallest_effective_mass, particle.boxes.mass, len(particle.centres)
     modes = (
         (lightest / 2, CONTACTS_AT_A_TIP, law.normal_damping),
         (lightest, CONTACTS_AT_A_TIP, law.wall_damping),
-        (mass / 2, spheres, law.normal_damping),
-        (mass, spheres, law.wall_damping),
+        (mass / 4, spheres, max(law.normal_damping, law.wall_damping / 2)),
     )
     steps = []
     for moved, contacts, damping in modes:

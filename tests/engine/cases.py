@@ -17,8 +17,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.engine import Cylinder, Engine, yade_version
+from dem.errors import InputError, RunError
 from dem.phases import container_height, shake_amplitude
 from dem.placement import Poses, place_layer
+from dem.run import run_scene
 from dem.scene import Scene, parse_scene
 from dem.series import SeriesWriter
 from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
@@ -270,7 +272,8 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     engine = build(scene, shaken=True)
     phase = next(p for p in scene.phases if p.type == "shake")
     amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
-    engine.advance(delay)
+    if delay:  # YADE takes a run of no steps for one without end
+        engine.advance(delay)
     begun, start = engine.time, engine.floor
     wall_start = _wall(engine)
     engine.shake(amplitude=amplitude, frequency=phase.frequency_hz)
@@ -281,7 +284,8 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     wall = _wall(engine)
     last, elapsed = engine.floor, engine.time - begun
     engine.stop_container()
-    engine.advance(rest)
+    if rest:
+        engine.advance(rest)
     return {
         "time": np.arange(1, steps + 1) * engine.time_step,
         "elapsed": elapsed,
@@ -345,3 +349,12 @@ def stack(
     advance_watched(engine, round(watch / engine.time_step), look)
     state = engine.state()
     return {"fastest": fastest, "z": state.positions[:, 2], "thick": thick, "dt": engine.time_step}
+
+
+def run(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """A whole run; errors come back as text."""
+    try:
+        run_scene(load(data), Path(out), command="test", progress=False)
+    except (InputError, RunError) as error:
+        return {"error": type(error).__name__, "text": str(error)}
+    return {"error": None, "text": ""}

@@ -107,8 +107,9 @@ def test_pile_at_rest_weighs_what_it_weighs(simulate: Simulate, scene_data: Scen
 def chatter(simulate: Simulate, data: dict[str, Any], layers: int, times_stable: float | None = None) -> float:
     """Largest speed [m/s] of smarticles lying flat on each other, 0.3 s after they were let go."""
     stack = simulate(cases.stack, data, layers=layers, settle=0.3, watch=0.02, times_stable=times_stable)
-    expected = (np.arange(layers) + 0.5) * stack["thick"]
-    assert stack["z"] == pytest.approx(expected, abs=0.2 * stack["thick"])  # still stacked: this is what is tested
+    if times_stable is None or times_stable <= 1:
+        expected = (np.arange(layers) + 0.5) * stack["thick"]
+        assert stack["z"] == pytest.approx(expected, abs=0.2 * stack["thick"])  # still stacked: this is what is tested
     return float(stack["fastest"])
 
 
@@ -128,17 +129,22 @@ def test_smarticle_lying_flat_comes_to_rest(
 def test_flat_smarticle_chatters_above_the_stable_step(
     simulate: Simulate, scene_data: SceneData, fidelity: str
 ) -> None:
-    # What the test above would see if the step were too large. Twice, since one layer alone has some margin.
-    assert chatter(simulate, scene_data({"fidelity": fidelity}), layers=1, times_stable=2.0) > 10 * RESTS
+    # What the test above would see if the step were too large: 0.05 m/s and more. The two-layer modes rule.
+    assert chatter(simulate, scene_data({"fidelity": fidelity}), layers=2, times_stable=1.2) > 100 * RESTS
 
 
-@pytest.mark.parametrize("layers", [2, 3])
+CHATTERS = pytest.mark.xfail(strict=True, reason="0.8 of the stable step chatters for ever, at 3e-4 m/s and more")
+
+
 @pytest.mark.parametrize(
-    "fidelity",
+    ("fidelity", "layers"),
     [
-        pytest.param("draft", marks=pytest.mark.xfail(strict=True, reason="0.8 of the stable step chatters: 5e-4 m/s")),
-        pytest.param("standard", marks=pytest.mark.xfail(strict=True, reason="0.8 of the stable step chatters: 5e-4 m/s")),
-        "reference",
+        ("draft", 2),
+        pytest.param("draft", 3, marks=CHATTERS),
+        pytest.param("standard", 2, marks=CHATTERS),
+        pytest.param("standard", 3, marks=CHATTERS),
+        ("reference", 2),
+        ("reference", 3),
     ],
 )
 def test_stack_of_flat_smarticles_comes_to_rest(
