@@ -1,5 +1,5 @@
 # Every target sets up what it needs: on a bare Debian 12 with root (or sudo) `make demo` is enough.
-# Times: two cores, packages from a near mirror.
+# Times are measured: two cores, packages from a near mirror. `?`: not measured yet.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo validate bench test lint types unit engine format lock clean
@@ -12,40 +12,41 @@ PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: ## install everything into the system and .venv (5 min the first time, then at once)
+setup: ## install everything into the system and .venv (first time: ?; then at once)
 	@setup/install.sh
 
-demo: setup ## quick comparison with Gravish et al. 2012, figures included (minutes)
+demo: setup ## quick comparison with Gravish et al. 2012, figures included (?)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
-	@echo "tables and figures: $(CURDIR)/out/demo-$(STAMP)/results"
+	@echo "figures:"
+	@ls -1 $(CURDIR)/out/demo-$(STAMP)/results/*.png
 
-validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
+validate: setup ## the whole comparison with Gravish et al. 2012 (?)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-bench: setup ## measure speed (minutes)
+bench: setup ## measure speed (?)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 
-test: lint types ## all checks and tests, as continuous integration runs them (minutes)
+test: lint types ## all checks and tests, as continuous integration runs them (?)
 	$(PYTEST) -m "not validation"
 
-lint: setup ## style: ruff (seconds)
+lint: setup ## style: ruff (?)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: setup ## types: mypy, strict (seconds; a minute the first time)
+types: setup ## types: mypy, strict (?)
 	$(BIN)/mypy
 
-unit: setup ## tests that need no YADE (seconds)
+unit: setup ## tests that need no YADE (?)
 	$(PYTEST) tests/unit
 
-engine: setup ## tests that run YADE (a minute)
+engine: setup ## tests that run YADE (?)
 	$(PYTEST) tests/engine -m "not validation"
 
 format: setup ## rewrite the sources in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-lock: ## pin requirements*.txt anew from requirements*.in (2 min)
+lock: ## pin requirements*.txt anew from requirements*.in (?)
 	setup/lock.sh
 
 clean: ## remove .venv and caches; results in out/ stay

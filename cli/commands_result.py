@@ -7,25 +7,30 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
 
-from cli.layout import columns
-from cli.parsing import Commands, Parser, add_json
+from cli.layout import Cell, columns
+from cli.parsing import Commands, Parser, add_json, positive_int
 from dem.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Columns of the summary that a person wants to see first; a table has all.
+_COMPARED = "second-highest-com"
+_WIDTH = 100  # characters of a terminal
+# What a person wants to see first: heading, column of the table, format, factor to the heading's unit.
 _SHOWN = (
-    "run",
-    "phase type",
-    "time [s]",
-    "smarticles [-]",
-    "phi second-highest-com [-]",
-    "phi second-highest-com SE [-]",
-    "crossings mean [-]",
-    "com height [m]",
+    ("phase", "phase type", "", 1.0),
+    ("t [s]", "time [s]", ".2f", 1.0),
+    ("smarticles", "smarticles [-]", ".4g", 1.0),
+    ("φ", f"phi {_COMPARED} [-]", ".4f", 1.0),
+    ("± SE", f"phi {_COMPARED} SE [-]", ".4f", 1.0),
+    ("top-percentile", "phi top-percentile [-]", ".4f", 1.0),
+    ("voxel", "phi voxel [-]", ".4f", 1.0),
+    ("voronoi", "phi voronoi [-]", ".4f", 1.0),
+    ("⟨N⟩", "crossings mean [-]", ".2f", 1.0),
+    ("z [mm]", "com height [m]", ".2f", 1e3),
 )
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 
@@ -76,6 +81,9 @@ The end of the output's name decides: .png is a picture; .gif, .webp and .mp4 ar
         help="crossings (default; links of others through its plane), contacts, height, speed, id",
     )
     render.add_argument("--view", default="front", metavar="VIEW", help="front (default), oblique, top")
+    render.add_argument(
+        "--size", type=positive_int, metavar="PIXELS", help="width and height; default: 1200, of a film 720"
+    )
     _add_overwrite(render)
 
 
@@ -126,11 +134,53 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
-    shown = [name for name in _SHOWN if name in table.columns]
-    print(columns(shown, table[shown].values.tolist()))
+    print(_table(table))
+    print(_legend(per_frame=arguments.frames))
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
     return 0
+
+
+def _table(table: pd.DataFrame) -> str:
+    """The columns worth showing, one block per run under its name."""
+    shown = [entry for entry in _SHOWN if entry[1] in table.columns]
+    rows = [
+        [_cell(value, form, factor) for value, (_, _, form, factor) in zip(row, shown, strict=True)]
+        for row in table[[entry[1] for entry in shown]].values.tolist()
+    ]
+    header, *lines = columns([entry[0] for entry in shown], rows).splitlines()
+    told = [header]
+    previous = None
+    for run, line in zip(table["run"], lines, strict=True):
+        if run != previous:
+            told.append(f"{run}:")
+        told.append(line)
+        previous = run
+    return "\n".join(told)
+
+
+def _cell(value: object, form: str, factor: float) -> Cell | str:
+    if not isinstance(value, float | int):
+        return str(value)
+    return Cell(f"{factor * value:{form}}" if math.isfinite(value) else "-")
+
+
+def _legend(*, per_frame: bool) -> str:
+    """What the columns mean, and over what they are averaged."""
+    from postprocess.measure import LAST_FRAMES  # noqa: PLC0415
+    from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
+
+    costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
+    averaged = f"means over the last {LAST_FRAMES} frames of each phase, SE: their standard error"
+    lines = [
+        f"{'one row per frame' if per_frame else averaged}; {costly} at the last frame of each phase only",
+        *(
+            f"{'φ by ' if name == _COMPARED else ''}{name}: {'' if name == _COMPARED else 'φ = '}{meaning}"
+            for name, meaning in DEFINITIONS.items()
+        ),
+        "⟨N⟩: links of others through a smarticle's plane; z: height of the centre of mass above the floor",
+    ]
+    return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, object]]:
@@ -153,7 +203,9 @@ def render_run(arguments: argparse.Namespace) -> int:
         raise InputError(msg)
     from postprocess import render  # noqa: PLC0415  (imports PyVista)
 
-    look = {"color_by": arguments.color_by, "view": arguments.view}
+    look: dict[str, Any] = {"color_by": arguments.color_by, "view": arguments.view}
+    if arguments.size is not None:
+        look["size"] = (arguments.size, arguments.size)
     if film:
         written = render.render_film(arguments.directory, output, overwrite=arguments.overwrite, **look)
     else:

@@ -6,15 +6,36 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.commands_sweep import add_slots, compute, make_folder, refuse_failures
 from cli.layout import columns
 from cli.parsing import Commands
+from dem.errors import InputError
 
 if TYPE_CHECKING:
     from templates.folder import Entry, Folder
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Analysis:
+    """What is to be analysed.
+
+    Args:
+        runs: run directories, finished or not.
+        output: directory for the results.
+        note: how the runs differ from the full study.
+        command: the command line.
+        quick: whether this is the quick variant, whose analysis takes seconds.
+    """
+
+    runs: Sequence[Path]
+    output: Path
+    note: str
+    command: str
+    quick: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,18 +43,26 @@ class _Study:
     """What is done with the runs of a study.
 
     Args:
-        analyse: (run directories, output directory, note, command) -> text for the terminal.
+        analyse: measures and writes; gives the text for the terminal.
         pictured: values of the run that a picture is drawn of.
     """
 
-    analyse: Callable[[Sequence[Path], Path, str, str], str]
+    analyse: Callable[[_Analysis], str]
     pictured: Mapping[str, object]
 
 
-def _analyse_gravish(runs: Sequence[Path], output: Path, note: str, command: str) -> str:
+def _analyse_gravish(analysis: _Analysis) -> str:
     from postprocess.gravish import analyse_gravish  # noqa: PLC0415
+    from postprocess.packing import DEFINITIONS  # noqa: PLC0415
+    from postprocess.study_runs import QUICK_DEFINITIONS  # noqa: PLC0415
 
-    report = analyse_gravish(runs, output, note=note, command=command)
+    report = analyse_gravish(
+        analysis.runs,
+        analysis.output,
+        note=analysis.note,
+        command=analysis.command,
+        definitions=QUICK_DEFINITIONS if analysis.quick else tuple(DEFINITIONS),
+    )
     header = ["φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"]
     rows = [
         [
@@ -47,20 +76,43 @@ def _analyse_gravish(runs: Sequence[Path], output: Path, note: str, command: str
         ]
         for row in report.deviations.to_dict("records")
     ]
-    figures = [str(path) for path in report.files.values() if path.suffix == ".png"]
-    return "\n".join(
-        [
-            columns(header, rows),
-            "",
-            *(f"{v.question} {v.answer.upper()}\n    {v.evidence}" for v in report.verdicts),
-            "",
-            *(f"figure: {figure}" for figure in figures),
-            f"tables, and the origin of every number: {output}",
-        ]
+    told = [f"{v.question} {v.answer.upper()}\n    {v.evidence}" for v in report.verdicts]
+    return _told(columns(header, rows), told, report.files, analysis.output)
+
+
+def _analyse_sensitivity(analysis: _Analysis, *, study: str) -> str:
+    from postprocess.sensitivity import COMPARED, analyse_sensitivity, told_change, told_value  # noqa: PLC0415
+
+    report = analyse_sensitivity(
+        analysis.runs, analysis.output, study=study, note=analysis.note, command=analysis.command
     )
+    header = ["variant", "seeds"]
+    for name in COMPARED:
+        header += [name, "change %"]
+    rows = []
+    for row in report.summary.to_dict("records"):
+        cells: list[object] = [row["variant"], row["seeds [-]"]]
+        for name, quantity in COMPARED.items():
+            cells.append(told_value(row[f"{quantity} [-]"], row[f"{quantity} 95 % [-]"], name))
+            mark = " *" if row[f"{name} clear"] else ""
+            cells.append(told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"]) + mark)
+        rows.append(cells)
+    told = [f"Changes are against {report.baseline}; * beyond the error at 95 %."]
+    return _told(columns(header, rows), told, report.files, analysis.output)
 
 
-_STUDIES = {"gravish": _Study(analyse=_analyse_gravish, pictured={"l_over_w": 0.7})}
+def _told(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
+    figures = [f"figure: {path}" for path in files.values() if path.suffix == ".png"]
+    return "\n".join([table, "", *told, "", *figures, f"tables, and the origin of every number: {output}"])
+
+
+_STUDIES = {
+    "gravish": _Study(analyse=_analyse_gravish, pictured={"l_over_w": 0.7}),
+    **{
+        name: _Study(analyse=partial(_analyse_sensitivity, study=name), pictured={"variant": "draft"})
+        for name in ("sensitivity", "sensitivity-section")
+    },
+}
 
 
 def add(commands: Commands) -> None:
@@ -74,16 +126,21 @@ gravish: U-shapes of several aspect ratios l/w, poured into a cylinder and shake
 against the packing fractions that Gravish et al. measured (PRL 108, 208001). --quick takes minutes
 and prints how it differs from the full study, which takes hours.
 
+sensitivity: what the packing fraction before and after shaking owes to restitution, friction, damping,
+stiffness and sphere diameter, one at a time, at l/w = 0.7. sensitivity-section: the same for pitch and
+rows of spheres, up to the true section.
+
 DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
 same command again goes on where it stopped. `smarticles status DIR` tells how far it is.""",
         examples="""\
   smarticles study gravish --quick --out demo
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
+  smarticles study sensitivity --out sensitivity
 """,
     )
     study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))
-    study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
+    study.add_argument("--quick", action="store_true", help="the variant that takes minutes; gravish only")
     study.add_argument(
         "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
     )
@@ -97,7 +154,7 @@ def run_study(arguments: argparse.Namespace) -> int:
 
     study = _STUDIES[arguments.name]
     file = study_file(arguments.name, quick=arguments.quick)
-    changed = {"fidelity": arguments.fidelity} if arguments.fidelity else {}
+    changed = _changed(arguments.name, file, arguments.fidelity)
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
     note = _note(arguments.name, file, changed)
     print(note, flush=True)
@@ -107,12 +164,31 @@ def run_study(arguments: argparse.Namespace) -> int:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
         runs = [folder.run(entry) for entry in folder.entries]
-        print(study.analyse(runs, results, note, arguments.command_line))
+        analysis = _Analysis(
+            runs=runs, output=results, note=note, command=arguments.command_line, quick=arguments.quick
+        )
+        print(study.analyse(analysis))
         sys.stdout.flush()
         _draw(folder, finished, study.pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
     refuse_failures(folder, outcomes)
     return 0
+
+
+def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
+    """Constants of the study that the command line changes.
+
+    Raises:
+        InputError: the study has a fidelity of its own.
+    """
+    from templates.sweep import load_sweep  # noqa: PLC0415
+
+    if fidelity is None:
+        return {}
+    if "fidelity" not in load_sweep(file).content.constants:
+        msg = f"--fidelity {fidelity}: study {name} compares variants of one fidelity; leave --fidelity out"
+        raise InputError(msg)
+    return {"fidelity": fidelity}
 
 
 def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:

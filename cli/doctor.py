@@ -35,8 +35,8 @@ _PACKAGES = {
     "jinja2": ("Jinja2", True),
     "rich": ("rich", True),
     "pandas": ("pandas", False),
-    "freud": ("freud-analysis", False),
     "matplotlib": ("matplotlib", False),
+    "PIL": ("pillow", False),
 }
 
 # One sphere falls for ten steps.

@@ -6,11 +6,19 @@ import math
 from collections.abc import Sequence
 
 
+class Cell(str):
+    """A number that is written as wanted already; aligned as numbers are."""
+
+    __slots__ = ()
+
+
 def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A table of aligned columns; numbers to the right, NaN and None as a dash."""
     cells = [[_text(value) for value in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(header, *cells, strict=True)]
-    right = [bool(rows) and all(isinstance(row[k], int | float | None) for row in rows) for k in range(len(header))]
+    right = [
+        bool(rows) and all(isinstance(row[k], int | float | Cell | None) for row in rows) for k in range(len(header))
+    ]
     lines = [
         "  ".join(
             cell.rjust(width) if flush else cell.ljust(width)

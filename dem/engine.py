@@ -309,11 +309,14 @@ class Engine:
         return int(self._omega.iter)
 
     def advance(self, steps: int) -> None:
-        """Advance by whole steps.
+        """Advance by whole steps; none for a number that is not positive.
 
         Raises:
             RunError: YADE stopped before the last step.
         """
+        if steps <= 0:
+            # YADE would take it for a run without end.
+            return
         target = self.steps + steps
         self._omega.run(steps, False)
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable
@@ -27,15 +28,21 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         write(temporary)
         os.replace(temporary, path)  # noqa: PTH105 - the atomic call by its name
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
         msg = (
             f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
             "everything written before is whole"
         )
         raise RunError(msg) from error
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
         raise
+
+
+def _remove(path: Path) -> None:
+    # Where even this fails, the first error is the one to tell.
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -28,31 +28,50 @@ class Part(BaseModel):
         if isinstance(data, Mapping):
             for key in data:
                 if key not in cls.model_fields:
-                    near = difflib.get_close_matches(str(key), cls.model_fields, n=1, cutoff=0.4)
-                    hint = f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(cls.model_fields)
-                    msg = f"unknown key {key!r}; {hint}"
+                    msg = f"unknown key {key!r}; {cls._nearest(str(key))}"
                     raise ValueError(msg)
         return data
+
+    @classmethod
+    def _nearest(cls, key: str) -> str:
+        """The way out for an unknown key: a key of this part that is spelt alike, or of the part it belongs in."""
+        here = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
+        if here:
+            return f"did you mean {here[0]!r}?"
+        for part in Part.__subclasses__():
+            there = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
+            if there:
+                return f"{there[0]!r} belongs in {part.__name__.lower()}"
+        return "known keys: " + ", ".join(cls.model_fields)
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_booleans_as_numbers(cls, data: Any) -> Any:
-        # YAML reads `yes` and `on` as true, and true would pass as 1.
+    def _refuse_other_kinds_as_numbers(cls, data: Any) -> Any:
+        # YAML reads `yes` and `on` as true, and true would pass as 1; "0.4" in quotes would pass as 0.4.
         if isinstance(data, Mapping):
             for key, value in data.items():
                 field = cls.model_fields.get(str(key))
-                if isinstance(value, bool) and field is not None and field.annotation is not bool:
-                    msg = f"{key}: got the boolean {str(value).lower()}, expected {_kind(field.annotation)}"
-                    raise ValueError(msg)
+                if field is None:
+                    continue
+                for item in value if isinstance(value, list) else [value]:
+                    if isinstance(item, bool) and field.annotation is not bool:
+                        msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(field.annotation)}"
+                        raise ValueError(msg)
+                    if isinstance(item, str) and _kind(field.annotation) == "a number":
+                        msg = f"{key}: got the text {item!r}, expected a number; leave out the quotes and the unit"
+                        raise ValueError(msg)
         return data
 
 
+_NUMBERS = (int, float, float | None, int | None, tuple[float, float])
+
+
 def _kind(annotation: Any) -> str:
-    return "a number" if annotation in (int, float, float | None, int | None) else "a value of its kind"
+    return "a number" if annotation in _NUMBERS else "a value of its kind"
 
 
-def _refuse_wrong_unit(value: float) -> float:
-    if value > LONGEST_LENGTH:
+def _refuse_wrong_unit(value: float | None) -> float | None:
+    if value is not None and value > LONGEST_LENGTH:
         msg = (
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
             f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
@@ -99,9 +118,21 @@ class Smarticle(Part):
     def _angle_range(cls, value: tuple[float, float]) -> tuple[float, float]:
         for angle in value:
             if not -15 <= angle <= 105:
-                msg = f"{angle:g}° is outside -15° … 105°, where the links of one smarticle stay apart"
+                msg = f"{angle:g}° is outside -15° … 105°, the range of the hinges"
                 raise ValueError(msg)
         return value
+
+    @model_validator(mode="after")
+    def _barbs_apart(self) -> Self:
+        inward = -sum(math.cos(math.radians(angle)) for angle in self.angles_deg if angle > 90)
+        free = self.middle_length_m * (1 - self.aspect_ratio * inward) - self.thickness_in_plane_m
+        if free < 0:
+            msg = (
+                f"angles_deg: at {self.angles_deg[0]:g}° and {self.angles_deg[1]:g}° the barbs of l/w = "
+                f"{self.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
+            )
+            raise ValueError(msg)
+        return self
 
     @model_validator(mode="after")
     def _thinner_than_long(self) -> Self:
@@ -135,7 +166,7 @@ class Container(Part):
         None, gt=0, description="height of the wall [m]; by default high enough for the pour"
     )
 
-    _length_unit = field_validator("radius_m")(_refuse_wrong_unit)
+    _length_unit = field_validator("radius_m", "height_m")(_refuse_wrong_unit)
 
 
 class Contact(Part):

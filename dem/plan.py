@@ -122,7 +122,7 @@ def plan(scene: Scene) -> Plan:
 
 
 def _effects(scene: Scene) -> tuple[Effect, ...]:
-    contact = scene.contact
+    contact, recording = scene.contact, scene.recording
     shakes = [(k, phase) for k, phase in enumerate(scene.phases) if isinstance(phase, Shake)]
     shaken = bool(shakes)
     amplitudes = ", ".join(
@@ -149,6 +149,20 @@ def _effects(scene: Scene) -> tuple[Effect, ...]:
             shaken,
             amplitudes if shaken else "no phase of type shake",
             "one engine over the container's bodies",
+        ),
+        Effect(
+            "frames and series",
+            True,
+            f"a frame every {recording.frame_interval_s:g} s, a sample every {recording.series_interval_s:g} s",
+            "reading the state of all smarticles",
+        ),
+        Effect(
+            "checkpoints",
+            recording.checkpoint_interval_s is not None,
+            "recording.checkpoint_interval_s is null"
+            if recording.checkpoint_interval_s is None
+            else f"every {recording.checkpoint_interval_s:g} s; a killed run goes on from the last one",
+            "saving and reloading the simulation",
         ),
         Effect("articulation", False, "no phase actuates; each smarticle is one welded clump", "none"),
     )

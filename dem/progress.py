@@ -13,6 +13,10 @@ from pathlib import Path
 INTERVAL = 1.0  # s of wall time between updates
 
 
+def _now() -> float:
+    return time.monotonic()
+
+
 @dataclass
 class Progress:
     """Tells at most once per second.
@@ -29,7 +33,7 @@ class Progress:
     _phase: str = ""
     _index: int = 0
     _end: float | None = None
-    _begun: float = field(default_factory=lambda: _now())
+    _begun: float = field(default_factory=_now)
     _start: float = 0.0
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
@@ -92,7 +96,8 @@ class Progress:
             fraction = (simulated - self._start) / (self._end - self._start)
             bar = "█" * round(20 * fraction)
             done = f" {bar:<20} {100 * fraction:3.0f} %"
-            left = f"  {(now - wall_since) * (self._end - simulated) / (simulated - since):.0f} s left in this phase"
+            ahead = max(0.0, self._end - simulated)
+            left = f"  {(now - wall_since) * ahead / (simulated - since):.0f} s left in this phase"
         elif self._phase == "deposit":
             fraction = count / self.total
             done = f" {'█' * round(20 * fraction):<20} {count}/{self.total}"
@@ -103,7 +108,3 @@ class Progress:
         line = f"{self._phase:<8}{done}  t = {simulated:.2f} s{packing}{left}"
         sys.stderr.write(f"\r\x1b[K{line}")
         sys.stderr.flush()
-
-
-def _now() -> float:
-    return time.monotonic()

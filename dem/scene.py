@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +19,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from dem.errors import InputError
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Part, Phase, Recording, Smarticle
+from dem.yaml_text import StrictLoader
 
 SCHEMA_VERSION = 1
 
@@ -50,7 +50,7 @@ class Scene(Part):
         if not isinstance(value, Mapping):
             return value
         base = value.get("base", "standard")
-        if base not in FIDELITIES:
+        if not isinstance(base, str) or base not in FIDELITIES:
             msg = f"unknown fidelity {base!r}; known: {', '.join(FIDELITIES)}"
             raise ValueError(msg)
         return {"base": base, **FIDELITIES[base], **value}
@@ -159,6 +159,9 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     Raises:
         InputError: one line with file, key, value and the way out.
     """
+    if data is None:
+        msg = f"{source}: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
+        raise InputError(msg)
     if not isinstance(data, Mapping):
         msg = f"{source}: a scene is a mapping of keys to values, got {type(data).__name__}"
         raise InputError(msg)
@@ -184,17 +187,18 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=StrictLoader)
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror}); give the path of a scene file"
         raise InputError(msg) from None
     except UnicodeDecodeError:
         msg = f"{path}: is not a text file; give the path of a scene file"
         raise InputError(msg) from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
+        # A ValueError is a date that does not exist.
         msg = f"{path}: not valid YAML: {' '.join(str(error).split())}"
         raise InputError(msg) from None
-    for override in overrides:
+    for override in overrides if isinstance(data, Mapping) else ():
         _apply(data, override)
     return parse_scene(data, source=str(path))
 
@@ -212,27 +216,13 @@ def scene_hash(scene: Scene) -> str:
 
 def json_schema() -> dict[str, Any]:
     """JSON schema of the scene file, for editors."""
-    return Scene.model_json_schema()
-
-
-class _Loader(yaml.SafeLoader):  # type: ignore[misc] # PyYAML ships no types
-    """Safe YAML that reads 1e-3 as a number, as YAML 1.2 does, and refuses a key given twice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=deep) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                msg = f"key {key!r} is given twice"
-                raise yaml.constructor.ConstructorError(None, None, msg, node.start_mark)
-        mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
-        return mapping
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)$"),
-    list("-+0123456789."),
-)
+    schema = Scene.model_json_schema()
+    # The file may name a fidelity, or give its base and some knobs; the model that pydantic describes has them all.
+    fidelity = schema["properties"]["fidelity"]
+    mapping = {"$ref": fidelity.pop("$ref")}
+    fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
+    schema["$defs"]["Fidelity"].pop("required")
+    return schema
 
 
 def _apply(data: Any, override: str) -> None:
@@ -241,8 +231,8 @@ def _apply(data: Any, override: str) -> None:
         msg = f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2"
         raise InputError(msg)
     try:
-        value = yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError:
+        value = yaml.load(text, Loader=StrictLoader)
+    except (yaml.YAMLError, ValueError):
         msg = f"--set {override}: the value is not valid YAML"
         raise InputError(msg) from None
     *parents, last = key.split(".")

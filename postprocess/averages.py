@@ -16,10 +16,10 @@ class Mean:
     """A mean over successive frames.
 
     Attributes:
-        value: The mean; NaN without samples.
-        standard_error: Standard error of the mean; NaN with fewer than two samples.
+        value: The mean; NaN without samples. Infinite if a sample is, NaN if samples are of either sign.
+        standard_error: Standard error of the mean; NaN with fewer than two samples, or infinite ones.
         count: Number of samples averaged.
-        effective_count: Number of independent samples they are worth.
+        effective_count: Number of independent samples they are worth; NaN with infinite ones.
     """
 
     value: float
@@ -51,6 +51,12 @@ def mean_with_error(samples: ArrayLike) -> Mean:
     if count == 0:
         nan = float("nan")
         return Mean(value=nan, standard_error=nan, count=0, effective_count=0.0)
+    infinite = values[np.isinf(values)]
+    if len(infinite):
+        # E.g. the unbalanced force over no contact force, while everything is still in the air.
+        one_sign = bool((infinite == infinite[0]).all())
+        mean = float(infinite[0]) if one_sign else float("nan")
+        return Mean(value=mean, standard_error=float("nan"), count=count, effective_count=float("nan"))
     mean = float(values.mean())
     if count == 1:
         return Mean(value=mean, standard_error=float("nan"), count=1, effective_count=1.0)

@@ -1,4 +1,4 @@
-"""Statistics of the study `gravish`: means over seeds, deviations, and answers with evidence.
+"""Statistics of the study `gravish`: deviations, and answers with evidence.
 
 Gravish's points are compared at equal l/w only and never interpolated. All error bars are
 half-widths of 95 % confidence intervals of a mean over seeds, by Student's t. A mean over one seed
@@ -8,52 +8,21 @@ has none, and what would need one is left undetermined.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
 
-from postprocess.packing import DEFINITIONS
-
-DEFINITION = "second-highest-com"
-"""Definition of the packing fraction that is compared with Gravish's."""
-
-
-DIGITISING_ERROR = 0.003
-"""Taken as the error of each of Gravish's points [-]."""
-
+from postprocess.gravish_reference import COLUMNS, DIGITISING_ERROR, reference_at
+from postprocess.seeds import mean_over_seeds
+from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, SHAKEN, STAGES, measured_quantities
 
 ACCEPTED_DEVIATION = 10.0
 """Mean absolute deviation from Gravish's points that the study accepts [%]."""
 
 
-CONFIDENCE = 0.95
-
-
-ASPECT, SEED, SEEDS, SHAKEN = "aspect ratio [-]", "seed", "seeds [-]", "time shaken [s]"
-
-
-STAGES: Mapping[str, str] = MappingProxyType(
-    {
-        "phi_0": "before shaking",
-        "phi_f": "at the end of shaking",
-        "phi_f relaxed": "after the relaxation that follows shaking",
-    }
-)
-"""When a packing fraction is taken; each is a mean over the last frames of its phase."""
-
-
-REFERENCE = files("postprocess") / "reference" / "gravish2012_phi.csv"
-"""Gravish's digitised points."""
-
-
-_REFERENCE_COLUMN = {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
-
+_COMPARED = {f"{stage} {DEFINITION}": stage for stage in COLUMNS}
 
 Answer = Literal["yes", "no", "undetermined"]
 
@@ -73,70 +42,12 @@ class Verdict:
     evidence: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class SeedMean:
-    """A mean over seeds.
-
-    Attributes:
-        value: NaN without seeds.
-        standard_error: s/√n; NaN for fewer than two seeds.
-        half_width: Of the 95 % confidence interval by Student's t with n − 1 degrees of freedom;
-            NaN for fewer than two seeds.
-        count: n.
-    """
-
-    value: float
-    standard_error: float
-    half_width: float
-    count: int
-
-
-def mean_over_seeds(values: Sequence[float]) -> SeedMean:
-    """Mean of independent values with its error.
-
-    Args:
-        values: One per seed; NaN are left out.
-
-    Returns:
-        The mean, in the values' unit.
-
-    Example:
-        >>> mean = mean_over_seeds([1.0, 2.0, 3.0])
-        >>> mean.value, round(mean.half_width, 3)
-        (2.0, 2.484)
-    """
-    known = np.asarray(values, dtype=np.float64)
-    known = known[~np.isnan(known)]
-    count = len(known)
-    if count < 2:
-        value = float(known[0]) if count else math.nan
-        return SeedMean(value=value, standard_error=math.nan, half_width=math.nan, count=count)
-    error = float(known.std(ddof=1)) / math.sqrt(count)
-    quantile = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2))
-    return SeedMean(
-        value=float(known.mean()),
-        standard_error=error,
-        half_width=quantile * error,
-        count=count,
-    )
-
-
-def read_reference() -> pd.DataFrame:
-    """Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final`.
-
-    Returns:
-        The table; NaN where there is no point.
-    """
-    with REFERENCE.open(encoding="utf-8") as file:
-        return pd.read_csv(file)
-
-
 def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
     """One row per aspect ratio: means over seeds, their errors, and Gravish's values.
 
     Args:
         runs: Table of runs, see `GravishReport.runs`.
-        reference: See `read_reference`.
+        reference: See `gravish_reference.read_reference`.
 
     Returns:
         The table, by ascending aspect ratio. `… 95 % [-]` are half-widths, `… deviation [%]` is
@@ -150,27 +61,17 @@ def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
             "seeds": " ".join(map(str, sorted(group[SEED]))),
             SHAKEN: group[SHAKEN].mean(),
         }
-        for quantity in _quantities(runs):
+        for quantity in measured_quantities(runs):
             mean = mean_over_seeds(group[f"{quantity} [-]"])
             row[f"{quantity} [-]"] = mean.value
             row[f"{quantity} SE [-]"] = mean.standard_error
             row[f"{quantity} 95 % [-]"] = mean.half_width
             if quantity in _COMPARED:
-                value = _reference_at(reference, aspect, _COMPARED[quantity])
+                value = reference_at(reference, aspect, _COMPARED[quantity])
                 row[f"{quantity} Gravish [-]"] = value
                 row[f"{quantity} deviation [%]"] = 100 * (mean.value / value - 1)
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-_COMPARED = {f"{stage} {DEFINITION}": column for stage, column in _REFERENCE_COLUMN.items()}
-
-
-def _quantities(runs: pd.DataFrame) -> list[str]:
-    """What is averaged over seeds: names of columns without their unit."""
-    columns = [f"{stage} {definition}" for definition in DEFINITIONS for stage in STAGES]
-    columns += ["crossings before", "crossings after", "crossings relaxed"]
-    return [name for name in columns if f"{name} [-]" in runs.columns]
 
 
 def answers(
@@ -197,12 +98,6 @@ def answers(
 def _stages(summary: pd.DataFrame) -> list[str]:
     """The stages that the runs went through: not every run relaxes at the end."""
     return [stage for stage in STAGES if f"{stage} {DEFINITION} [-]" in summary.columns]
-
-
-def _reference_at(reference: pd.DataFrame, aspect: float, column: str) -> float:
-    """Gravish's value at exactly this aspect ratio, or NaN."""
-    same = np.isclose(reference["l_over_w"], aspect, rtol=0, atol=1e-6)
-    return float(reference.loc[same, column].iloc[0]) if same.any() else math.nan
 
 
 def deviations_from_reference(summary: pd.DataFrame) -> pd.DataFrame:

@@ -42,7 +42,7 @@ def draw(
     Args:
         output: Folder.
         summary: See `gravish_answers.summarise_runs`.
-        reference: See `gravish_answers.read_reference`.
+        reference: See `gravish_reference.read_reference`.
         manifests: The runs behind the summary.
         definition: Of the packing fraction that is compared.
         reading_error: Of the reference's points [-].

@@ -19,7 +19,8 @@ from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from dem.errors import InputError
-from templates.texts import StrictLoader, nearest, parse_yaml
+from dem.yaml_text import StrictLoader, parse_yaml
+from templates.texts import nearest
 
 Value = Any
 """What a variable may hold: None, bool, int, float, str, and lists and mappings of these."""

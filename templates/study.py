@@ -23,12 +23,16 @@ def study_file(name: str, *, quick: bool = False) -> Path:
     """Sweep file of a study.
 
     Raises:
-        InputError: there is no such study.
+        InputError: there is no such study, or it has no quick variant.
     """
     if name not in study_names():
         msg = f"study {name!r} does not exist; {nearest(name, study_names())}"
         raise InputError(msg)
-    return _FOLDER / (f"{name}.quick.yaml" if quick else f"{name}.yaml")
+    file = _FOLDER / (f"{name}.quick.yaml" if quick else f"{name}.yaml")
+    if not file.is_file():
+        msg = f"study {name} has no quick variant; leave --quick out"
+        raise InputError(msg)
+    return file
 
 
 def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:

@@ -26,8 +26,9 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError
+from dem.yaml_text import parse_yaml
 from templates.render import Value
-from templates.texts import IDENTIFIER, nearest, parse_table, parse_yaml, read_text
+from templates.texts import IDENTIFIER, nearest, parse_table, read_text
 
 SEED = "seed"
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}

@@ -1,7 +1,7 @@
 """Small simulations whose answer is known. They run in the worker process of `conftest.py`, never in pytest's own:
 
-YADE keeps one scene per process, installs handlers, and must not meet PyVista's VTK. Each case builds its engine anew and
-returns plain numbers and arrays; the tests compare them with the answer. Lengths in m, times in s, SI throughout.
+YADE keeps one scene per process, installs handlers, and must not meet PyVista's VTK. Each case builds its engine anew
+and returns plain numbers and arrays; the tests compare them with the answer. SI throughout.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dem.placement import Poses, place_layer
 from dem.run import run_scene
 from dem.scene import Scene, parse_scene
 from dem.series import SeriesWriter
-from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
+from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step, typical_effective_mass
 
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
 FLAT = Rotation.identity()
@@ -44,9 +44,7 @@ def build(
 ) -> Engine:
     return Engine(
         particle=scene.particle,
-        cylinder=Cylinder(
-            radius=radius or scene.container.radius_m, height=container_height(scene), facets=64
-        ),
+        cylinder=Cylinder(radius=radius or scene.container.radius_m, height=container_height(scene), facets=64),
         law=law or contact_law(scene),
         gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
         time_step=dt or time_step(scene),
@@ -62,9 +60,7 @@ def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0
     """Give a smarticle a velocity; YADE integrates the angular momentum, so that is set too."""
     clump = engine._clumps[k]
     rotation = engine.state().rotations[k]
-    momentum = (
-        rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
-    )
+    momentum = rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
     clump.vel = engine._vector(*map(float, velocity))
     clump.angVel = engine._vector(*map(float, spin))
     clump.angMom = engine._vector(*momentum)
@@ -160,14 +156,22 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     }
 
 
-def rebound(data: dict[str, Any], *, speed: float, refine: float) -> dict[str, Any]:
-    """An upright bar falls on its end: the contact force passes through the centre of mass."""
+def rebound(data: dict[str, Any], *, speed: float, refine: float, resize: bool = False) -> dict[str, Any]:
+    """An upright bar falls on its end: the contact force passes through the centre of mass.
+
+    `resize` scales the dashpots from the typical mass, for which the law is made, to the mass that moves here.
+    """
     scene = load(data)
     law = contact_law(scene)
-    engine = build(scene, gravity=0.0, dt=time_step(scene) / refine)
+    if resize:
+        scale = math.sqrt(scene.smarticle.boxes.mass / typical_effective_mass(scene.particle))
+        law = dataclasses.replace(law, wall_damping=law.wall_damping * scale, normal_damping=law.normal_damping * scale)
+    engine = build(scene, law=law, gravity=0.0, dt=time_step(scene) / refine)
     add(engine, (0, 0, scene.smarticle.middle_length_m / 2 + 1e-4), UPRIGHT)
     push(engine, 0, velocity=(0, 0, -speed))
-    engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
+    # A contact lasts π/ω and less, and the way back is short unless the rebound is slow.
+    contact = math.pi * math.sqrt(scene.smarticle.boxes.mass / law.normal_stiffness)
+    engine.advance(math.ceil((2e-4 / speed + 3 * contact) / engine.time_step))
     state = engine.state()
     return {
         "after": state.velocities[0],
@@ -200,11 +204,7 @@ def slide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, A
     scene = load(data)
     engine = build(scene, radius=0.1)
     law, particle = contact_law(scene), scene.particle
-    sunk = (
-        particle.boxes.mass
-        * scene.gravity_m_per_s2
-        / (len(particle.centres) * law.normal_stiffness)
-    )
+    sunk = particle.boxes.mass * scene.gravity_m_per_s2 / (len(particle.centres) * law.normal_stiffness)
     lowest = particle.centres[:, 2].min() - particle.radius
     add(engine, (0, -0.03, -lowest - sunk))
     push(engine, 0, velocity=(0, speed, 0))
@@ -242,9 +242,7 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     engine = build(scene)
     _pour(engine, scene, count)
     engine.advance(round(settle / engine.time_step))
-    writer = SeriesWriter(
-        Path(), scene.container.radius_m, scene.gravity_m_per_s2, {}
-    )
+    writer = SeriesWriter(Path(), scene.container.radius_m, scene.gravity_m_per_s2, {})
     writer.sample(engine, engine.state(), 0)
     forces: list[np.ndarray] = []
     advance_watched(engine, watch, lambda: forces.append(engine.container_force()))
@@ -306,12 +304,8 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     _pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
     phase = next(p for p in scene.phases if p.type == "shake")
-    engine.shake(
-        amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz
-    )
-    writer = SeriesWriter(
-        Path(), scene.container.radius_m, scene.gravity_m_per_s2, {}
-    )
+    engine.shake(amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz)
+    writer = SeriesWriter(Path(), scene.container.radius_m, scene.gravity_m_per_s2, {})
     writer.sample(engine, engine.state(), 0)
     means = []
     for _ in range(samples):
@@ -358,3 +352,30 @@ def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
+
+
+def still(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
+    """Smarticles that lie flat on the floor, each by itself, turned by random angles; forces summed by hand."""
+    scene = load(data)
+    engine = build(scene, radius=0.2)
+    rng = np.random.default_rng(6)
+    lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
+    for k in range(count):
+        turn = Rotation.from_euler("z", rng.random() * 2 * np.pi)
+        add(engine, (0.03 * (k % 8) - 0.1, 0.03 * (k // 8) - 0.1, -lowest + 1e-5), turn)
+    engine.advance(round(settle / engine.time_step))
+    weight = scene.smarticle.boxes.mass * scene.gravity_m_per_s2
+    net, contacts = np.tile([0.0, 0.0, -weight], (count, 1)), []
+    for interaction in engine._omega.interactions:
+        if interaction.isReal:
+            force = np.array(interaction.phys.normalForce + interaction.phys.shearForce)
+            contacts.append(np.linalg.norm(force))
+            for body, sign in ((interaction.id1, -1), (interaction.id2, 1)):
+                k = engine._smarticle_of.get(body)
+                if k is not None:
+                    net[k] += sign * force
+    return {
+        "said": engine.unbalanced_force(),
+        "summed": float(np.linalg.norm(net, axis=1).mean() / np.mean(contacts)),
+        "weight_over_contact": weight / float(np.mean(contacts)),
+    }

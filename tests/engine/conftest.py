@@ -13,7 +13,7 @@ import pytest
 
 from dem.errors import RunError
 
-TIMEOUT = 120  # s for one case; the longest takes a few
+TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations
 
 
 @pytest.fixture(scope="session")

@@ -57,15 +57,16 @@ def test_rebound_of_two_smarticles(simulate: Simulate, scene_data: SceneData, as
     assert np.abs(pair["after"].sum(axis=0)).max() < 1e-12  # momentum
 
 
-@pytest.mark.xfail(
-    strict=True, reason="damping_ratio is that of a contact that pulls; YADE's does not: 0.2 asked, 0.31 had"
-)
-def test_restitution_at_the_typical_mass_is_the_one_asked_for(simulate: Simulate, scene_data: SceneData) -> None:
-    # A bar of another density whose whole mass is the typical mass of the scene's: what the contact law is sized for.
-    data = scene_data({"smarticle.aspect_ratio": 0, "contact.restitution": 0.2})
-    fall = simulate(cases.rebound, data, speed=0.5, refine=8)
-    law, typical = fall["law"], typical_effective_mass(cases.load(data).particle)
-    assert restitution(law["normal_stiffness"], law["wall_damping"], typical) == pytest.approx(0.2, rel=0.02)
+@pytest.mark.parametrize("asked", [0.05, 0.2, 0.8])
+def test_rebound_of_the_typical_mass_is_the_one_asked_for(
+    simulate: Simulate, scene_data: SceneData, asked: float
+) -> None:
+    # The same bar, but with the law's dashpots sized for its own mass instead of the typical one.
+    data = scene_data({"smarticle.aspect_ratio": 0, "contact.restitution": asked})
+    typical = typical_effective_mass(cases.load(data).particle)
+    fall = simulate(cases.rebound, data, speed=0.5, refine=8, resize=True)
+    assert fall["mass"] > 1.3 * typical
+    assert fall["after"][2] / 0.5 == pytest.approx(asked, rel=0.03)
 
 
 @pytest.mark.parametrize(("aspect_ratio", "friction"), [(0.7, 0.4), (0.7, 0.2), (0.3, 0.4)])
@@ -129,23 +130,13 @@ def test_smarticle_lying_flat_comes_to_rest(
 def test_flat_smarticle_chatters_above_the_stable_step(
     simulate: Simulate, scene_data: SceneData, fidelity: str
 ) -> None:
-    # What the test above would see if the step were too large: 0.05 m/s and more. The two-layer modes rule.
-    assert chatter(simulate, scene_data({"fidelity": fidelity}), layers=2, times_stable=1.2) > 100 * RESTS
-
-
-CHATTERS = pytest.mark.xfail(strict=True, reason="0.8 of the stable step chatters for ever, at 3e-4 m/s and more")
+    # What these tests see if the step is too large. Two layers are softer than the endless pile that rules the step.
+    assert chatter(simulate, scene_data({"fidelity": fidelity}), layers=2, times_stable=1.6) > 3 * RESTS
 
 
 @pytest.mark.parametrize(
     ("fidelity", "layers"),
-    [
-        ("draft", 2),
-        pytest.param("draft", 3, marks=CHATTERS),
-        pytest.param("standard", 2, marks=CHATTERS),
-        pytest.param("standard", 3, marks=CHATTERS),
-        ("reference", 2),
-        ("reference", 3),
-    ],
+    [("draft", 2), ("draft", 3), ("draft", 5), ("standard", 2), ("standard", 3), ("reference", 3)],
 )
 def test_stack_of_flat_smarticles_comes_to_rest(
     simulate: Simulate, scene_data: SceneData, fidelity: str, layers: int
@@ -153,15 +144,21 @@ def test_stack_of_flat_smarticles_comes_to_rest(
     assert chatter(simulate, scene_data({"fidelity": fidelity}), layers=layers) < RESTS
 
 
-def test_stack_comes_to_rest_at_half_of_the_stable_step(simulate: Simulate, scene_data: SceneData) -> None:
-    assert chatter(simulate, scene_data(), layers=3, times_stable=0.5) < RESTS
+@pytest.mark.parametrize("fidelity", ["draft", "standard"])
+def test_bar_lying_on_the_floor_comes_to_rest(simulate: Simulate, scene_data: SceneData, fidelity: str) -> None:
+    # Without barbs it can roll, and its moment about its own axis is small.
+    assert chatter(simulate, scene_data({"fidelity": fidelity, "smarticle.aspect_ratio": 0}), layers=1) < RESTS
 
 
-@pytest.mark.xfail(strict=True, reason="a bar's rolling mode is stiffer than the modes of stable_time_step: it chatters")
-def test_bar_lying_on_the_floor_comes_to_rest(simulate: Simulate, scene_data: SceneData) -> None:
-    assert chatter(simulate, scene_data({"fidelity": "standard", "smarticle.aspect_ratio": 0}), layers=1) < RESTS
-
-
-def test_bar_comes_to_rest_at_half_of_the_stable_step(simulate: Simulate, scene_data: SceneData) -> None:
-    data = scene_data({"fidelity": "standard", "smarticle.aspect_ratio": 0})
-    assert chatter(simulate, data, layers=1, times_stable=0.5) < RESTS
+@pytest.mark.xfail(
+    strict=True,
+    reason="YADE's unbalancedForce counts a clump in exact balance with its whole contact force: a still pile may "
+    "never count as settled; dem.engine.unbalanced_force",
+)
+def test_unbalanced_force_is_that_of_the_forces(simulate: Simulate, scene_data: SceneData) -> None:
+    # Some of 64 smarticles at rest balance gravity to the last bit. One of them adds its weight to the mean.
+    for aspect_ratio in (0.1, 0.2, 0.4, 0.7):
+        data = scene_data({"fidelity": "standard", "smarticle.aspect_ratio": aspect_ratio})
+        still = simulate(cases.still, data, count=16, settle=0.3)
+        assert still["summed"] < 1e-6
+        assert still["said"] == pytest.approx(still["summed"], abs=1e-6)

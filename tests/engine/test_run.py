@@ -32,7 +32,7 @@ RUN = (
     "import sys; from pathlib import Path; from dem.run import run_scene; from dem.scene import load_scene\n"
     "run_scene(load_scene(Path(sys.argv[1])), Path(sys.argv[2]), command='test', progress=False)"
 )
-TIMEOUT = 120
+TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations
 
 
 def start(data: dict[str, Any], folder: Path, out: Path) -> subprocess.Popen[str]:
@@ -179,10 +179,13 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
     rows, scene = series(out), cases.load(data)
     settle, weight = scene.phases[0].settle, 10 * scene.smarticle.boxes.mass * 9.81
     settled_at = read_json(out / "done.json")["phases"][0]["end_s"]
-    resting = (rows["time_s"] >= settled_at) & (rows["phase"] == 1)
+    # The criterion holds at one look; the pile may stir once more. Later it lies still.
+    resting = (rows["time_s"] >= settled_at + 0.1) & (rows["phase"] == 1)
+    assert resting.sum() > 5
     assert rows["max_speed_m_per_s"][resting].max() < settle.speed_m_per_s
     assert rows["unbalanced_force"][resting].max() < settle.unbalanced_force
-    force = rows["container_force_N"][resting][len(rows["time_s"][resting]) // 2 :].mean(axis=0)
+    assert rows["max_speed_m_per_s"][rows["phase"] == 0].max() > 10 * settle.speed_m_per_s  # it was poured
+    force = rows["container_force_N"][resting].mean(axis=0)
     assert force == pytest.approx([0, 0, -weight], abs=5e-3 * weight)
     shaken = rows["phase"] == 2
     # Over whole periods the mean force on the container is the weight too, and it moves by A.
@@ -193,7 +196,7 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
 
 @pytest.mark.xfail(
     strict=True,
-    reason="a layer poured between two samples is charged with its weight for the whole interval: dem.series._mean_force",
+    reason="a layer poured between two samples is charged with its weight for all of the interval: dem.series",
 )
 def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
@@ -205,18 +208,24 @@ def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, 
     assert force == pytest.approx(-5 * mass * 9.81, rel=0.02)
 
 
+@pytest.mark.parametrize(("speed", "unbalanced"), [("1e-18", "1e+09"), ("1e+09", "1e-18")])
 def test_impossible_settle_criterion_fails_with_the_residuals(
-    simulate: Simulate, scene_data: SceneData, tmp_path: Path
+    simulate: Simulate, scene_data: SceneData, tmp_path: Path, speed: str, unbalanced: str
 ) -> None:
-    data = scene_data({"phases.0.settle": {"speed_m_per_s": 1e-18, "timeout_s": 0.05}})
+    # Each of the two by itself keeps a pile from counting as settled.
+    settle = {"speed_m_per_s": float(speed), "unbalanced_force": float(unbalanced), "timeout_s": 0.05}
     out = tmp_path / "run"
-    answer = simulate(cases.run, data, str(out))
+    answer = simulate(cases.run, scene_data({"phases.0.settle": settle}), str(out))
     assert answer["error"] == "RunError"
-    assert re.fullmatch(
-        r"the pile has not settled after 0\.05 s: speed \S+ m/s \(limit 1e-18 m/s\), unbalanced force \S+ "
-        r"\(limit 0\.05\); raise phases\.0\.settle\.timeout_s or its limits.*",
+    found = re.fullmatch(
+        r"the pile has not settled after 0\.05 s: speed (\S+) m/s \(limit (\S+) m/s\), unbalanced force (\S+) "
+        r"\(limit (\S+)\); raise phases\.0\.settle\.timeout_s or its limits.*",
         answer["text"],
     )
+    assert found
+    assert (found[2], found[4]) == (speed, unbalanced)
+    assert 0 < float(found[1]) < 1
+    assert float(found[3]) > 0
     failed = read_json(out / "failed.json")
     assert (failed["status"], failed["cause"]) == ("failed", answer["text"])
     assert not (out / "done.json").exists()
@@ -227,7 +236,8 @@ def test_impossible_settle_criterion_fails_with_the_residuals(
 
 
 @pytest.mark.parametrize(
-    ("held", "what"), [({"run.json": "{}", "frames.pvd": "x"}, "another run"), ({"notes.txt": "mine"}, "files (notes.txt, …)")]
+    ("held", "what"),
+    [({"run.json": "{}", "frames.pvd": "x"}, "another run"), ({"notes.txt": "mine"}, "files (notes.txt, …)")],
 )
 def test_directory_that_holds_something_is_left_as_it_is(
     simulate: Simulate, scene_data: SceneData, tmp_path: Path, held: dict[str, str], what: str

@@ -108,9 +108,9 @@ class TestGuarded:
                 "error: /d/x.csv: No space left on device; free space, or check the path and its permissions",
             ),
             (
-                ModuleNotFoundError("No module named 'freud'", name="freud"),
+                ModuleNotFoundError("No module named 'pandas'", name="pandas"),
                 1,
-                "error: the Python package 'freud' is not installed; run `make setup`, then `smarticles doctor`",
+                "error: the Python package 'pandas' is not installed; run `make setup`, then `smarticles doctor`",
             ),
             (
                 ZeroDivisionError("division by zero"),

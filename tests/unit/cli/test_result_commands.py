@@ -6,10 +6,12 @@ import csv
 import json
 from pathlib import Path
 
-import pytest
 from command_cases import Smarticles, WriteRun
+from PIL import Image
 
-from cli.layout import columns
+from cli.layout import Cell, columns
+from postprocess.camera import VIEWS
+from postprocess.colouring import COLOURINGS
 
 
 def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -17,9 +19,26 @@ def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, s
     said = smarticles("measure", run)
     assert said.status == 0
     lines = said.out.splitlines()
-    assert lines[0].startswith("run ")
-    assert "phi second-highest-com [-]" in lines[0]
-    assert [line.split()[1] for line in lines[1:]] == ["deposit", "relax", "shake", "relax"]
+    assert lines[0].split()[:6] == ["phase", "t", "[s]", "smarticles", "φ", "±"]
+    assert lines[1] == f"{run}:"
+    assert [line.split()[0] for line in lines[2:6]] == ["deposit", "relax", "shake", "relax"]
+    # Known: φ before shaking is 0.105, and 12 smarticles take part.
+    assert lines[3].split()[2:4] == ["12", "0.1050"]
+
+
+def test_measure_names_each_definition_within_100_columns(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", frames_per_phase=1)]
+    for words in ([], ["--frames"]):
+        said = smarticles("measure", *runs, *words)
+        lines = said.out.splitlines()
+        assert max(map(len, lines[:1] + [line for line in lines[1:] if not line.startswith("/")])) <= 100
+        assert [line for line in lines if line.startswith("/")] == [f"{run}:" for run in runs]
+        told = " ".join(line.strip() for line in lines)
+        assert "φ by second-highest-com: N V_s / (π r² z), z = " in told
+        assert all(f"{name}: φ = " in told for name in ("top-percentile", "voxel", "voronoi"))
+        assert ("SE: their standard error" in told) == (not words)
 
 
 def test_measure_writes_a_table_of_several_runs(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -86,18 +105,18 @@ def test_render_refuses_a_time_for_a_film(tmp_path: Path, smarticles: Smarticles
 
 def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run, picture = write_run(tmp_path / "a"), tmp_path / "picture.png"
-    said = smarticles("render", run, "--output", picture, "--time", "1", "--color-by", "speed", "--view", "top")
+    said = smarticles("render", run, "--output", picture, "--time", "1", "--view", "top", "--size", "300")
     assert (said.status, said.out, said.err) == (0, f"{picture}\n", "")
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    with Image.open(picture) as image:
+        assert (image.format, image.size) == ("PNG", (300, 300))
     again = smarticles("render", run, "--output", picture)
     assert again.status == 2
     assert "--overwrite" in again.err or "exists" in again.err
 
 
 def test_render_help_names_all_it_can_do(smarticles: Smarticles) -> None:
-    render = pytest.importorskip("postprocess.render", reason="needs PyVista")
     text = smarticles("render", "--help").out
-    assert all(name in text for name in [*render.COLOURINGS, *render.VIEWS])
+    assert all(name in text for name in [*COLOURINGS, *VIEWS])
 
 
 def test_columns() -> None:
@@ -109,3 +128,4 @@ def test_columns() -> None:
         "b         -",
     ]
     assert columns(["a", "b"], []) == "a  b"
+    assert columns(["φ"], [[Cell("0.10")], [Cell("-")]]).splitlines() == ["   φ", "0.10", "   -"]

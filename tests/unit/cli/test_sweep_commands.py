@@ -191,3 +191,64 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     assert "1 of 9 runs are missing: lw1.00_seed3: " in said.err.splitlines()[-1]
     missing = (results / "missing.csv").read_text(encoding="utf-8")
     assert "lw1.00_seed3" in missing
+    # The quick analysis leaves out what takes seconds per run.
+    header = (results / "runs.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "phi_f voxel [-]" in header
+    assert "voronoi" not in header
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--quick"], "study sensitivity has no quick variant; leave --quick out"),
+        (
+            ["--fidelity", "reference"],
+            "--fidelity reference: study sensitivity compares variants of one fidelity; leave",
+        ),
+    ],
+)
+def test_what_a_study_does_not_have_is_refused(
+    words: list[str], message: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    said = smarticles("study", "sensitivity", *words, "--out", tmp_path / "out")
+    assert said.status == 2
+    assert said.err.startswith(f"smarticles: error: {message}")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("study", ["sensitivity", "sensitivity-section"])
+def test_a_study_of_sensitivity_is_analysed(
+    study: str, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "study"
+    points = expand(load_sweep(study_file(study)))
+    smarticles("sweep", study_file(study), "--out", out)
+    variants = list(dict.fromkeys(point.values["variant"] for point in points))
+    for point in points:
+        # φ after shaking: 0.100 of all variants but the last one, which has 0.130.
+        after = (0.130 if point.values["variant"] == variants[-1] else 0.100) * (1 + 0.002 * point.values["seed"])
+        run = write_run(
+            out / "runs" / point.name,
+            seed=point.values["seed"],
+            count=6,
+            frames_per_phase=1,
+            phases=("deposit", "relax", "shake"),
+            packing=(0.1, 0.1, after),
+        )
+        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        manifest["scene_sha256"] = point.scene_sha256
+        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    said = smarticles("study", study, "--out", out)
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0] == "the full study as shipped"
+    assert lines[1].split()[:3] == ["variant", "seeds", "phi_0"]
+    table = lines[2 : 2 + len(variants)]
+    assert [line.split()[0] for line in table] == variants
+    assert [("+30.0 ± " in line and " *" in line) for line in table] == [False] * (len(variants) - 1) + [True]
+    assert "Changes are against draft; * beyond the error at 95 %." in lines
+    assert (out / "results" / "sensitivity.png").is_file()
+    assert f"Study {study}, fidelity draft: {len(points)} of {len(points)} runs" in (
+        out / "results" / "summary.csv"
+    ).read_text(encoding="utf-8")

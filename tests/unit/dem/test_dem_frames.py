@@ -16,9 +16,7 @@ from dem.frames import FrameWriter, frame_mesh
 from dem.particle import Boxes
 
 W, RATIO = 0.0117, 0.7
-BOXES = Boxes(
-    middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
-)
+BOXES = Boxes(middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
 COUNT = 5
 
 

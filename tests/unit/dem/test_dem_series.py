@@ -17,7 +17,9 @@ from dem.particle import Boxes
 from dem.series import SeriesWriter, packing_fraction
 
 RADIUS, G = 0.0234, 9.81
-BOXES = Boxes(middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
+BOXES = Boxes(
+    middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
+)
 
 
 @dataclass

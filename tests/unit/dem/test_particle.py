@@ -44,7 +44,14 @@ def own_vertices(ratio: float, angles: tuple[float, float]) -> np.ndarray:
     a1, a2 = np.radians(angles)
     left, right = np.array([-W / 2, 0.0]), np.array([W / 2, 0.0])
     l = ratio * W  # noqa: E741
-    return np.array([left + l * np.array([-np.cos(a1), np.sin(a1)]), left, right, right + [l * np.cos(a2), l * np.sin(a2)]])
+    return np.array(
+        [
+            left + l * np.array([-np.cos(a1), np.sin(a1)]),
+            left,
+            right,
+            right + np.array([l * np.cos(a2), l * np.sin(a2)]),
+        ]
+    )
 
 
 def in_body_frame(boxes: Boxes, ratio: float, angles: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
+from dem.engine import Cylinder
 from dem.errors import RunError
 from dem.particle import Boxes, Particle, SphereChain
 from dem.placement import Poses, place_layer
@@ -16,7 +17,11 @@ NOTHING = np.empty((0, 3))
 
 def make_particle(ratio: float = 0.7) -> Particle:
     boxes = Boxes(
-        middle_length=0.0117, barb_length=ratio * 0.0117, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
+        middle_length=0.0117,
+        barb_length=ratio * 0.0117,
+        thickness_normal=1.27e-3,
+        thickness_in_plane=0.5e-3,
+        density=7850,
     )
     return Particle(boxes, SphereChain(rows=1, diameter=1.2e-3, pitch=1.2e-3))
 
@@ -43,15 +48,15 @@ def test_no_two_smarticles_overlap_nor_the_wall(ratio: float, count: int) -> Non
     assert placed[..., 2].min() - particle.radius >= BOTTOM * (1 - 1e-9)
 
 
-@pytest.mark.parametrize(
-    "facets",
-    [64, pytest.param(16, marks=pytest.mark.xfail(strict=True, reason="the flat wall of few facets is nearer: dem.placement"))],
-)
+@pytest.mark.parametrize("facets", [64, 16])
 def test_no_smarticle_overlaps_the_flat_facets_of_the_wall(facets: int) -> None:
-    # Engine._add_container: a polygon of the circle's area. The middle of its sides is nearer than the radius.
+    # The wall is a polygon of the circle's area; the middle of its sides is nearer than the radius.
+    cylinder = Cylinder(radius=RADIUS, height=1.0, facets=facets)
     inner = RADIUS * np.sqrt(2 * np.pi / (facets * np.sin(2 * np.pi / facets))) * np.cos(np.pi / facets)
     particle = make_particle()
-    placed = np.concatenate([spheres(particle, place(particle, count=12, seed=seed)) for seed in range(12)])
+    placed = np.concatenate(
+        [spheres(particle, place(particle, count=12, seed=seed, radius=cylinder.inner_radius)) for seed in range(12)]
+    )
     assert np.hypot(placed[..., 0], placed[..., 1]).max() + particle.radius < inner
 
 

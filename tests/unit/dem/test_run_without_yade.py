@@ -80,7 +80,6 @@ def test_engine_that_stops_early_is_a_run_error() -> None:
     assert str(caught.value) == "YADE stopped at step 7 of 10 (t = 0.0000 s); see its message above"
 
 
-@pytest.mark.xfail(strict=True, reason="YADE takes a run of 0 steps for one without end: Engine.advance(0) hangs")
 def test_no_steps_are_no_run() -> None:
     omega = Omega()
     make_engine(omega).advance(0)

@@ -13,15 +13,13 @@ from dem.errors import InputError
 from postprocess import gravish_answers, gravish_figures
 from postprocess.gravish import analyse_gravish
 from postprocess.gravish_answers import (
-    DEFINITION,
-    DIGITISING_ERROR,
     answers,
     deviations_from_reference,
-    mean_over_seeds,
-    read_reference,
     steps_between_ratios,
     summarise_runs,
 )
+from postprocess.gravish_reference import DIGITISING_ERROR, read_reference
+from postprocess.study_runs import DEFINITION
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
 CHEAP = (DEFINITION, "top-percentile")
@@ -60,35 +58,6 @@ def judged(levels, spread=SPREAD):
 MONOTONE = "Does phi_0 fall monotonically with l/w within error bars?"
 GAIN = "Is phi_f above phi_0 at every l/w?"
 CLOSE = "Is the mean absolute deviation of phi_f from Gravish at most 10 %?"
-
-
-# Statistics
-
-
-def test_half_width_is_student_t():
-    # t(0.975; 2) = 4.302653 and t(0.975; 1) = 12.706205, from printed tables.
-    mean = mean_over_seeds([1.0, 2.0, 4.0])
-    error = math.sqrt(((4 / 3) ** 2 + (1 / 3) ** 2 + (5 / 3) ** 2) / 2 / 3)
-    assert (mean.value, mean.count) == (pytest.approx(7 / 3), 3)
-    assert mean.standard_error == pytest.approx(error)
-    assert mean.half_width == pytest.approx(4.302653 * error)
-    assert mean_over_seeds([1.0, 3.0]).half_width == pytest.approx(12.706205)
-
-
-def test_half_width_covers_the_truth_as_often_as_it_says():
-    random = np.random.default_rng(5)
-    means = [mean_over_seeds(random.normal(1.0, 0.1, 3)) for _ in range(2000)]
-    covered = np.mean([abs(mean.value - 1.0) < mean.half_width for mean in means])
-    # Standard error of the share: 0.005. The normal distribution's 1.96 would cover 0.81.
-    assert covered == pytest.approx(0.95, abs=0.015)
-
-
-def test_one_seed_has_no_error_and_none_has_no_mean():
-    alone = mean_over_seeds([0.1, math.nan])
-    assert (alone.value, alone.count) == (0.1, 1)
-    assert math.isnan(alone.standard_error)
-    assert math.isnan(alone.half_width)
-    assert math.isnan(mean_over_seeds([]).value)
 
 
 # The reference

@@ -48,6 +48,19 @@ def test_mean_of_few_samples():
     assert mean_with_error([2.0, 2.0, 2.0]).standard_error == 0
 
 
+@pytest.mark.parametrize(
+    ("samples", "value"),
+    [([1.0, np.inf, 2.0], np.inf), ([np.inf], np.inf), ([-np.inf, 1.0, np.nan], -np.inf), ([np.inf, -np.inf], np.nan)],
+)
+def test_infinite_samples_have_an_infinite_mean_without_an_error(samples, value):
+    """Warnings are errors here: none may come of it."""
+    mean = mean_with_error(samples)
+    assert mean.value == pytest.approx(value, nan_ok=True)
+    assert np.isnan(mean.standard_error)
+    assert np.isnan(mean.effective_count)
+    assert mean.count == np.count_nonzero(~np.isnan(samples))
+
+
 def test_one_row_per_frame_with_every_measure(make_run):
     directory = make_run()
     table = measure_run(directory)

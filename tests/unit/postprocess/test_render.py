@@ -11,10 +11,12 @@ from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, wri
 
 from dem.errors import InputError, RunError
 from postprocess import figures, film
+from postprocess.camera import VIEWS, Look, extent, fitted_camera
 from postprocess.colouring import COLOURINGS, ColourScale
 from postprocess.frames import read_frames
 from postprocess.manifest import read_run
-from postprocess.render import VIEWS, _extent, _fitted_camera, _Look, link_boxes, render_film, render_run
+from postprocess.render import render_film, render_run
+from postprocess.stage import link_boxes
 
 SIZE = (240, 240)
 
@@ -97,10 +99,10 @@ def test_mesh_refuses_flat_boxes():
 def test_camera_sees_everything_and_stands_no_further_than_needed(tmp_path, view, packing):
     scene = SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(packing,))
     directory = write_run(tmp_path, scene)
-    look = _Look.checked(color_by="id", size=SIZE, view=view)
-    points = _extent(read_frames(directory)[0], read_run(directory), look)
+    look = Look.checked(color_by="id", size=SIZE, view=view)
+    points = extent(read_frames(directory)[0], read_run(directory), look)
     right, up, forward = look.axes
-    position, focus = _fitted_camera(points, look.axes, 1.3)
+    position, focus = fitted_camera(points, look.axes, 1.3)
     assert np.cross(focus - position, forward) == pytest.approx(0, abs=1e-6 * np.linalg.norm(focus - position))
     depth = (points - position) @ forward
     edge = np.tan(np.radians(11))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import templates
 from dem.errors import InputError
-from dem.parts import Deposit, Relax, Shake
+from dem.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
 from templates.expand import Point, expand
 from templates.study import differences, study_file, study_names
 from templates.sweep import load_sweep
@@ -71,6 +73,40 @@ def test_an_unknown_study_is_an_input_error() -> None:
     assert "gravish" in study_names()
     with pytest.raises(InputError, match=r"'gravitsh' does not exist; did you mean 'gravish'\?"):
         study_file("gravitsh")
+
+
+def test_a_study_without_a_quick_variant_says_so() -> None:
+    with pytest.raises(InputError, match="study sensitivity has no quick variant; leave --quick out"):
+        study_file("sensitivity", quick=True)
+
+
+@pytest.mark.parametrize(
+    ("study", "choices"),
+    [
+        ("sensitivity", {"draft": 0, "diameter-1.27mm": 1, "friction-0.6": 2}),  # friction of smarticles and of walls
+        ("sensitivity-section", {"draft": 0, "pitch-0.5": 1, "two-rows": 2}),  # rows and pitch
+    ],
+)
+def test_variants_differ_from_the_draft_in_their_choice_alone(study: str, choices: dict[str, int]) -> None:
+    found = expand(load_sweep(study_file(study)))
+    assert found[0].name == "draft_seed1"
+    # The file writes the draft out: the two must stay the same.
+    assert found[0].scene.fidelity == Fidelity(base="draft", **FIDELITIES["draft"])
+    assert {point.scene.smarticle.aspect_ratio for point in found} == {0.7}
+    for point in found:
+        variant = str(point.values["variant"])
+        twin = next(p for p in found if p.values["variant"] == "draft" and p.scene.seed == point.scene.seed)
+        here, there = (flat(p.scene.model_dump()) for p in (point, twin))
+        changed = {key for key in here if here[key] != there[key]}
+        assert len(changed) == choices.get(variant, 1), (variant, changed)
+        assert all(key.startswith(("fidelity.", "contact.")) for key in changed)
+
+
+def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return found
 
 
 def test_every_data_file_of_a_study_is_named_in_its_readme() -> None:

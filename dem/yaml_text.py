@@ -1,0 +1,84 @@
+"""YAML read strictly: the one reader of scenes, sweeps and templates."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from dem.errors import InputError
+
+# YAML 1.1 takes 1e-3 and 5E2 for text; everyone who writes them means numbers, as YAML 1.2 does.
+_FLOAT = re.compile(
+    r"""[-+]?(?:[0-9][0-9_]*\.[0-9_]*(?:[eE][-+]?[0-9]+)?
+        |[0-9][0-9_]*[eE][-+]?[0-9]+
+        |\.[0-9][0-9_]*(?:[eE][-+]?[0-9]+)?
+        |\.(?:inf|Inf|INF)
+        |\.(?:nan|NaN|NAN))\Z""",
+    re.VERBOSE,
+)
+# YAML 1.1 reads 1:30 as 90 and 010 as 8; here both are text, which no number's key takes.
+_INT = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)\Z")
+_OWN = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
+
+
+class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no types
+    """SafeLoader that refuses a key given twice and reads `1e-3` as a number."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Build a mapping; a repeated key is an error, not the last one's victory."""
+        if isinstance(node, yaml.MappingNode):
+            self.flatten_mapping(node)
+            seen: set[Any] = set()
+            for key_node, _ in node.value:
+                key = self.construct_object(key_node, deep=True)
+                try:
+                    repeated = key in seen
+                    seen.add(key)
+                except TypeError:
+                    problem = f"a key must be plain text or a number: got {key!r}"
+                    raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark) from None
+                if repeated:
+                    problem = f"key {key!r} is given twice; keep one of the two"
+                    raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
+        return mapping
+
+
+StrictLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _OWN]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+StrictLoader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+.0123456789"))
+StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+0123456789"))
+
+
+def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
+    """What a YAML text says.
+
+    Args:
+        text: the YAML.
+        source: what error messages call it.
+        loader: the loader class.
+
+    Raises:
+        InputError: the text is not YAML; the message names the line.
+    """
+    try:
+        # A SafeLoader underneath: no Python objects can be made.
+        return yaml.load(text, Loader=loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        msg = f"{source}{where}: not valid YAML: {error.problem or error.context}; correct this line"
+        raise InputError(msg) from error
+    except yaml.YAMLError as error:
+        msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
+        raise InputError(msg) from error
+    except ValueError as error:
+        msg = f"{source}: not valid YAML: {error}; correct the file"  # a date that does not exist
+        raise InputError(msg) from error
+    except RecursionError as error:
+        msg = f"{source}: nested too deeply to read; make the file flatter"
+        raise InputError(msg) from error

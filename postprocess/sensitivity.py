@@ -1,0 +1,266 @@
+"""The studies of sensitivity: what φ before and after shaking owes to each choice of the contact model.
+
+Each variant differs from the first one, the baseline, in one choice. Runs are named
+`VARIANT_seedN`. A change is clear where it is beyond its own 95 % half-width, by Welch.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+import pandas as pd
+
+from dem.errors import InputError
+from postprocess import sensitivity_figure
+from postprocess.gravish_reference import read_reference, reference_at
+from postprocess.manifest import RunManifest
+from postprocess.origin import (
+    closing_lines,
+    make_folder,
+    markdown_ending,
+    missing_table,
+    told_count,
+    write_provenance,
+    write_tables,
+    write_text,
+)
+from postprocess.seeds import Difference, SeedMean, difference, mean_over_seeds
+from postprocess.study_runs import (
+    ASPECT,
+    DEFINITION,
+    SEED,
+    SEEDS,
+    WHEN,
+    MissingRun,
+    collect_runs,
+    measured_row,
+    refuse_mixture,
+    refuse_repeats,
+    runs_table,
+    told_bars,
+    told_seeds,
+    told_shaken,
+)
+
+VARIANT = "variant"
+
+COMPARED: Mapping[str, str] = MappingProxyType(
+    {
+        "phi_0": f"phi_0 {DEFINITION}",
+        "phi_f": f"phi_f {DEFINITION}",
+        "crossings after": "crossings after",
+    }
+)
+"""What is compared with the baseline: its name here, and its column in the table of runs less the unit."""
+
+_RUN_NAME = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SensitivityReport:
+    """Tables and files of the study.
+
+    Attributes:
+        baseline: Variant that the others are compared with.
+        runs: One row per finished run.
+        summary: One row per variant, in the order given: means over seeds with errors, and changes
+            against the baseline; NaN without a finished run.
+        missing: Runs that were given and are not in the tables.
+        footer: What figure and tables say about their origin, one statement each.
+        files: Everything that was written, by name.
+    """
+
+    baseline: str
+    runs: pd.DataFrame = field(repr=False)
+    summary: pd.DataFrame = field(repr=False)
+    missing: tuple[MissingRun, ...]
+    footer: tuple[str, ...] = field(repr=False)
+    files: Mapping[str, Path] = field(repr=False)
+
+
+def analyse_sensitivity(
+    run_dirs: Sequence[Path | str], output: Path | str, *, study: str = "sensitivity", note: str, command: str
+) -> SensitivityReport:
+    """Measures the runs of the study and writes its tables and its figure.
+
+    Runs that are not done, or cannot be read, are listed as missing. Files of an earlier analysis
+    in the same folder are replaced.
+
+    Args:
+        run_dirs: Run directories named `VARIANT_seedN`; the first one's variant is the baseline.
+        output: Folder for the results; made if needed.
+        study: Name of the study.
+        note: How these runs differ from the full study; stands in the footer.
+        command: Command line to state as the origin.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: No run is done, a run is given twice, the runs differ in fidelity, aspect ratio
+            or number of smarticles, or the output is no folder.
+    """
+    output = make_folder(output)
+    manifests, rows, missing = collect_runs(study, run_dirs, _row)
+    refuse_mixture(study, manifests, "l/w", lambda run: f"{run.aspect_ratio:g}")
+    refuse_mixture(study, manifests, "count", lambda run: f"{run.count} smarticles")
+    refuse_repeats(study, manifests, VARIANT, lambda run: _named(run.directory)[0])
+    runs = runs_table(rows)
+    variants = _variants(run_dirs)
+    summary = summarise_variants(runs, variants)
+    aspect = manifests[0].aspect_ratio
+    reference = {stage: reference_at(read_reference(), aspect, stage) for stage in ("phi_0", "phi_f")}
+    footer = _footer(study, manifests, runs, missing, baseline=variants[0], note=note, command=command)
+    written = write_tables(output, {"runs": runs, "summary": summary, "missing": missing_table(missing)}, footer)
+    title = f"Study {study}: packing at l/w = {aspect:g}"
+    text = _markdown(title, summary, reference, missing, footer)
+    written["summary.md"] = write_text(text, output / "summary.md")
+    written["provenance.json"] = write_provenance(
+        output / "provenance.json",
+        study=study,
+        manifests=manifests,
+        missing=missing,
+        footer=footer,
+        note=note,
+        command=command,
+    )
+    drawn = sensitivity_figure.draw(
+        output / "sensitivity", runs=runs, summary=summary, reference=reference, footer=footer
+    )
+    written |= {path.name: path for path in drawn}
+    return SensitivityReport(
+        baseline=variants[0],
+        runs=runs,
+        summary=summary,
+        missing=missing,
+        footer=footer,
+        files=MappingProxyType(written),
+    )
+
+
+def summarise_variants(runs: pd.DataFrame, variants: Sequence[str]) -> pd.DataFrame:
+    """One row per variant: means over seeds, and changes against the first variant.
+
+    Args:
+        runs: Table of runs, see `SensitivityReport.runs`.
+        variants: In the order wanted; one without runs has NaN.
+
+    Returns:
+        The table; `… 95 % [-]` are half-widths, `… change [%]` and its half-width `… change 95 %
+        [%]` are relative to the baseline's mean, `… clear` says whether the change is beyond it.
+    """
+    groups = {variant: runs[runs[VARIANT] == variant] for variant in variants}
+    rows = []
+    for variant, group in groups.items():
+        row: dict[str, object] = {
+            VARIANT: variant,
+            SEEDS: len(group),
+            "seeds": " ".join(map(str, sorted(group[SEED]))),
+        }
+        for name, quantity in COMPARED.items():
+            column = f"{quantity} [-]"
+            mean, baseline = mean_over_seeds(group[column]), mean_over_seeds(groups[variants[0]][column])
+            row[column] = mean.value
+            row[f"{quantity} 95 % [-]"] = mean.half_width
+            change = None if variant == variants[0] else _relative(mean, baseline)
+            row[f"{name} change [%]"] = change.value if change else math.nan
+            row[f"{name} change 95 % [%]"] = change.half_width if change else math.nan
+            row[f"{name} clear"] = bool(change and change.clear)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _relative(mean: SeedMean, baseline: SeedMean) -> Difference:
+    """The change in per cent of the baseline's mean, which is itself taken as exact."""
+    change = difference(mean, baseline)
+    scale = 100 / baseline.value if baseline.value else math.nan
+    return Difference(value=scale * change.value, half_width=scale * change.half_width)
+
+
+def _named(directory: Path | str) -> tuple[str, int]:
+    """Variant and seed of a run, by the name of its directory.
+
+    Raises:
+        InputError: It is not named like a run of this study.
+    """
+    found = _RUN_NAME.fullmatch(Path(directory).name)
+    if found is None:
+        msg = f"{directory}: not a run of this study: its runs are named VARIANT_seedN, such as draft_seed1"
+        raise InputError(msg)
+    return found["variant"], int(found["seed"])
+
+
+def _row(run: RunManifest) -> dict[str, object]:
+    variant, seed = _named(run.directory)
+    if seed != run.seed:
+        msg = f"{run.directory}: its name says seed {seed}, run.json says {run.seed}; do not rename runs"
+        raise InputError(msg)
+    return {VARIANT: variant, **measured_row(run, [DEFINITION])}
+
+
+def _variants(run_dirs: Sequence[Path | str]) -> list[str]:
+    """All variants in the order given, those without a finished run among them."""
+    return list(dict.fromkeys(_named(path)[0] for path in run_dirs if _RUN_NAME.fullmatch(Path(path).name)))
+
+
+def _footer(
+    study: str,
+    manifests: Sequence[RunManifest],
+    runs: pd.DataFrame,
+    missing: Sequence[MissingRun],
+    *,
+    baseline: str,
+    note: str,
+    command: str,
+) -> tuple[str, ...]:
+    counts = runs.groupby(VARIANT, sort=False).size()
+    return (
+        f"{told_count(study, manifests, missing)}; l/w = {runs[ASPECT].iloc[0]:g}, {manifests[0].count} smarticles, "
+        f"{told_seeds(runs, counts, VARIANT)}; shaken for {told_shaken(runs)}.",
+        f"φ by {DEFINITION}; {WHEN}. {told_bars(counts, VARIANT)}.",
+        f"Changes are against the baseline {baseline}, their errors 95 % by Welch: where a choice changes nothing "
+        "at all, one change in twenty is still beyond its error.",
+        *closing_lines(manifests, note=note, command=command),
+    )
+
+
+def _markdown(
+    title: str,
+    summary: pd.DataFrame,
+    reference: Mapping[str, float],
+    missing: Sequence[MissingRun],
+    footer: Sequence[str],
+) -> str:
+    known = [f"{stage} = {value:.4f}" for stage, value in reference.items() if math.isfinite(value)]
+    parts = [f"# {title}", ""]
+    parts += [f"Gravish et al. 2012 at this l/w: {', '.join(known)}." if known else "Gravish has no point at this l/w."]
+    parts += ["Changes are against the first row; those beyond their error are bold.", ""]
+    parts += ["| variant | seeds | φ_0 | change % | φ_f | change % | ⟨N⟩ after | change % |", "| --- " * 8 + "|"]
+    for _, row in summary.iterrows():
+        cells = [str(row[VARIANT]), str(row[SEEDS])]
+        for name, quantity in COMPARED.items():
+            cells.append(told_value(row[f"{quantity} [-]"], row[f"{quantity} 95 % [-]"], name))
+            change = told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"])
+            cells.append(f"**{change}**" if row[f"{name} clear"] else change)
+        parts.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*parts, *markdown_ending(missing, footer)])
+
+
+def told_value(value: float, half_width: float, name: str) -> str:
+    """A mean with its half-width, as far as there are any; `name` is a key of `COMPARED`."""
+    digits = 4 if name.startswith("phi") else 2
+    if math.isnan(value):
+        return "-"
+    return f"{value:.{digits}f}" + (f" ± {half_width:.{digits}f}" if math.isfinite(half_width) else "")
+
+
+def told_change(change: float, half_width: float) -> str:
+    """A change with its half-width, both in per cent, as far as there are any."""
+    if math.isnan(change):
+        return "-"
+    return f"{change:+.1f}" + (f" ± {half_width:.1f}" if math.isfinite(half_width) else "")
