@@ -157,6 +157,7 @@ class Engine:
         self._clump_ids: list[int] = []
         self._to_body: Any = None
         self._smarticle_of: dict[int, int] = {}
+        self._smarticle_seconds = 0.0
         self._add_materials(law)
         self._add_container(cylinder)
         self._assemble(law, shaken=shaken)
@@ -244,7 +245,7 @@ class Engine:
         """
         self._omega.save(str(path))
         axes = [] if self._to_body is None else [self._to_body[k] for k in range(4)]
-        return {"clumps": self._clump_ids, "to_body": axes}
+        return {"clumps": self._clump_ids, "to_body": axes, "smarticle_seconds": self._smarticle_seconds}
 
     def load(self, path: Path, memory: Mapping[str, Any]) -> None:
         """Replace the simulation by a saved one of the same scene.
@@ -255,6 +256,7 @@ class Engine:
         """
         self._omega.load(str(path), quiet=True)
         self._clump_ids = list(memory["clumps"])
+        self._smarticle_seconds = memory["smarticle_seconds"]
         if memory["to_body"]:
             x, y, z, w = memory["to_body"]
             # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
@@ -326,6 +328,7 @@ class Engine:
             # Ctrl-C arrives here, while YADE's own thread is at work: let it finish its step.
             self._omega.pause()
             raise
+        self._smarticle_seconds += steps * self.time_step * self.count
         if self.steps != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
@@ -362,6 +365,11 @@ class Engine:
     def count(self) -> int:
         """Smarticles present."""
         return len(self._clumps)
+
+    @property
+    def gravity_impulse(self) -> float:
+        """What gravity has given to all smarticles, each since it was added [N s], downwards."""
+        return self._smarticle_seconds * self.particle.boxes.mass * self._gravity
 
     @property
     def floor(self) -> float:
@@ -419,9 +427,19 @@ class Engine:
         return force
 
     def unbalanced_force(self) -> float:
-        """Mean net force on a smarticle, gravity included, over the mean contact force [1]; 0 for a still pile."""
-        value = float(self._utils.unbalancedForce())
-        return value if math.isfinite(value) else math.inf
+        """Mean net force on a smarticle over its weight [1]: 0 for a still pile, 1 in free fall, inf when empty.
+
+        YADE's own measure leaves gravity out for a body whose contact forces are exactly zero or balance exactly, and
+        so calls a still pile unbalanced.
+        """
+        if not self._clump_ids or not self._gravity:
+            return math.inf
+        weight = self.particle.boxes.mass * self._gravity
+        total = 0.0
+        for clump in self._clump_ids:
+            x, y, z = self._omega.forces.f(clump)
+            total += math.sqrt(x * x + y * y + (z - weight) ** 2)
+        return total / (weight * len(self._clump_ids))
 
     def kinetic_energy(self, state: State) -> float:
         """Translational and rotational kinetic energy [J] of the smarticles in a state."""

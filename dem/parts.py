@@ -235,12 +235,11 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
 
 
 class Settle(Part):
-    """When a pile counts as settled: both hold at the same check."""
+    """When a pile counts as settled: all hold at every look over a stretch of time."""
 
     speed_m_per_s: float = Field(0.02, gt=0, description="largest speed of any smarticle [m/s]")
-    unbalanced_force: float = Field(
-        0.05, gt=0, description="mean net force on a smarticle over the mean contact force [1]"
-    )
+    unbalanced_force: float = Field(0.05, gt=0, description="mean net force on a smarticle over its weight [1]")
+    hold_s: float = Field(0.05, ge=0, description="how long both must hold [s]")
     timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
 
 

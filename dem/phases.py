@@ -89,8 +89,15 @@ class Pouring:
         self._phase = phase
         self._scene = scene
         rng = np.random.default_rng(derive_seed(scene.seed, "deposit"))
-        # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile.
-        self.memory: Memory = {"left": scene.count, "layer": 0, "waited": 0.0, "random": rng.bit_generator.state}
+        # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile;
+        # `still` [s] that the pile has been.
+        self.memory: Memory = {
+            "left": scene.count,
+            "layer": 0,
+            "waited": 0.0,
+            "still": 0.0,
+            "random": rng.bit_generator.state,
+        }
 
     def proceed(self, engine: Engine) -> float:
         """See `Stage.proceed`."""
@@ -128,7 +135,9 @@ class Pouring:
         settle: Settle = self._phase.settle
         speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
         unbalanced = engine.unbalanced_force()
-        if speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force:
+        still = speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force
+        self.memory["still"] = self.memory["still"] + CHECK_INTERVAL if still else 0.0
+        if self.memory["still"] > settle.hold_s:
             return True
         if self.memory["waited"] > settle.timeout_s:
             msg = (

@@ -125,6 +125,11 @@ def _run(
             _keep_series(simulation)
         mark_failed(out, status=status, cause=cause, time=simulation.engine.time if simulation else 0.0)
         raise
+    except Exception as error:
+        # A defect of ours: the run directory must still say that the run has ended.
+        log.exception("unexpected error")
+        mark_failed(out, status="failed", cause=f"unexpected {type(error).__name__}: {error}", time=0.0)
+        raise
     finally:
         bar.finish()
     return RunOutcome(out, engine.time, engine.steps, simulation.wall)
@@ -215,7 +220,7 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         default=0.0,
     )
     return Recorder(
-        series=SeriesWriter(out, radius, gravity, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
+        series=SeriesWriter(out, radius, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
         frames=FrameWriter(out),
         watchdog=Watchdog(radius=radius, height=height, speed=SPEED_MARGIN * max(fall, shaking)),
         progress=progress,

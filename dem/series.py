@@ -31,7 +31,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "com_height_m": ("m", "mean height of the centres of mass above the floor"),
     "kinetic_energy_J": ("J", "translational and rotational kinetic energy of the smarticles"),
     "max_speed_m_per_s": ("m/s", "largest speed of a centre of mass"),
-    "unbalanced_force": ("1", "mean net force on a smarticle over the mean contact force"),
+    "unbalanced_force": ("1", "mean net force on a smarticle over its weight"),
     "packing_fraction": (
         "1",
         "N V_s / (pi r² z), z the second-highest centre of mass above the floor",
@@ -60,16 +60,14 @@ class SeriesWriter:
     Args:
         folder: the run directory.
         radius: of the container [m].
-        gravity: g [m/s²].
         attributes: root attributes: scene hash, seed.
     """
 
     folder: Path
     radius: float
-    gravity: float
     attributes: dict[str, Any]
     _rows: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in COLUMNS})
-    _before: tuple[float, NDArray[np.float64]] | None = None
+    _before: tuple[float, float, NDArray[np.float64]] | None = None
 
     def sample(self, engine: Engine, state: State, phase: int) -> float:
         """Take one sample.
@@ -98,22 +96,22 @@ class SeriesWriter:
         return phi
 
     def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
-        # What the container received is what the smarticles lost to it: -(ΔP/Δt) - M g ẑ. Exact over any interval,
-        # where a sampled contact force would alias the shaking and miss the impacts between samples. Smarticles are
-        # added at rest, so a layer that was poured in between brings no momentum; its weight acts since it is there.
-        time, before = engine.time, self._before
-        self._before = (time, momentum)
+        # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
+        # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
+        # Smarticles are added at rest, so a layer that was poured in between brings no momentum.
+        time, impulse, before = engine.time, engine.gravity_impulse, self._before
+        self._before = (time, impulse, momentum)
         if before is None or time <= before[0]:
             return np.full(3, math.nan)
-        weight = np.array([0.0, 0.0, engine.particle.boxes.mass * engine.count * self.gravity])
-        mean: NDArray[np.float64] = -(momentum - before[1]) / (time - before[0]) - weight
+        lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
+        mean: NDArray[np.float64] = lost / (time - before[0])
         return mean
 
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns."""
         before = self._before
-        return {"before": None if before is None else [before[0], before[1].tolist()]}
+        return {"before": None if before is None else [before[0], before[1], before[2].tolist()]}
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -123,7 +121,7 @@ class SeriesWriter:
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Go on from where `memory` and `columns` were taken."""
         before = memory["before"]
-        self._before = None if before is None else (before[0], np.array(before[1]))
+        self._before = None if before is None else (before[0], before[1], np.array(before[2]))
         self._rows = {name: list(columns[name]) for name in COLUMNS}
 
     def write(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import signal
 import time
 from collections.abc import Mapping
@@ -11,11 +12,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dem.checkpoint import Checkpoint, write_checkpoint
+from dem.checkpoint import CURRENT, Checkpoint, write_checkpoint
 from dem.engine import Engine
+from dem.errors import RunError
 from dem.phases import Stage, begin
 from dem.recorder import Recorder
 from dem.scene import Scene, scene_hash
+
+SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
 
 
 class StopRequestedError(Exception):
@@ -119,6 +123,7 @@ class Simulation:
 
     def _checkpoint(self) -> None:
         saved = self.folder / ".engine.partial.yade"
+        self._check_space()
         try:
             memory = self.engine.save(saved)
             content = saved.read_bytes()
@@ -141,6 +146,18 @@ class Simulation:
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
             raise StopRequestedError(msg)
+
+    def _check_space(self) -> None:
+        # YADE does not notice a full disk when it saves, and would then load what it could not write.
+        newest = self.folder / CURRENT
+        needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
+        free = shutil.disk_usage(self.folder).free
+        if free < needed:
+            msg = (
+                f"{self.folder}: {free / 2**20:.1f} MiB free, a checkpoint needs {needed / 2**20:.1f} MiB; "
+                "free space and go on with --resume"
+            )
+            raise RunError(msg)
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go on from a checkpoint."""

@@ -194,10 +194,6 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
     assert rows["max_speed_m_per_s"][shaken].max() > 0.05
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a layer poured between two samples is charged with its weight for all of the interval: dem.series",
-)
 def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
     rows, mass = series(out), cases.load(data).smarticle.boxes.mass

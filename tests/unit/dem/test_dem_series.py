@@ -32,6 +32,12 @@ class Double:
     container_velocity: float = 0.0
     unbalanced: float = 0.25
     particle: Any = field(default_factory=lambda: SimpleNamespace(boxes=BOXES))
+    smarticle_seconds: float | None = None
+
+    @property
+    def gravity_impulse(self) -> float:
+        seconds = self.count * self.time if self.smarticle_seconds is None else self.smarticle_seconds
+        return BOXES.mass * G * seconds
 
     def unbalanced_force(self) -> float:
         return self.unbalanced
@@ -49,7 +55,7 @@ def make_state(heights: list[float], velocities: list[list[float]] | None = None
 
 
 def make_writer(folder: Path) -> SeriesWriter:
-    return SeriesWriter(folder, RADIUS, G, {"scene_sha256": "abc", "seed": 7})
+    return SeriesWriter(folder, RADIUS, {"scene_sha256": "abc", "seed": 7})
 
 
 def read(folder: Path) -> dict[str, np.ndarray]:

@@ -129,7 +129,7 @@ from dem.errors import RunError
 from dem.series import SeriesWriter
 
 def write(length):
-    writer = SeriesWriter(Path(sys.argv[1]), 0.0234, 9.81, {"seed": 1})
+    writer = SeriesWriter(Path(sys.argv[1]), 0.0234, {"seed": 1})
     for name, rows in writer._rows.items():
         rows += [np.zeros(3) if name == "container_force_N" else 0.0] * length
     writer.write()
