@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import random
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from processes import TIMEOUT_S, complete, differing, finish, frame_times, results, start
 
 INTERVAL_S = 0.04  # between checkpoints
 FRAME_S = 0.02
@@ -31,51 +30,12 @@ phases:
   - {{{{type: relax, duration_s: 0.1}}}}
   - {{{{type: shake, duration_s: 0.2}}}}
 """
-TIMEOUT_S = 120.0  # for one process; it needs 3 s on a free core
-
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]  # skipped where there is no YADE
 
 
 def write_scene(path: Path, seed: int) -> Path:
     path.write_text(SCENE.format(seed=seed))
     return path
-
-
-def start(scene: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "cli", "run", str(scene), "--out", str(out)]
-    if (out / "run.json").exists():
-        command.append("--resume")
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
-    _, said = process.communicate(timeout=TIMEOUT_S)
-    return process.returncode, said
-
-
-def complete(scene: Path, out: Path) -> str:
-    """Run to the end; what was said on the way."""
-    status, said = finish(start(scene, out))
-    assert status == 0, said
-    assert (out / "done.json").exists()
-    return said
-
-
-def results(out: Path) -> dict[str, bytes]:
-    files = [out / "frames.pvd", out / "series.h5", *sorted((out / "frames").iterdir())]
-    return {str(path.relative_to(out)): path.read_bytes() for path in files}
-
-
-def differing(one: dict[str, bytes], other: dict[str, bytes]) -> list[str]:
-    return sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
-
-
-def frame_times(out: Path) -> list[float]:
-    try:
-        return [float(value) for value in re.findall(r'timestep="([^"]+)"', (out / "frames.pvd").read_text())]
-    except FileNotFoundError:
-        return []
 
 
 def log_of(out: Path) -> str:
