@@ -48,7 +48,7 @@ schema_version = 1
 name = "here"
 scheduler = "slurm"
 max_array_size = 1001
-signal_lead_s = 20
+signal_lead_s = 40
 default_partition = "only"
 [partitions.only]
 cores_per_node = 6
@@ -114,8 +114,10 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP), ("here.toml", CLUSTER)):
         (place / name).write_text(text)
     out = place / "out"
-    request = ("--runs-per-task", "1", "--memory", "900", "--time", "1")
-    said = smarticles("sweep", place / "sweep.yaml", "--out", out, "--submit", "slurm", *request, "--cluster", place / "here.toml")
+    request = ("--runs-per-task", "1", "--memory", "900", "--time", "2")
+    said = smarticles(
+        "sweep", place / "sweep.yaml", "--out", out, "--submit", "slurm", *request, "--cluster", place / "here.toml"
+    )
     record = json.loads((out / "jobs/001/job.json").read_text())
     assert f"job {record['job_id']}: 6 of 6 runs, 6 tasks of 1 run" in said
     assert sorted(record["runs"]) == ["a", "b", "c", "d", "fails", "long"]
@@ -126,15 +128,20 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     log = out / "jobs" / "001" / f"{task}.txt"
     wait_until(lambda: "queued again" in log.read_text(), log.read_text)
     assert "ended by USR1" in log.read_text()
+    others = {**dict.fromkeys(["a", "b", "c", "d"], "done"), "fails": "failed"}
+    wait_until(lambda: {**states(smarticles, out), **others} == states(smarticles, out), lambda: "the others not done")
     assert states(smarticles, out)["long"] in ("queued", "running")
-    assert "nothing to submit" in smarticles("resume", out, "--submit", "slurm")
+    # What failed has no result; what waits in the queue is left there.
+    assert ": 1 of 6 runs, 1 tasks of 1 run" in smarticles("resume", out, "--submit", "slurm", *request)
+    assert (out / "jobs/002/runs.txt").read_text() == "fails\n"
     stopped = json.loads((out / "runs/long/failed.json").read_text())
     assert (stopped["status"], "stopped as requested" in stopped["cause"]) == ("interrupted", True)
     # Slurm lets two minutes pass before it starts a task again.
-    wait_until(lambda: "PENDING" in slurm.call("squeue", "--noheader", "--format=%T"), log.read_text)
-    slurm.call("scontrol", "update", f"JobId={record['job_id']}_{task}", "StartTime=now")
+    label = f"{record['job_id']}_{task}"
+    wait_until(lambda: "PENDING" in slurm.call("squeue", "--noheader", f"--jobs={label}", "--format=%T"), log.read_text)
+    slurm.call("scontrol", "update", f"JobId={label}", "StartTime=now")
 
-    expected = {**dict.fromkeys(["a", "b", "c", "d", "long"], "done"), "fails": "failed"}
+    expected = {**others, "long": "done"}
     wait_until(lambda: states(smarticles, out) == expected, lambda: f"{states(smarticles, out)}: {log.read_text()}")
     assert "resumed from the checkpoint" in (out / "runs/long/log.txt").read_text()
     complete(out / "scenes" / "long.yaml", tmp_path / "whole")
@@ -147,10 +154,10 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     assert states(smarticles, out) == {**expected, "b": "missing"}
     said = smarticles("resume", out, "--submit", "slurm", *request)
     assert ": 2 of 6 runs, 2 tasks of 1 run" in said
-    assert sorted((out / "jobs/002/runs.txt").read_text().split()) == ["b", "fails"]
+    assert sorted((out / "jobs/003/runs.txt").read_text().split()) == ["b", "fails"]
     wait_until(lambda: states(smarticles, out) == expected, lambda: str(states(smarticles, out)))
     assert differing(results(out / "runs" / "b"), before) == []
-    assert (out / "runs" / "fails.stopped-1" / "failed.json").exists()
+    assert (out / "runs" / "fails.stopped-2" / "failed.json").exists()
 
 
 def test_a_refused_job_is_reported_and_nothing_is_lost(
@@ -158,7 +165,9 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
 ) -> None:
     for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP)):
         (tmp_path / name).write_text(text)
-    (tmp_path / "here.toml").write_text(CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent"))
+    (tmp_path / "here.toml").write_text(
+        CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent")
+    )
     command = [sys.executable, "-m", "cli", "sweep", str(tmp_path / "sweep.yaml"), "--out", str(tmp_path / "out")]
     command += ["--submit", "slurm", "--cluster", str(tmp_path / "here.toml")]
     done = subprocess.run(command, env=slurm.environment, capture_output=True, text=True, check=False)
@@ -167,6 +176,8 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
     assert "invalid partition specified: absent" in done.stderr
     assert json.loads((tmp_path / "out/jobs/001/job.json").read_text())["job_id"] is None
     (tmp_path / "here.toml").write_text(CLUSTER)
-    said = smarticles("resume", tmp_path / "out", "--submit", "slurm", "--cluster", tmp_path / "here.toml", "--memory", "900")
+    said = smarticles(
+        "resume", tmp_path / "out", "--submit", "slurm", "--cluster", tmp_path / "here.toml", "--memory", "900"
+    )
     assert "6 of 6 runs, 1 tasks of 6 runs" in said
     wait_until(lambda: set(states(smarticles, tmp_path / "out").values()) == {"done", "failed"}, lambda: "not done")

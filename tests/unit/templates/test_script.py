@@ -21,7 +21,7 @@ from templates.script import job_name, render_script
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden"
 PLAIN = "/home/user/sweeps/friction"
-HOSTILE = "/home/us er/it's \"$HOME\" `id` & \\n #; *"
+HOSTILE = '/home/us er/it\'s "$HOME" `id` & \\n #; *'
 HOUR = 3600.0
 
 CASES = {
