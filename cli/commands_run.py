@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli.parsing import Commands, Parser, add_json
+from cli.stopping import TO_BE_CONTINUED
 
 
 def add(commands: Commands) -> None:
@@ -21,8 +22,9 @@ def add(commands: Commands) -> None:
         text="""
 Pours, shakes and relaxes as the scene says. DIR gets the resolved scene, versions, a log, VTK
 frames (open DIR/frames.pvd in ParaView) and HDF5 series, and done.json at the end. Ctrl-C stops
-the run and leaves what was recorded whole; --resume goes on from the last checkpoint. A directory
-that holds something else is never touched.""",
+the run and leaves what was recorded whole; --resume goes on from the last checkpoint. SIGUSR1, as a
+batch system sends before its time limit, ends the run at its next checkpoint with exit status 75. A
+directory that holds something else is never touched.""",
         examples="""\
   smarticles run scene.yaml --out runs/a
   smarticles run scene.yaml --out runs/b --set seed=2 --set phases.2.duration_s=5
@@ -108,6 +110,9 @@ def compute(
         settings: keys that differ from the file, `KEY=VALUE`.
         resume: go on in a run directory that holds an unfinished run.
 
+    Returns:
+        Exit status: 0, or 75 where SIGUSR1 stopped the run at a checkpoint.
+
     Raises:
         InputError: the scene is not valid, or the directory holds something else.
         RunError: the run failed.
@@ -123,7 +128,10 @@ def compute(
     place = shlex.quote(str(out))
     try:
         outcome = run.run_scene(scene, out, command=arguments.command_line, progress=sys.stderr.isatty(), resume=resume)
-    except (KeyboardInterrupt, StopRequestedError):
+    except StopRequestedError as stop:
+        print(f"smarticles: {stop}; to be continued: smarticles resume {place}", file=sys.stderr)
+        return TO_BE_CONTINUED
+    except KeyboardInterrupt:
         msg = f"what was recorded is whole; measure it: smarticles measure {place}; go on: smarticles resume {place}"
         raise KeyboardInterrupt(msg) from None
     if outcome is None:

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli import commands_run
+from cli import commands_run, queueing
 from cli.layout import columns
 from cli.parsing import Commands, Parser, add_json, positive_int
 from dem.errors import InputError, RunError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from templates.expand import Point
     from templates.folder import Folder, RunStatus
     from templates.local import Outcome
+    from templates.submission import Draft
 
 _FILE_HELP = """
 A sweep file makes many scenes from one template:
@@ -46,30 +47,37 @@ def add(commands: Commands) -> None:
         "sweep",
         run_sweep,
         summary="make run directories from a template, and start the runs if asked to",
-        text=_FILE_HELP,
+        text=_FILE_HELP + "\n" + queueing.HELP,
         examples="""\
   smarticles sweep friction.yaml --dry-run
   smarticles sweep friction.yaml --out friction               write the scenes, start nothing
   smarticles sweep friction.yaml --out friction --submit local
+  smarticles sweep friction.yaml --out friction --submit slurm --cluster example-large --time 12:00:00
+  smarticles sweep friction.yaml --out friction --submit slurm --cluster my-cluster.toml --dry-run
 """,
     )
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.yaml", help="sweep file")
     sweep.add_argument("--out", type=Path, metavar="DIR", help="directory of the sweep")
     sweep.add_argument(
         "--submit",
-        choices=("none", "local"),
+        choices=("none", "local", "slurm"),
         default="none",
-        help="none: only write (default); local: run on this machine, one run per core",
+        help="none: only write (default); local: run on this machine, one run per core; slurm: as a job on a cluster",
     )
-    sweep.add_argument("--dry-run", action="store_true", help="list the runs, write nothing")
+    sweep.add_argument("--dry-run", action="store_true", help="list the runs and show the job script, write nothing")
+    sweep.add_argument(
+        "--max-points", type=positive_int, metavar="N", help="refuse a sweep of more runs; default: 10000"
+    )
     add_slots(sweep)
+    queueing.add_options(sweep)
 
     status = commands.add(
         "status",
         show_status,
         summary="what is done, running, failed, missing",
         text="""
-Reads files only. A run is `interrupted` after Ctrl-C, `stopped` when it was killed.""",
+From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was told to
+stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it.""",
         examples="""\
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
@@ -85,16 +93,25 @@ Reads files only. A run is `interrupted` after Ctrl-C, `stopped` when it was kil
         summary="go on with a run, or with what a sweep is missing",
         text="""
 Finished runs are kept. An unfinished one goes on from its last checkpoint; without a checkpoint, or
-when it failed, what it left is renamed to NAME.stopped-1, not deleted, and the run starts anew.
+when it failed, what it left is renamed to NAME.stopped-1, not deleted, and the run starts anew. With --submit slurm
+what is missing and not in the queue becomes a new job, on the cluster of the last one unless --cluster says otherwise.
 For a study, give the study's command again: it also makes the tables and figures.""",
         examples="""\
   smarticles resume friction
   smarticles resume friction --jobs 1
+  smarticles resume friction --submit slurm
   smarticles resume friction/runs/mu0.2_seed1
 """,
     )
     resume.add_argument("directory", type=Path, metavar="DIR", help="of a sweep or a run")
+    resume.add_argument(
+        "--submit",
+        choices=("none", "local", "slurm"),
+        default="local",
+        help="local: run on this machine (default); slurm: submit a job; none: with --cluster, write its script",
+    )
     add_slots(resume)
+    queueing.add_options(resume)
 
 
 def add_slots(parser: Parser) -> None:
@@ -104,25 +121,70 @@ def add_slots(parser: Parser) -> None:
 
 def run_sweep(arguments: argparse.Namespace) -> int:
     """`smarticles sweep`."""
-    from templates.expand import expand  # noqa: PLC0415
+    from templates.expand import MAX_POINTS, expand  # noqa: PLC0415
+    from templates.slurm import require_sbatch  # noqa: PLC0415
     from templates.sweep import load_sweep  # noqa: PLC0415
 
     sweep = load_sweep(arguments.sweep)
-    points = expand(sweep)
+    points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
+    queue = queueing.wants_queue(arguments)
     if arguments.dry_run:
         print(_listing(points))
+        if queue:
+            print(queueing.show(_draft(sweep.content.name, points, arguments)))
         return 0
-    if arguments.out is None:
-        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
-        raise InputError(msg)
-    folder = make_folder(arguments.sweep, arguments.out, arguments.command_line)
+    if queue:
+        if arguments.submit == "slurm":
+            require_sbatch()
+        # Renders all and throws it away: what is refused is refused before anything is written.
+        _draft(sweep.content.name, points, arguments)
+    folder = make_folder(arguments.sweep, _place(arguments), arguments.command_line, max_points=arguments.max_points)
+    if queue:
+        return queueing.enqueue(folder, arguments)
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
         return 0
     return _run(folder, arguments)
 
 
-def make_folder(file: Path, out: Path, command: str, constants: Mapping[str, str] | None = None) -> Folder:
+def _place(arguments: argparse.Namespace) -> Path:
+    out: Path | None = arguments.out
+    if out is None:
+        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
+        raise InputError(msg)
+    return out
+
+
+def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
+    """What would be submitted: all runs of a new sweep, what is missing of one that is there."""
+    from templates.folder import MANIFEST, Entry, open_folder  # noqa: PLC0415
+    from templates.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
+
+    out = _place(arguments)
+    entries = [
+        Entry(
+            name=point.name,
+            scene_sha256=point.scene_sha256,
+            expected_s=expected_wall_s(point.scene),
+            values=point.values,
+        )
+        for point in points
+    ]
+    if (out / MANIFEST).exists():
+        missing = to_submit(open_folder(out), tasks_of_runs(submissions(out)))
+        # Nothing to submit: the limits are looked at for all runs.
+        entries = missing or entries
+    return queueing.draft_of(out, name, entries, arguments)
+
+
+def make_folder(
+    file: Path,
+    out: Path,
+    command: str,
+    constants: Mapping[str, str] | None = None,
+    *,
+    max_points: int | None = None,
+) -> Folder:
     """Expand a sweep file into its directory, or take up the directory that holds it already.
 
     Args:
@@ -130,11 +192,12 @@ def make_folder(file: Path, out: Path, command: str, constants: Mapping[str, str
         out: directory of the sweep.
         command: the command line, for the manifest.
         constants: values that replace those of the file.
+        max_points: how many runs it may have; None: the usual limit.
 
     Raises:
         InputError: the sweep is not valid, or the directory holds something else.
     """
-    from templates.expand import expand  # noqa: PLC0415
+    from templates.expand import MAX_POINTS, expand  # noqa: PLC0415
     from templates.folder import create_folder  # noqa: PLC0415
     from templates.sweep import load_sweep, with_constants  # noqa: PLC0415
 
@@ -142,7 +205,7 @@ def make_folder(file: Path, out: Path, command: str, constants: Mapping[str, str
     return create_folder(
         out,
         sweep,
-        expand(sweep),
+        expand(sweep, max_points=max_points or MAX_POINTS),
         command=command,
         versions=versions(),
         expected_s=expected_wall_s,
@@ -181,43 +244,79 @@ def show_status(arguments: argparse.Namespace) -> int:
     from templates.folder import MANIFEST, count_states, open_folder, run_status  # noqa: PLC0415
 
     directory: Path = arguments.directory
+    queue: dict[str, object] | None = None
     if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
         runs = [run_status(directory)]
         name = directory.name
     else:
         folder = open_folder(directory)
         runs, name = folder.status(), folder.name
+        runs, queue = _with_queue(runs, directory)
     counts = count_states(runs)
     if arguments.json:
         content: Mapping[str, object] = {
             "directory": str(directory),
             "name": name,
             "counts": counts,
+            "queue": queue,
             "runs": [run.to_dict() for run in runs],
         }
         print(json.dumps(content, indent=2, ensure_ascii=False))
         return 0
     print(_status_table(runs))
+    if queue is not None and queue["error"]:
+        print(f"{queue['error']}; the states are those of the run directories alone")
     print(f"{name}: {len(runs)} runs, " + ", ".join(f"{n} {state}" for state, n in counts.items()))
     return 0
 
 
+def _with_queue(runs: list[RunStatus], directory: Path) -> tuple[list[RunStatus], dict[str, object] | None]:
+    """States with what the queue says, and how that went; None where nothing was submitted."""
+    from templates.slurm import QueueError  # noqa: PLC0415
+    from templates.submission import merged, plain, submissions, tasks_of_runs  # noqa: PLC0415
+
+    found = submissions(directory)
+    if not found:
+        return runs, None
+    jobs = [one.job_id for one in found if one.job_id is not None]
+    try:
+        tasks = tasks_of_runs(found)
+    except QueueError as error:
+        return runs, {"jobs": jobs, "error": str(error), "tasks": {}}
+    return [merged(run, tasks.get(run.name)) for run in runs], {"jobs": jobs, "error": None, "tasks": plain(tasks)}
+
+
 def _status_table(runs: Sequence[RunStatus]) -> str:
     header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
-    return columns(
-        header,
-        [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs],
-    )
+    rows = [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs]
+    if any(run.job for run in runs):
+        header.insert(2, "job")
+        for row, run in zip(rows, runs, strict=True):
+            row.insert(2, run.job or "")
+    return columns(header, rows)
 
 
 def resume_sweep(arguments: argparse.Namespace) -> int:
     """`smarticles resume`."""
     from templates.folder import open_folder  # noqa: PLC0415
+    from templates.slurm import require_sbatch  # noqa: PLC0415
 
     directory: Path = arguments.directory
+    queue = queueing.wants_queue(arguments)
     if (directory / "run.json").is_file():
+        if queue:
+            msg = f"{directory}: is one run; give the directory of its sweep to submit it, or leave --submit out"
+            raise InputError(msg)
         return commands_run.compute(directory / "scene.yaml", directory, arguments, resume=True)
-    return _run(open_folder(directory), arguments)
+    folder = open_folder(directory)
+    if queue:
+        if arguments.submit == "slurm":
+            require_sbatch()
+        return queueing.enqueue(folder, arguments)
+    if arguments.submit == "none":
+        msg = "--submit none: needs --cluster NAME, for which the script is written; see `smarticles resume --help`"
+        raise InputError(msg)
+    return _run(folder, arguments)
 
 
 def _run(folder: Folder, arguments: argparse.Namespace) -> int:
@@ -231,13 +330,16 @@ def compute(folder: Folder, arguments: argparse.Namespace) -> list[Outcome]:
     """Run what a sweep is missing, and show how it goes.
 
     Raises:
+        InputError: runs of the sweep are in a queue.
         KeyboardInterrupt: Ctrl-C; the message says how to go on.
     """
     from rich.console import Console  # noqa: PLC0415
 
     from templates.display import display_for  # noqa: PLC0415
     from templates.local import run_folder  # noqa: PLC0415
+    from templates.submission import refuse_queued  # noqa: PLC0415
 
+    refuse_queued(folder)
     try:
         return run_folder(folder, display_for(Console(stderr=True)), slots=arguments.jobs)
     except KeyboardInterrupt:

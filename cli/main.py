@@ -1,6 +1,7 @@
 """The console command `smarticles`: command line in, exit status out.
 
-Exit status: 0 done; 1 the run failed; 2 bad input or usage; 130 stopped by Ctrl-C.
+Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint as SIGUSR1 asked, to be
+continued; 130 stopped by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ first steps:
   smarticles plan scene.yaml               what a run would do and cost
   smarticles run scene.yaml --out run1     do it
 
-exit status: 0 done; 1 the run failed; 2 bad input or usage; 130 stopped by Ctrl-C"""
+exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint by SIGUSR1,
+to be continued; 130 stopped by Ctrl-C"""
 
 
 def build_parser() -> tuple[Parser, Commands]:

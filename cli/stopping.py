@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+TO_BE_CONTINUED = 75
+"""Exit status of a run that SIGUSR1 stopped at a checkpoint; EX_TEMPFAIL of sysexits.h."""
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

@@ -80,8 +80,10 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         if resume:
             _check_scene(scene, out)
         else:
-            write_text(out / SCENE, dump_scene(scene))
             write_json(out / MANIFEST, manifest(scene, dt=dt, command=command, yade=yade))
+        if not (out / SCENE).exists():
+            # Killed between the two, a run is resumed: what tells a run is the manifest.
+            write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
             return _run(scene, out, log, dt=dt, yade=yade, progress=progress, resume=resume)

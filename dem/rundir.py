@@ -32,7 +32,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        held = sorted(path.name for path in out.iterdir() if path.name != LOCK)
+        held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not _is_partial(path.name))
     except OSError as error:
         msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
         raise InputError(msg) from None
@@ -54,6 +54,11 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
         lock.write(f"{os.getpid()}\n")
         lock.flush()
         yield
+
+
+def _is_partial(name: str) -> bool:
+    """Whether a file is one that a killed process had not finished writing, see `dem.files`."""
+    return name.startswith(".") and ".partial." in name
 
 
 def recorded_scene_hash(out: Path) -> str:

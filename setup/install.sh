@@ -15,8 +15,9 @@ fail() {
 
 install_debian_packages() {
     command -v dpkg-query >/dev/null || fail "this is not Debian; see environment.md, 'Other systems'"
-    local package missing=()
-    for package in $(sed 's/#.*//' setup/debian-packages.txt); do
+    local package missing=() lists=(setup/debian-packages.txt)
+    [ "${1-}" = --no-dev ] || lists+=(setup/debian-packages-dev.txt)
+    for package in $(sed 's/#.*//' "${lists[@]}"); do
         case $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) in
         installed*) ;;
         *) missing+=("$package") ;;
@@ -69,5 +70,5 @@ install_environment() {
     echo "setup: done; '.venv/bin/smarticles doctor' tells what works"
 }
 
-install_debian_packages
+install_debian_packages "$@"
 install_environment "$@"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,6 +12,9 @@ from dem.errors import InputError
 from dem.scene import Scene, parse_scene, scene_hash
 from templates.render import Value, evaluate, render_text, render_yaml
 from templates.sweep import SEED, Sweep
+
+MAX_POINTS = 10_000
+"""Runs of one sweep, unless the user asks for more: a slip in a grid makes millions."""
 
 # What is a directory name everywhere, needs no quoting in a shell and does not look like an option.
 _RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,99}\Z")
@@ -33,15 +37,23 @@ class Point:
     scene_sha256: str
 
 
-def expand(sweep: Sweep) -> list[Point]:
+def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
     """All points of a sweep, in the order of its file.
 
     Args:
         sweep: the sweep.
+        max_points: how many runs it may have.
 
     Raises:
-        InputError: a name is unknown, two runs share a name or a scene, a scene is not valid.
+        InputError: too many runs, a name is unknown, two runs share a name or a scene, a scene is not valid.
     """
+    count = _count(sweep)
+    if count > max_points:
+        msg = (
+            f"{sweep.path}: points: {count} runs, more than {max_points}; "
+            f"shorten its lists, or give --max-points {count}"
+        )
+        raise InputError(msg)
     points: list[Point] = []
     for values in _assignments(sweep):
         name = _run_name(sweep, values)
@@ -50,6 +62,19 @@ def expand(sweep: Sweep) -> list[Point]:
         points.append(Point(name=name, values=values, scene=scene, scene_sha256=scene_hash(scene)))
     _refuse_twins(sweep, points)
     return points
+
+
+def _count(sweep: Sweep) -> int:
+    """How many points there will be, without making them."""
+    points, repeats = sweep.content.points, sweep.content.repeats
+    lengths = [
+        len(sweep.table) or 1,
+        len(points.list_ or [0]),
+        len(next(iter(points.zip_.values()))) if points.zip_ else 1,
+        *(len(column) for column in (points.grid or {}).values()),
+        len(repeats.seeds) if repeats else 1,
+    ]
+    return math.prod(lengths)
 
 
 def _assignments(sweep: Sweep) -> Iterator[dict[str, Value]]:

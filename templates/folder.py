@@ -4,6 +4,7 @@ DIR/sweep.json          manifest: files it was made of, points with scene hashes
 DIR/scenes/NAME.yaml    the resolved scene of each run
 DIR/runs/NAME/          the run directories
 DIR/logs/NAME.txt       what the run's process said
+DIR/jobs/               what was given to a queue, see `templates.submission`
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ FORMAT = 1
 MANIFEST = "sweep.json"
 CHECKPOINT = "checkpoint.zip"
 
-State = Literal["done", "running", "failed", "interrupted", "stopped", "missing"]
-"""`interrupted` closed its files after Ctrl-C; `stopped` was killed and says nothing."""
+State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
+"""`interrupted` closed its files when told to stop; `stopped` was killed and says nothing; `queued` waits for a job."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +46,7 @@ class RunStatus:
         phase: type of the phase it is in, or None.
         time_s: simulated time [s], or None.
         wall_s: wall time so far [s], or None.
+        job: number of the queue's task that computes it, or did last, or None.
     """
 
     name: str
@@ -54,6 +56,7 @@ class RunStatus:
     phase: str | None = None
     time_s: float | None = None
     wall_s: float | None = None
+    job: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -250,9 +253,10 @@ def create_folder(
         write_json(path / MANIFEST, _manifest(sweep, points, command, versions, expected_s))
         folder = open_folder(path)
     (path / "scenes").mkdir(exist_ok=True)
-    for entry, point in zip(folder.entries, points, strict=True):
-        if not folder.scene(entry).exists():
-            write_text(folder.scene(entry), dump_scene(point.scene))
+    for point in points:
+        file = folder.path / "scenes" / f"{point.name}.yaml"
+        if not file.exists():
+            write_text(file, dump_scene(point.scene))
     return folder
 
 
@@ -290,13 +294,22 @@ def _refuse_other_sweep(folder: Folder, sweep: Sweep, points: Sequence[Point]) -
     wanted = {point.name: point.scene_sha256 for point in points}
     if present == wanted:
         return
-    name = next(name for name in [*wanted, *present] if present.get(name) != wanted.get(name))
-    what = "has another scene" if name in present and name in wanted else "is only in one of them"
+    parts = [
+        _some("only in the file: ", [name for name in wanted if name not in present]),
+        _some("only in the directory: ", [name for name in present if name not in wanted]),
+        _some("of another scene: ", [name for name in wanted if present.get(name, wanted[name]) != wanted[name]]),
+    ]
     msg = (
-        f"{folder.path}: holds another sweep ({folder.name!r}): run {name} {what}; "
+        f"{folder.path}: holds another sweep ({folder.name!r}): runs {'; '.join(filter(None, parts))}; "
         f"give {sweep.path} a directory of its own"
     )
     raise InputError(msg)
+
+
+def _some(what: str, names: Sequence[str], most: int = 8) -> str:
+    """`what` and the first few names; nothing where there are none."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{what}{', '.join(names[:most])}{more}" if names else ""
 
 
 def open_folder(path: Path) -> Folder:

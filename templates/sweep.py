@@ -17,8 +17,7 @@ repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from dem.errors import InputError
 from dem.yaml_text import parse_yaml
+from templates.explain import Models, explain
 from templates.render import Value
 from templates.texts import IDENTIFIER, nearest, parse_table, read_text
 
@@ -171,7 +171,7 @@ def load_sweep(path: Path) -> Sweep:
     try:
         content = SweepFile.model_validate(data)
     except ValidationError as error:
-        raise InputError(_explain(error, path)) from error
+        raise InputError(explain(error, path, _MODELS, "see `smarticles sweep --help`")) from error
     template = path.parent / content.template
     table, table_path, table_text = _read_table(path, content.points.table)
     return Sweep(
@@ -232,33 +232,9 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
     return rows, file, text
 
 
-def _keys(model: type[BaseModel]) -> Iterator[str]:
-    for name, field in model.model_fields.items():
-        yield field.alias or name
-
-
-_MODELS: dict[tuple[str, ...], type[BaseModel]] = {
+_MODELS: Models = {
     (): SweepFile,
     ("points",): Points,
     ("points", "table"): Table,
     ("repeats",): Repeats,
 }
-
-
-def _explain(error: ValidationError, path: Path) -> str:
-    """One line for the first thing that is wrong: file, key, value, way out."""
-    # A misspelt key is also a missing one: the spelling tells more.
-    unknown_first = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
-    first = unknown_first[0]
-    place = tuple(str(step) for step in first["loc"])
-    key = ".".join(place) or "the file"
-    if first["type"] == "extra_forbidden":
-        model = _MODELS.get(place[:-1], SweepFile)
-        return f"{path}: {key}: unknown key; {nearest(place[-1], _keys(model))}"
-    if first["type"] == "missing":
-        return f"{path}: {key}: missing; add it (see `smarticles sweep --help`)"
-    text = re.sub(r"^Value error, ", "", first["msg"])
-    if first["type"] == "value_error":
-        return f"{path}: {key}: {text}"
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"{path}: {key}: {text}: got {first['input']!r}{more}"

@@ -70,7 +70,7 @@ def test_version(smarticles: Smarticles) -> None:
         (["run", "s.yaml", "--out", "d", "more"], "one argument too many: 'more'"),
         (["run", "s.yaml", "--ou", "d"], "the following arguments are required: --out"),
         (["study", "gravitsh", "--out", "d"], "NAME: 'gravitsh' is not known; did you mean 'gravish'?"),
-        (["sweep", "s.yaml", "--submit", "slurm"], "--submit: 'slurm' is not known; known: none, local"),
+        (["sweep", "s.yaml", "--submit", "slrum"], "--submit: 'slrum' is not known; did you mean 'slurm'?"),
         (["resume", "d", "--jobs", "0"], "argument --jobs: must be a whole number from 1: got '0'"),
         (["resume", "d", "--jobs", "two"], "argument --jobs: must be a whole number from 1: got 'two'"),
         (["render", "d", "--time", "end"], "argument --time: invalid float value: 'end'"),

@@ -49,9 +49,13 @@ def test_the_same_sweep_takes_up_its_directory(make_folder: MakeFolder) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[1, 2]", "[1, 3]", "run n10_seed3 is only in one of them"),
-        ("[1, 2]", "[1]", "run n10_seed2 is only in one of them"),
-        ("[1, 2]", "[1, 2, 3]", "run n10_seed3 is only in one of them"),
+        (
+            "[1, 2]",
+            "[1, 3]",
+            "runs only in the file: n10_seed3, n20_seed3; only in the directory: n10_seed2, n20_seed2; give",
+        ),
+        ("[1, 2]", "[1]", "runs only in the directory: n10_seed2, n20_seed2; give"),
+        ("[1, 2]", "[1, 2, 3]", "runs only in the file: n10_seed3, n20_seed3; give"),
     ],
 )
 def test_another_sweep_is_refused(make_folder: MakeFolder, old: str, new: str, message: str) -> None:
@@ -65,7 +69,7 @@ def test_another_sweep_is_refused(make_folder: MakeFolder, old: str, new: str, m
 def test_the_same_names_with_other_scenes_are_refused(make_folder: MakeFolder) -> None:
     make_folder()
     other = SWEEP.replace("points:", "constants: {k: 1}\npoints:").replace("[10, 20]", "[30, 20]")
-    with pytest.raises(InputError, match="run n10_seed1 has another scene"):
+    with pytest.raises(InputError, match="runs of another scene: n10_seed1, n10_seed2; give"):
         make_folder(other.replace("n{{ count }}", "n{{ 10 if count == 30 else count }}"))
 
 

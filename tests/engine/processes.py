@@ -1,0 +1,48 @@
+"""Runs as processes of their own, and what they leave."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+TIMEOUT_S = 120.0  # for one process; it needs 3 s on a free core
+
+
+def start(scene: Path, out: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "cli", "run", str(scene), "--out", str(out)]
+    if (out / "run.json").exists():
+        command.append("--resume")
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
+    _, said = process.communicate(timeout=TIMEOUT_S)
+    return process.returncode, said
+
+
+def complete(scene: Path, out: Path) -> str:
+    """Run to the end; what was said on the way."""
+    status, said = finish(start(scene, out))
+    assert status == 0, said
+    assert (out / "done.json").exists()
+    return said
+
+
+def results(out: Path) -> dict[str, bytes]:
+    files = [out / "frames.pvd", out / "series.h5", *sorted((out / "frames").iterdir())]
+    return {str(path.relative_to(out)): path.read_bytes() for path in files}
+
+
+def differing(one: dict[str, bytes], other: dict[str, bytes]) -> list[str]:
+    return sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
+
+
+def frame_times(out: Path) -> list[float]:
+    try:
+        return [float(value) for value in re.findall(r'timestep="([^"]+)"', (out / "frames.pvd").read_text())]
+    except FileNotFoundError:
+        return []

@@ -1,0 +1,179 @@
+"""sweep, status and resume with a queue: refusals before anything is written, dry runs, states."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from command_cases import SWEEP, Smarticles
+
+from templates import folder as folder_module
+from templates import slurm
+
+LARGE = ("--cluster", "example-large")
+
+
+@pytest.fixture
+def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Slurm that takes every job as number 7; what squeue answers, line by line, `NAME` standing for the job's name."""
+    lines: list[str] = []
+
+    def call(command: tuple[str, ...], folder: Path | None) -> str:
+        if command[0] == "sbatch":
+            assert folder is not None
+            assert (folder / command[-1]).is_file()
+            return "7\n"
+        name = next(word for word in command if word.startswith("--name=")).removeprefix("--name=")
+        return "\n".join(line.replace("NAME", name.split(",")[-1]) for line in lines)
+
+    monkeypatch.setattr(slurm, "_call", call)
+    monkeypatch.setattr(slurm, "require_sbatch", lambda: None)
+    return lines
+
+
+def test_a_dry_run_shows_list_and_script_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
+    before = sorted(sweep_file.parent.iterdir())
+    out = sweep_file.parent / "out"
+    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE, "--dry-run")
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert "--- jobs/001/runs.txt" in lines
+    assert "#SBATCH --cpus-per-task=2" in lines
+    assert sorted(sweep_file.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--cluster", "exmple-large"], "--cluster exmple-large: is not known; did you mean 'example-large'?"),
+        ([], "--cluster: is missing; known: example-apptainer, example-large, local-slurm"),
+        ([*LARGE, "--time", "3-0"], "--time 3-0: partition shared of example-large allows 2-00:00:00"),
+        ([*LARGE, "--partition", "sharde"], "did you mean 'shared'?"),
+        ([*LARGE, "--runs-per-task", "65"], "--runs-per-task 65: partition shared of example-large has 64 cores"),
+        ([*LARGE, "--memory", "900000"], "1 × 900000 MiB are more than the 250000 MiB"),
+    ],
+)
+def test_what_a_cluster_cannot_give_is_refused_before_anything_is_written(
+    words: list[str], message: str, sweep_file: Path, smarticles: Smarticles, queue: list[str]
+) -> None:
+    out = sweep_file.parent / "out"
+    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *words)
+    assert said.status == 2
+    assert message in said.err
+    assert not out.exists()
+
+
+def test_without_slurm_nothing_is_written(
+    sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slurm.shutil, "which", lambda name: None)
+    out = sweep_file.parent / "out"
+    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
+    assert said.status == 2
+    assert "there is no `sbatch` on this machine" in said.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("words", [["--time", "1"], ["--submit", "local", *LARGE], ["--runs-per-task", "2"]])
+def test_options_of_clusters_need_one(words: list[str], sweep_file: Path, smarticles: Smarticles) -> None:
+    said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out", *words)
+    assert said.status == 2
+    assert f"{words[-2]}: is for a cluster; " in said.err
+
+
+def test_submit_none_writes_scripts_that_are_submitted_by_hand(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    out = tmp_path / "it's out"
+    said = smarticles("sweep", sweep_file, "--out", out, *LARGE)
+    assert said.status == 0
+    assert "&& sbatch jobs/001/array.sh" in said.out
+    assert (out / "jobs/001/runs.txt").read_text().split() == ["n6", "n5"]
+    assert json.loads((out / "jobs/001/job.json").read_text())["job_id"] is None
+
+
+def test_a_sweep_is_submitted_followed_and_resumed(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str]
+) -> None:
+    out = tmp_path / "out"
+    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE, "--runs-per-task", "1")
+    assert said.status == 0, said.err
+    assert said.out.startswith(f"{out}: job 7: 2 of 2 runs, 2 tasks of 1 run: 1 cores, 1024 MiB, ")
+    queue += ["NAME|7|0|RUNNING|None", "NAME|7|1|CANCELLED|None"]
+    lines = smarticles("status", out).out.splitlines()
+    assert lines[1].split() == ["n5", "missing", "7_1", "-", "-", "Slurm:", "CANCELLED"]
+    assert lines[2].split() == ["n6", "running", "7_0", "-", "-"]
+    answer = json.loads(smarticles("status", out, "--json").out)
+    assert answer["queue"] == {"jobs": [7], "error": None, "tasks": {"CANCELLED": 1, "RUNNING": 1}}
+    said = smarticles("resume", out)
+    assert said.status == 2
+    assert "its runs are in Slurm's queue (jobs 7)" in said.err
+    said = smarticles("resume", out, "--submit", "slurm")  # on the same cluster
+    assert ": job 7: 1 of 2 runs, " in said.out
+    assert (out / "jobs/002/runs.txt").read_text() == "n5\n"
+
+
+def test_an_unknown_state_is_an_error(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str]
+) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
+    queue.append("NAME|7|0|DREAMING|None")
+    for command in (("status", out), ("resume", out, "--submit", "slurm")):
+        said = smarticles(*command)
+        assert said.status == 1
+        assert "task 7_0 is DREAMING, a state that is not known here" in said.err
+
+
+def test_status_says_when_the_queue_does_not_answer(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
+
+    def call(command: tuple[str, ...], _: Path | None) -> str:
+        raise subprocess.CalledProcessError(1, command, stderr="Unable to contact slurm controller")
+
+    monkeypatch.setattr(slurm, "_call", call)
+    said = smarticles("status", out)
+    assert said.status == 0
+    assert "the queue cannot be asked: Unable to contact slurm controller; the states are those of" in said.out
+    said = smarticles("resume", out, "--submit", "slurm")
+    assert said.status == 1
+    assert "the queue cannot be asked" in said.err
+
+
+def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    sweep_file.write_text(SWEEP.replace("[5, 6]", str(list(range(1, 200))).replace(" ", "")))
+    sweep_file.write_text(sweep_file.read_text().replace("}}", "}}", 1) + f"repeats: {{seeds: {list(range(100))}}}\n")
+    said = smarticles("sweep", sweep_file, "--out", tmp_path / "out")
+    assert said.status == 2
+    assert "points: 19900 runs, more than 10000; shorten its lists, or give --max-points 19900" in said.err
+    sweep_file.write_text(SWEEP)
+    assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "1").status == 2
+    assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "2").status == 0
+
+
+def test_status_of_a_thousand_runs(tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Less than 2 s: what it costs is counted in files read, since machines differ; the time has a wide margin."""
+    out = tmp_path / "out"
+    points = [{"name": f"s{k}", "scene_sha256": "x", "expected_s": 1.0, "values": {"seed": k}} for k in range(1000)]
+    (out / "runs").mkdir(parents=True)
+    (out / "sweep.json").write_text(json.dumps({"format": 1, "name": "many", "command": "c", "points": points}))
+    for number, point in enumerate(points):
+        run = out / "runs" / str(point["name"])
+        run.mkdir()
+        (run / "run.json").write_text("{}")
+        (run / ("done.json" if number % 2 else "progress.json")).write_text(json.dumps({"time_s": 1.0}))
+    reads: list[Path] = []
+    read = folder_module.read_json
+    monkeypatch.setattr(folder_module, "read_json", lambda path: (reads.append(path), read(path))[1])
+    begun = time.monotonic()
+    said = smarticles("status", out)
+    spent = time.monotonic() - begun
+    assert said.out.splitlines()[-1] == "many: 1000 runs, 500 stopped, 500 done"
+    assert len(reads) == 1 + 500 + 3 * 500
+    assert spent < 10

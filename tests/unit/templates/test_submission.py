@@ -1,0 +1,204 @@
+"""What is in the queue, what is to be submitted, and what Slurm answers."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sweep_cases import MakeFolder
+
+from dem.errors import InputError, RunError
+from templates import slurm, submission
+from templates.cluster import load_cluster
+from templates.folder import Folder, RunStatus
+from templates.request import Wishes, plan_request
+from templates.slurm import STATES, QueueError, Task, parse_job_id, parse_queue
+from templates.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
+
+
+@pytest.mark.parametrize(("answer", "number"), [("12\n", 12), ("12;here\n", 12), ("sbatch: warning\n7\n", 7)])
+def test_job_numbers(answer: str, number: int) -> None:
+    assert parse_job_id(answer, Path("array.sh")) == number
+
+
+@pytest.mark.parametrize("answer", ["", "\n", "Submitted batch job 12\n", "0\n", "-3", "12 13"])
+def test_other_answers_of_sbatch_are_errors(answer: str) -> None:
+    with pytest.raises(RunError, match=r"array.sh: sbatch answered .* which is no job number"):
+        parse_job_id(answer, Path("array.sh"))
+
+
+def test_the_queue_is_read() -> None:
+    tasks = parse_queue("six.1|12|0|RUNNING|None\nsix.1|12|3|PENDING|Resources\n")
+    assert [(task.label, task.state, task.reason) for task in tasks] == [
+        ("12_0", "running", ""),
+        ("12_3", "queued", "Resources"),
+    ]
+
+
+def test_an_unknown_state_is_an_error_that_names_it() -> None:
+    with pytest.raises(RunError, match="task 12_0 is DREAMING, a state that is not known here"):
+        parse_queue("six.1|12|0|DREAMING|None")
+
+
+def test_a_line_that_is_not_understood_is_an_error() -> None:
+    with pytest.raises(RunError, match="which is not understood"):
+        parse_queue("slurm_load_jobs: something\n")
+
+
+def test_every_state_of_the_manual_is_known() -> None:
+    manual = """BOOT_FAIL CANCELLED COMPLETED CONFIGURING COMPLETING DEADLINE FAILED NODE_FAIL OUT_OF_MEMORY PENDING
+    PREEMPTED RUNNING RESV_DEL_HOLD REQUEUE_FED REQUEUE_HOLD REQUEUED RESIZING REVOKED SIGNALING SPECIAL_EXIT STAGE_OUT
+    STOPPED SUSPENDED TIMEOUT"""
+    assert set(manual.split()) <= set(STATES)
+
+
+@pytest.fixture
+def folder(make_folder: MakeFolder) -> Folder:
+    """Four runs; n20 is expected to take longer."""
+    return make_folder()
+
+
+def submitted(folder: Folder, number: int | None = 12, runs_per_task: int = 2) -> submission.Draft:
+    cluster = load_cluster("example-large")
+    request = plan_request([entry.expected_s for entry in folder.entries], cluster, Wishes(runs_per_task=runs_per_task))
+    made = draft(
+        folder.path,
+        folder.name,
+        folder.entries,
+        cluster=cluster,
+        reference="example-large",
+        request=request,
+        command=("smarticles",),
+        token="tt",
+    )
+    write(folder, made)
+    if number is not None:
+        file = folder.path / "jobs" / made.submission.number / "job.json"
+        file.write_text(json.dumps({**json.loads(file.read_text()), "job_id": number}))
+    return made
+
+
+@pytest.fixture
+def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What squeue answers, line by line; empty at first."""
+    lines: list[str] = []
+
+    def call(command: tuple[str, ...], _: Path | None) -> str:
+        assert command[0] == "squeue"
+        return "\n".join(lines)
+
+    monkeypatch.setattr(slurm, "_call", call)
+    return lines
+
+
+def finish(folder: Folder, number: int) -> None:
+    entry = folder.entries[number]
+    run = folder.run(entry)
+    run.mkdir(parents=True)
+    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
+    (run / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0}))
+
+
+def test_longer_runs_come_first_and_share_a_task(folder: Folder) -> None:
+    made = submitted(folder)
+    assert (folder.path / "jobs/001/runs.txt").read_text().split() == [
+        "n20_seed1",
+        "n20_seed2",
+        "n10_seed1",
+        "n10_seed2",
+    ]
+    assert made.submission.of_task(1) == ("n10_seed1", "n10_seed2")
+    (found,) = submissions(folder.path)
+    assert (found.job_id, found.job_name, found.cluster) == (12, "test.tt", "example-large")
+    assert submitted(folder).submission.number == "002"
+
+
+def test_only_what_is_missing_and_not_in_the_queue_is_submitted(folder: Folder, queue: list[str]) -> None:
+    submitted(folder)
+    finish(folder, 3)  # n20_seed2
+    queue += ["test.tt|12|0|COMPLETED|None", "test.tt|12|1|PENDING|BeginTime"]
+    tasks = tasks_of_runs(submissions(folder.path))
+    assert [entry.name for entry in to_submit(folder, tasks)] == ["n20_seed1"]
+    assert [entry.name for entry in to_submit(folder, {})] == ["n10_seed1", "n10_seed2", "n20_seed1"]
+
+
+def test_a_job_whose_number_was_lost_is_found_by_its_name(folder: Folder, queue: list[str]) -> None:
+    submitted(folder, number=None)
+    queue += ["test.tt|99|0|RUNNING|None", "test.tt|99|1|RUNNING|None"]
+    tasks = tasks_of_runs(submissions(folder.path))
+    assert tasks["n10_seed1"].label == "99_1"
+    assert to_submit(folder, tasks) == []
+
+
+def test_a_waiting_task_counts_more_than_one_that_ended(folder: Folder, queue: list[str]) -> None:
+    submitted(folder)
+    queue += ["test.tt|12|0|RUNNING|None", "test.tt|11|0|TIMEOUT|None"]
+    assert tasks_of_runs(submissions(folder.path))["n20_seed1"].label == "12_0"
+
+
+def status(state: Any, **more: Any) -> RunStatus:
+    return RunStatus(name="a", directory=Path("a"), state=state, **more)
+
+
+@pytest.mark.parametrize(
+    ("directory", "slurm_state", "state", "cause"),
+    [
+        ("missing", "PENDING", "queued", "Slurm: PENDING, Priority"),
+        ("interrupted", "REQUEUED", "queued", "Slurm: REQUEUED, Priority"),
+        ("stopped", "RUNNING", "running", None),
+        ("interrupted", "COMPLETING", "running", None),
+        ("stopped", "TIMEOUT", "stopped", "Slurm: TIMEOUT"),
+        ("missing", "CANCELLED", "missing", "Slurm: CANCELLED"),
+        ("missing", "COMPLETED", "missing", None),
+        ("done", "RUNNING", "done", None),
+        ("failed", "RUNNING", "failed", None),
+    ],
+)
+def test_queue_and_directory_together(directory: str, slurm_state: str, state: str, cause: str | None) -> None:
+    task = Task(job_name="n", job_id=1, index=2, slurm_state=slurm_state, reason="Priority")
+    found = merged(status(directory), task)
+    assert (found.state, found.cause, found.job) == (state, cause, "1_2")
+
+
+def test_nothing_is_computed_here_while_it_is_in_the_queue(folder: Folder, queue: list[str]) -> None:
+    refuse_queued(folder)
+    submitted(folder)
+    refuse_queued(folder)
+    queue.append("test.tt|12|0|RUNNING|None")
+    with pytest.raises(InputError, match=r"in Slurm's queue \(jobs 12\).*scancel 12"):
+        refuse_queued(folder)
+
+
+def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    submitted(folder)
+
+    def call(command: tuple[str, ...], _: Path | None) -> str:
+        raise subprocess.CalledProcessError(1, command, stderr="Unable to contact\nslurm controller")
+
+    monkeypatch.setattr(slurm, "_call", call)
+    with pytest.raises(QueueError, match="the queue cannot be asked: Unable to contact slurm controller"):
+        tasks_of_runs(submissions(folder.path))
+    with pytest.raises(InputError, match="was submitted to Slurm"):
+        refuse_queued(folder)
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"job_id": "x"}'])
+def test_a_damaged_record_is_an_error(folder: Folder, text: str) -> None:
+    submitted(folder)
+    (folder.path / "jobs/001/job.json").write_text(text)
+    with pytest.raises(InputError, match=r"job.json: is damaged, so it is not known which runs are in the queue"):
+        submissions(folder.path)
+
+
+def test_runs_that_cannot_go_on_are_set_aside(folder: Folder) -> None:
+    entry = folder.entries[0]
+    run = folder.run(entry)
+    run.mkdir(parents=True)
+    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
+    (run / "failed.json").write_text(json.dumps({"status": "failed", "cause": "why"}))
+    submitted(folder)
+    assert not run.exists()
+    assert (run.parent / f"{entry.name}.stopped-1" / "failed.json").exists()
