@@ -201,7 +201,9 @@ def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, 
     assert rows["count"][poured - 1 : poured + 1].tolist() == [5, 10]
     # Five lie on the floor; the other five have fallen for less than 8 ms, and start a whole sphere above.
     force = rows["container_force_N"][poured, 2]
-    assert force == pytest.approx(-5 * mass * 9.81, rel=0.02)
+    # The first layer has landed but may still rock, by a few per cent of its weight; charging the second one for the
+    # part of the interval before it was poured would add half of its weight.
+    assert force == pytest.approx(-5 * mass * 9.81, rel=0.1)
 
 
 @pytest.mark.parametrize(("speed", "unbalanced"), [("1e-18", "1e+09"), ("1e+09", "1e-18")])
