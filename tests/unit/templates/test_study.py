@@ -62,7 +62,7 @@ def test_the_quick_variant_says_how_it_differs() -> None:
     assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
     assert any(line.startswith("shake_s: ") and line.endswith(" instead of 5.0") for line in lines)
     # Columns that follow from l/w, and what is the same, are not told.
-    assert not any(line.startswith(("n:", "layers:", "seed:", "relax_s:")) for line in lines)
+    assert not any(line.startswith(("n:", "layers:", "seed:", "title:")) for line in lines)
 
 
 def test_nothing_differs_from_itself() -> None:
