@@ -75,7 +75,7 @@ def test_bad_cluster_files_are_input_errors(old: str, new: str, message: str, tm
 
 
 def test_unknown_clusters_are_input_errors_with_the_nearest(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--cluster exmple-large: is not known; did you mean 'example-large'?"):
+    with pytest.raises(InputError, match=r"--cluster exmple-large: is not known; did you mean 'example-large'\?"):
         load_cluster("exmple-large")
     with pytest.raises(InputError, match="known: example-apptainer, example-large, local-slurm"):
         load_cluster("zzz")
