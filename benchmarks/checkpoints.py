@@ -1,8 +1,7 @@
 """What checkpoints cost: the same run with and without them, in turn; `python -m benchmarks.checkpoints`.
 
-Pairs are run one after the other, so that a busy machine weighs on both; processor time is compared, since wall time on
-a shared machine tells of the neighbours. Waiting for the disk is measured apart, as wall time minus processor time
-would not tell it from waiting for a core.
+Pairs are run one after the other, so that a busy machine weighs on both. Processor time is compared, since wall time
+on a shared machine tells of the neighbours; waiting for the disk (3.5 MB per checkpoint, flushed) is not in it.
 """
 
 from __future__ import annotations
