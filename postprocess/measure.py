@@ -104,6 +104,7 @@ def summarise_run(
     last: int = LAST_FRAMES,
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
+    phases: Collection[int] | None = None,
 ) -> pd.DataFrame:
     """Measures of a run averaged over the last frames of each phase, one row per phase.
 
@@ -116,6 +117,7 @@ def summarise_run(
         last: Frames to average; "frames averaged" says how many there were.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: When to take the costly ones among them, see `measure_run`.
+        phases: Indices of the phases wanted; all if not given.
 
     Returns:
         A table with units in its column names.
@@ -127,6 +129,8 @@ def summarise_run(
     manifest, frames, series = _open(directory, definitions)
     summaries = []
     for part in _phases(manifest, frames):
+        if phases is not None and part[0].phase not in phases:
+            continue
         table = pd.DataFrame(_rows(part[-last:], manifest, series, definitions, costly))
         final = table.iloc[-1]
         kept = [*_LABELS, "phase", "phase type"]

@@ -156,11 +156,15 @@ def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, obje
         types = ", ".join(phase.type for phase in run.phases)
         msg = f"{run.directory}: no shaking after another phase: its phases are {types}"
         raise InputError(msg)
-    cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
-    table = summarise_run(run.directory, definitions=cheap).set_index("phase")
     wanted = {"phi_0": shakes[0].index - 1, "phi_f": shakes[-1].index}
     if shakes[-1].index < run.phases[-1].index:
         wanted["phi_f relaxed"] = run.phases[-1].index
+    cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
+    summary = summarise_run(run.directory, definitions=cheap, phases=set(wanted.values()))
+    if summary.empty:
+        msg = f"{run.directory}: no frame of the phases around shaking; run it again"
+        raise InputError(msg)
+    table = summary.set_index("phase")
     for phase in wanted.values():
         if phase not in table.index:
             kind = run.phases[phase].type

@@ -206,3 +206,11 @@ def test_failed_write_leaves_the_old_table(tmp_path):
 def test_table_that_cannot_be_placed(tmp_path, name):
     with pytest.raises(InputError, match="cannot write table"):
         write_table(pd.DataFrame({"a": [1]}), tmp_path / name)
+
+
+def test_summary_of_chosen_phases_is_that_of_all_of_them(run):
+    every = summarise_run(run, definitions=CHEAP)
+    chosen = summarise_run(run, definitions=CHEAP, phases={1, 2})
+    assert chosen["phase"].tolist() == [1, 2]
+    pd.testing.assert_frame_equal(chosen, every[every["phase"].isin([1, 2])].reset_index(drop=True))
+    assert summarise_run(run, definitions=CHEAP, phases=set()).empty
