@@ -158,6 +158,8 @@ class Engine:
         self._to_body: Any = None
         self._smarticle_of: dict[int, int] = {}
         self._smarticle_seconds = 0.0
+        # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
+        self._loaded: tuple[int, float] | None = None
         self._add_materials(law)
         self._add_container(cylinder)
         self._assemble(law, shaken=shaken)
@@ -245,7 +247,12 @@ class Engine:
         """
         self._omega.save(str(path))
         axes = [] if self._to_body is None else [self._to_body[k] for k in range(4)]
-        return {"clumps": self._clump_ids, "to_body": axes, "smarticle_seconds": self._smarticle_seconds}
+        return {
+            "clumps": self._clump_ids,
+            "to_body": axes,
+            "smarticle_seconds": self._smarticle_seconds,
+            "unbalanced": self.unbalanced_force(),
+        }
 
     def load(self, path: Path, memory: Mapping[str, Any]) -> None:
         """Replace the simulation by a saved one of the same scene.
@@ -262,6 +269,7 @@ class Engine:
             # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
             self._to_body = self._quaternion(w, x, y, z)
         self._bind()
+        self._loaded = (self.steps, memory["unbalanced"])
 
     def add(self, poses: Poses) -> None:
         """Add smarticles at rest."""
@@ -432,6 +440,8 @@ class Engine:
         YADE's own measure leaves gravity out for a body whose contact forces are exactly zero or balance exactly, and
         so calls a still pile unbalanced.
         """
+        if self._loaded is not None and self._loaded[0] == self.steps:
+            return self._loaded[1]
         if not self._clump_ids or not self._gravity:
             return math.inf
         weight = self.particle.boxes.mass * self._gravity
