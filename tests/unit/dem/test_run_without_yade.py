@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -68,7 +67,8 @@ class Omega:
 
 def make_engine(omega: Omega) -> Engine:
     engine = Engine.__new__(Engine)
-    vars(engine).update(SimpleNamespace(_omega=omega).__dict__)
+    # What `advance` needs, without YADE: Omega, and what counts the smarticles' seconds.
+    vars(engine).update(_omega=omega, _clumps=[], _smarticle_seconds=0.0, time_step=1e-5)
     return engine
 
 
