@@ -81,7 +81,7 @@ class Simulation:
         if self._stage is None:
             self._stage = begin(phase, self.scene)
             self._performed.append(
-                {"index": self._phase, "type": phase.type, "start_s": self.engine.time, "wall_s": -self._wall()}
+                {"index": self._phase, "type": phase.type, "start_s": self.engine.time, "wall_s": -self.wall}
             )
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
@@ -98,7 +98,7 @@ class Simulation:
             self._target = self.engine.steps + max(1, round(wait / self.engine.time_step))
             self._advance()
         entry["end_s"] = self.engine.time
-        entry["wall_s"] += self._wall()
+        entry["wall_s"] += self.wall
         self.log.info(
             "phase %d %s ended at t = %.4f s after %.1f s of wall time",
             self._phase,
@@ -140,7 +140,7 @@ class Simulation:
             "stage": self._stage.memory,
             "target": self._target,
             "performed": self._performed,
-            "wall_s": self._wall(),
+            "wall_s": self.wall,
         }
         write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
         if self._stop_requested:
@@ -175,14 +175,10 @@ class Simulation:
         self._performed = [dict(entry) for entry in state["performed"]]
         self._spent, self._began = state["wall_s"], time.monotonic()
 
-    def _wall(self) -> float:
-        """Wall time spent [s], in the processes before this one too."""
-        return self._spent + time.monotonic() - self._began
-
     @property
     def wall(self) -> float:
         """Wall time spent [s], in the processes before this one too."""
-        return self._wall()
+        return self._spent + time.monotonic() - self._began
 
     def _request_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True
