@@ -216,8 +216,10 @@ def check_slurm() -> Check:
             found="no sbatch",
             way_out="only `sweep --submit slurm` needs it; use `--submit local` on this machine",
         )
-    version = _output("sbatch", "--version")
+    version = "sbatch is installed"
     try:
+        # Without a slurm.conf even --version fails: Slurm is installed, as the tests do, but not set up.
+        version = _output("sbatch", "--version")
         _output("scontrol", "ping")
     except (OSError, subprocess.SubprocessError):
         return Check(
