@@ -101,6 +101,15 @@ def _analyse_sensitivity(analysis: _Analysis, *, study: str) -> str:
     return _told(columns(header, rows), told, report.files, analysis.output)
 
 
+def _analyse_procedures(analysis: _Analysis) -> str:
+    from postprocess.procedures import analyse_procedures, told_points  # noqa: PLC0415
+
+    report = analyse_procedures(analysis.runs, analysis.output, note=analysis.note, command=analysis.command)
+    told = ["Means over seeds ± standard error.", ""]
+    told += [f"{found.verdict.upper()}: {found.paper}\n    {found.ours}" for found in report.findings]
+    return _told(columns(*told_points(report.points)), told, report.files, analysis.output)
+
+
 def _told(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
     figures = [f"figure: {path}" for path in files.values() if path.suffix == ".png"]
     return "\n".join([table, "", *told, "", *figures, f"tables, and the origin of every number: {output}"])
@@ -108,6 +117,7 @@ def _told(table: str, told: Sequence[str], files: Mapping[str, Path], output: Pa
 
 _STUDIES = {
     "gravish": _Study(analyse=_analyse_gravish, pictured={"l_over_w": 0.7}),
+    "procedures": _Study(analyse=_analyse_procedures, pictured={"procedure": "shape-change", "l_over_w": 0.7}),
     **{
         name: _Study(analyse=partial(_analyse_sensitivity, study=name), pictured={"variant": "draft"})
         for name in ("sensitivity", "sensitivity-section")
@@ -130,20 +140,29 @@ sensitivity: what the packing fraction before and after shaking owes to restitut
 stiffness and sphere diameter, one at a time, at l/w = 0.7. sensitivity-section: the same for pitch and
 rows of spheres, up to the true section.
 
+procedures: shape change, external and internal oscillation of smarticles of several l/w, the latter with
+several amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): packing fraction,
+entanglement, energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that
+the hinge cannot reach at a small l/w are left out. --quick takes minutes.
+
 DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
-same command again goes on where it stopped. `smarticles status DIR` tells how far it is.""",
+same command again goes on where it stopped. `smarticles status DIR` tells how far it is, and
+--analyse shows what the finished runs say, also while the others are being computed.""",
         examples="""\
   smarticles study gravish --quick --out demo
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
   smarticles study sensitivity --out sensitivity
+  smarticles study procedures --quick --out procedures-quick
+  smarticles study procedures --out procedures --analyse     what the finished runs say so far
 """,
     )
     study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))
-    study.add_argument("--quick", action="store_true", help="the variant that takes minutes; gravish only")
+    study.add_argument("--quick", action="store_true", help="the variant that takes minutes; gravish, procedures")
     study.add_argument(
         "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
     )
+    study.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
     add_slots(study)
 
@@ -158,8 +177,11 @@ def run_study(arguments: argparse.Namespace) -> int:
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
     note = _note(arguments.name, file, changed)
     print(note, flush=True)
-    outcomes = compute(folder, arguments)
+    outcomes = [] if arguments.analyse else compute(folder, arguments)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
+    if arguments.analyse and not finished:
+        msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
+        raise InputError(msg)
     if finished:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.

@@ -42,7 +42,7 @@ _PACKAGES = {
 # One sphere falls for ten steps.
 _YADE = """
 import json
-from dem.engine import import_yade
+from dem.library import import_yade
 yade = import_yade()
 from yade import utils, wrapper
 scene = wrapper.Omega()

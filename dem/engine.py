@@ -1,4 +1,4 @@
-"""The running YADE simulation behind a small interface. The only module that imports `yade`.
+"""The running simulation behind a small interface.
 
 Heights, velocities and forces are in the laboratory frame. One process runs one simulation: YADE keeps its scene in a
 process-wide singleton.
@@ -6,26 +6,23 @@ process-wide singleton.
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import io
 import math
-import os
-import sys
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from dem.assembly import SMARTICLE_MATERIAL, Assembly
+from dem.container import WALL_MATERIAL, Cylinder, add_container
 from dem.errors import RunError
+from dem.hinges import HINGE_MATERIAL, HingeLaw
+from dem.library import load_yade
+from dem.motor import MotorLaw, Motors
 from dem.particle import Particle
 from dem.placement import Poses
+from dem.state import State
 from dem.timestep import ContactLaw
 
 Array = NDArray[np.float64]
@@ -34,82 +31,6 @@ Array = NDArray[np.float64]
 # at in every step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.2 costs
 # 17 % less than 0.4, 0.1 as much as 0.2.
 VERLET_DISTANCE = 0.15
-POLL_INTERVAL = 2e-4  # s of wall time; O.run(wait=True) would sleep 40 ms
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cylinder:
-    """The container as the engine builds it. Lengths in m."""
-
-    radius: float
-    height: float
-    facets: int
-
-    @property
-    def corner_radius(self) -> float:
-        """Distance [m] of the wall's edges from the axis: the polygon has the area of the circle."""
-        turn = 2 * math.pi / self.facets
-        return self.radius * math.sqrt(turn / math.sin(turn))
-
-    @property
-    def inner_radius(self) -> float:
-        """Distance [m] of the wall's flats from the axis, a little less than the radius."""
-        return self.corner_radius * math.cos(math.pi / self.facets)
-
-
-@dataclass(frozen=True)
-class State:
-    """All smarticles at one instant, in the laboratory frame.
-
-    Args:
-        positions: (N, 3) centres of mass [m].
-        rotations: (N, 3, 3) body frame to laboratory frame [1].
-        velocities: (N, 3) of the centres of mass [m/s].
-        angular_velocities: (N, 3) [rad/s].
-    """
-
-    positions: Array
-    rotations: Array
-    velocities: Array
-    angular_velocities: Array
-
-    def points(self, body: Array) -> Array:
-        """Points of the body frame, (k, 3) [m], on every smarticle: (N, k, 3) [m]."""
-        turned: Array = np.einsum("nij,kj->nki", self.rotations, body)
-        return turned + self.positions[:, None]
-
-
-def yade_version() -> str:
-    """Version of the YADE that runs.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
-    import_yade()
-    return str(importlib.import_module("yade.config").version)
-
-
-def import_yade() -> Any:
-    """The distribution's YADE, imported into this process.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
-    # Threads that find no free core spin; a run of seconds would take minutes.
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    for folder in Path("/usr/lib").glob("*/yade*/py"):
-        if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
-            sys.path.append(str(folder))
-    try:
-        # YADE greets on standard output, which belongs to the command's own answer.
-        with contextlib.redirect_stdout(io.StringIO()):
-            return importlib.import_module("yade")
-    except ImportError as error:
-        msg = (
-            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, "
-            "see environment.md; `smarticles doctor` tells what is missing"
-        )
-        raise RunError(msg) from None
 
 
 class Engine:
@@ -122,6 +43,9 @@ class Engine:
         gravity: g, downwards [m/s²].
         time_step: dt [s].
         shaken: whether the container will move; the engine that moves it exists only then.
+        hinges: stiffness of the hinges and what all motors have in common; None where smarticles stay welded: then
+            nothing of a hinge exists.
+        track_work: whether to add up the work of the moving container.
 
     Raises:
         RunError: YADE is not installed.
@@ -136,45 +60,44 @@ class Engine:
         gravity: float,
         time_step: float,
         shaken: bool,
+        hinges: tuple[HingeLaw, MotorLaw] | None = None,
+        track_work: bool = False,
     ) -> None:
-        import_yade()
-        from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
-        from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
-
-        self._utils, self._yade, self._vector, self._quaternion = (
-            utils,
-            wrapper,
-            Vector3,
-            Quaternion,
-        )
+        self._yade = load_yade()
+        self._omega = self._yade.omega
         self.particle = particle
         self.cylinder = cylinder
         self.time_step = time_step
-        self._gravity = gravity
-        self._omega = wrapper.Omega()
-        self._omega.reset()
-        self._clumps: list[Any] = []
-        self._clump_ids: list[int] = []
-        self._to_body: Any = None
-        self._smarticle_of: dict[int, int] = {}
+        self.gravity = gravity
+        self.motors: Motors | None = None
+        """The motors of all smarticles; None before the first articulation."""
+        hinge_law: HingeLaw | None = None
+        self._motor_law: MotorLaw | None = None
+        if hinges is not None:
+            hinge_law, self._motor_law = hinges
+        self._assembly = Assembly(self._yade, particle, hinge_law)
         self._smarticle_seconds = 0.0
+        self._container_work = 0.0
+        self._weld_loss = 0.0
+        self._track_work = track_work
         # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
         self._loaded: tuple[int, float] | None = None
-        self._add_materials(law)
-        self._add_container(cylinder)
-        self._assemble(law, shaken=shaken)
+        self._add_materials(law, hinged=hinges is not None)
+        self._container = add_container(self._yade, cylinder)
+        self._assemble(law, shaken=shaken, hinged=hinge_law)
 
     # -- construction ------------------------------------------------------------------------------------------
 
-    def _add_materials(self, law: ContactLaw) -> None:
+    def _add_materials(self, law: ContactLaw, *, hinged: bool) -> None:
         # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen
         # such that the series with a smarticle's gives the wall's. Density zero: the spheres weigh nothing, the
-        # mass comes from a ballast that is taken away again (see `_clump`).
+        # mass comes from a ballast that is taken away again (see `dem.clump`).
         between = 2 * law.normal_damping
         wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
-        for label, damping in (("smarticle", between), ("wall", wall)):
-            self._omega.materials.append(
-                self._yade.ViscElMat(
+        classes, materials = self._yade.classes, self._omega.materials
+        for label, damping in ((SMARTICLE_MATERIAL, between), (WALL_MATERIAL, wall)):
+            materials.append(
+                classes.ViscElMat(
                     density=0,
                     kn=2 * law.normal_stiffness,
                     ks=2 * law.tangential_stiffness,
@@ -183,61 +106,50 @@ class Engine:
                     label=label,
                 )
             )
+        if hinged:
+            # Every bond is given its stiffness by hand; this only tells YADE which law it belongs to.
+            materials.append(classes.CohFrictMat(density=0, young=1, poisson=0, isCohesive=False, label=HINGE_MATERIAL))
 
-    def _add_container(self, cylinder: Cylinder) -> None:
-        # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
-        n = cylinder.facets
-        corner = cylinder.corner_radius
-        low, high = -0.1 * cylinder.radius, cylinder.height
-        angles = 2 * math.pi * np.arange(n + 1) / n
-        ring = np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
-        bodies = []
-        for (x0, y0), (x1, y1) in pairwise(ring):
-            a, b = self._vector(x0, y0, low), self._vector(x1, y1, low)
-            c, d = self._vector(x1, y1, high), self._vector(x0, y0, high)
-            bodies += [
-                self._utils.facet([a, b, c], material="wall", fixed=True),
-                self._utils.facet([a, c, d], material="wall", fixed=True),
-            ]
-        # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
-        bodies.append(self._utils.wall(0, axis=2, sense=1, material="wall"))
-        self._container = [self._omega.bodies.append(body) for body in bodies]
-
-    def _assemble(self, law: ContactLaw, *, shaken: bool) -> None:
-        yade = self._yade
+    def _assemble(self, law: ContactLaw, *, shaken: bool, hinged: HingeLaw | None) -> None:
+        yade = self._yade.classes
         friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
         shaker = [yade.HarmonicMotionEngine(ids=self._container, dead=True)] if shaken else []
         collider = yade.InsertionSortCollider(
             [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb()],
             verletDist=VERLET_DISTANCE * self.particle.radius,
         )
+        geometry = [yade.Ig2_Sphere_Sphere_ScGeom(), yade.Ig2_Facet_Sphere_ScGeom(), yade.Ig2_Wall_Sphere_ScGeom()]
+        physics = [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)]
+        laws = [yade.Law2_ScGeom_ViscElPhys_Basic()]
+        if hinged is not None:
+            # The correction for sliding spheres would falsify the motion of nodes that do not touch.
+            geometry.append(yade.Ig2_GridNode_GridNode_GridNodeGeom6D(avoidGranularRatcheting=False))
+            physics.append(yade.Ip2_CohFrictMat_CohFrictMat_CohFrictPhys())
+            laws.append(
+                yade.Law2_ScGeom6D_CohFrictPhys_CohesionMoment(
+                    useIncrementalForm=True,
+                    shear_creep=True,
+                    creep_viscosity=float(__import__("os").environ.get("DV", "0.15")),
+                )
+            )
+        gravity = self._yade.vector(0, 0, -self.gravity)
         self._omega.engines = [
             yade.ForceResetter(),
             collider,
-            yade.InteractionLoop(
-                [
-                    yade.Ig2_Sphere_Sphere_ScGeom(),
-                    yade.Ig2_Facet_Sphere_ScGeom(),
-                    yade.Ig2_Wall_Sphere_ScGeom(),
-                ],
-                [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)],
-                [yade.Law2_ScGeom_ViscElPhys_Basic()],
-            ),
+            yade.InteractionLoop(geometry, physics, laws),
             *shaker,
-            yade.NewtonIntegrator(damping=0, gravity=self._vector(0, 0, -self._gravity), exactAsphericalRot=True),
+            yade.NewtonIntegrator(damping=0, gravity=gravity, exactAsphericalRot=True),
         ]
         self._omega.dt = self.time_step
         self._bind()
 
     def _bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
-        bodies, engines = self._omega.bodies, self._omega.engines
+        bodies, engines, classes = self._omega.bodies, self._omega.engines, self._yade.classes
         self._floor = bodies[self._container[-1]].state
-        self._clumps = [bodies[clump].state for clump in self._clump_ids]
-        self._smarticle_of = {
-            sphere: k for k, clump in enumerate(self._clump_ids) for sphere in bodies[clump].shape.members
-        }
-        self._shaker = next((e for e in engines if isinstance(e, self._yade.HarmonicMotionEngine)), None)
+        self._shaker = next((e for e in engines if isinstance(e, classes.HarmonicMotionEngine)), None)
+        self._collider = next(e for e in engines if isinstance(e, classes.InsertionSortCollider))
+        self._assembly.bind()
 
     def save(self, path: Path) -> dict[str, Any]:
         """Save the simulation into a file.
@@ -246,11 +158,12 @@ class Engine:
             Plain data that `load` needs besides the file.
         """
         self._omega.save(str(path))
-        axes = [] if self._to_body is None else [self._to_body[k] for k in range(4)]
         return {
-            "clumps": self._clump_ids,
-            "to_body": axes,
+            "assembly": self._assembly.memory,
+            "motors": None if self.motors is None else self.motors.memory,
             "smarticle_seconds": self._smarticle_seconds,
+            "container_work": self._container_work,
+            "weld_loss": self._weld_loss,
             "unbalanced": self.unbalanced_force(),
         }
 
@@ -262,49 +175,20 @@ class Engine:
             memory: what `save` returned.
         """
         self._omega.load(str(path), quiet=True)
-        self._clump_ids = list(memory["clumps"])
+        self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
-        if memory["to_body"]:
-            x, y, z, w = memory["to_body"]
-            # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
-            self._to_body = self._quaternion(w, x, y, z)
+        self._container_work = memory["container_work"]
+        self._weld_loss = memory["weld_loss"]
+        if memory["motors"] is not None:
+            assert self._motor_law is not None  # a checkpoint belongs to its scene
+            self.motors = Motors(self._motor_law, np.zeros((self.count, 2)))
+            self.motors.restore(memory["motors"])
         self._bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
     def add(self, poses: Poses) -> None:
         """Add smarticles at rest."""
-        for position, rotation in zip(poses.positions, poses.rotations, strict=True):
-            self._clump(position, rotation)
-
-    def _clump(self, position: Array, rotation: Rotation) -> None:
-        # Clumped at the origin in the body frame, then moved: YADE's own mass properties of overlapping spheres depend
-        # on the pose and count overlaps twice. The spheres weigh nothing; one ballast member carries the exact mass
-        # and inertia of the boxes and is erased again, which leaves the clump's state alone.
-        omega, particle = self._omega, self.particle
-        spheres = [
-            omega.bodies.append(self._utils.sphere(self._vector(*centre), particle.radius, material="smarticle"))
-            for centre in particle.centres
-        ]
-        ballast = self._yade.Body()
-        ballast.shape = self._yade.Box()
-        ballast.material = omega.materials["smarticle"]
-        ballast.state.mass = particle.boxes.mass
-        ballast.state.inertia = self._vector(*particle.boxes.inertia)
-        ballast_id = omega.bodies.append(ballast)
-        clump_id = omega.bodies.clump([*spheres, ballast_id], discretization=0)
-        omega.bodies.erase(ballast_id)
-        clump = omega.bodies[clump_id].state
-        # YADE sorts the principal axes: a permutation of ours, the same for every smarticle.
-        principal = clump.ori
-        x, y, z, w = rotation.as_quat()
-        clump.ori = self._quaternion(w, x, y, z) * principal
-        clump.pos = self._vector(*position)
-        for sphere, centre in zip(spheres, rotation.apply(particle.centres) + position, strict=True):
-            omega.bodies[sphere].state.pos = self._vector(*centre)
-            self._smarticle_of[sphere] = len(self._clumps)
-        self._clumps.append(clump)
-        self._clump_ids.append(clump_id)
-        self._to_body = principal.inverse()
+        self._assembly.add(poses)
 
     # -- time --------------------------------------------------------------------------------------------------
 
@@ -325,21 +209,24 @@ class Engine:
             RunError: YADE stopped before the last step.
         """
         if steps <= 0:
-            # YADE would take it for a run without end.
             return
+        step, omega = self._omega.step, self._omega
         target = self.steps + steps
-        self._omega.run(steps, False)
-        try:
-            while self._omega.running:
-                time.sleep(POLL_INTERVAL)
-        except BaseException:
-            # Ctrl-C arrives here, while YADE's own thread is at work: let it finish its step.
-            self._omega.pause()
-            raise
-        self._smarticle_seconds += steps * self.time_step * self.count
-        if self.steps != target:
+        tracked = self._track_work and self._shaker is not None and not self._shaker.dead
+        # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
+        # arrives between two steps.
+        for _ in range(steps):
+            step()
+            if tracked:
+                self._container_work -= self._lift() * self._floor.vel[2] * self.time_step
+        if int(omega.iter) != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
+        self._smarticle_seconds += steps * self.time_step * self.count
+
+    def _lift(self) -> float:
+        """Vertical force of the smarticles on the container in the last step [N]."""
+        return float(self._yade.utils.sumForces(self._container, self._yade.vector(0, 0, 1)))
 
     def shake(self, *, amplitude: float, frequency: float) -> None:
         """Move the container as z = A sin(2πf t), t from now; it starts at the position where it is.
@@ -355,9 +242,9 @@ class Engine:
         # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
         omega = 2 * math.pi * frequency
         phase = -math.pi / 2 - omega * (self.time - self.time_step / 2)
-        self._shaker.A = self._vector(0, 0, amplitude)
-        self._shaker.f = self._vector(0, 0, frequency)
-        self._shaker.fi = self._vector(0, 0, phase)
+        self._shaker.A = self._yade.vector(0, 0, amplitude)
+        self._shaker.f = self._yade.vector(0, 0, frequency)
+        self._shaker.fi = self._yade.vector(0, 0, phase)
         self._shaker.dead = False
 
     def stop_container(self) -> None:
@@ -365,19 +252,73 @@ class Engine:
         if self._shaker is not None:
             self._shaker.dead = True
         for body in self._container:
-            self._omega.bodies[body].state.vel = self._vector(0, 0, 0)
+            self._omega.bodies[body].state.vel = self._yade.vector(0, 0, 0)
+
+    # -- articulation ------------------------------------------------------------------------------------------
+
+    @property
+    def hinged(self) -> bool:
+        """Whether the scene has hinges and motors, at work or not."""
+        return self._motor_law is not None
+
+    @property
+    def articulated(self) -> bool:
+        """Whether smarticles are three hinged links at present."""
+        return self._assembly.hinges is not None
+
+    def articulate(self) -> None:
+        """Split welded smarticles into hinged links, their motors holding the barbs where they are."""
+        if self.articulated:
+            return
+        assert self._motor_law is not None  # the engine was built for scenes that never articulate
+        self._assembly.articulate()
+        # Spheres of one smarticle may touch each other from now on: neighbours must be looked for anew.
+        self._collider.doSort = True
+        angles = self._hinges.angles()
+        if self.motors is None:
+            self.motors = Motors(self._motor_law, angles)
+        self.motors.engage(angles)
+
+    def weld(self) -> None:
+        """Make each smarticle one rigid body of the shape that it has: motors that hold, at a third of the cost."""
+        self._weld_loss += self._assembly.weld()
+
+    def actuate(self, targets: Array, interval: float) -> None:
+        """Let the motors look at their barbs and act for one control period.
+
+        Args:
+            targets: (N, 2) angles at the end of the period according to the schedule [rad].
+            interval: length of the period [s].
+        """
+        assert self.motors is not None  # only articulated smarticles are actuated
+        self._hinges.set_torques(self.motors.look(self._hinges.angles(), targets, interval))
+
+    @property
+    def _hinges(self) -> Any:
+        assert self._assembly.hinges is not None
+        return self._assembly.hinges
+
+    def joint_gaps(self) -> Array:
+        """(N, 2) how far the hinges have given way [m]; zero while welded."""
+        hinges = self._assembly.hinges
+        return np.zeros((self.count, 2)) if hinges is None else hinges.gaps()
 
     # -- state -------------------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
         """Smarticles present."""
-        return len(self._clumps)
+        return self._assembly.count
 
     @property
     def gravity_impulse(self) -> float:
         """What gravity has given to all smarticles, each since it was added [N s], downwards."""
-        return self._smarticle_seconds * self.particle.boxes.mass * self._gravity
+        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity
+
+    @property
+    def container_work(self) -> float:
+        """Work of the moving container on the smarticles since the start [J]; 0 where it is not tracked."""
+        return self._container_work
 
     @property
     def floor(self) -> float:
@@ -391,23 +332,16 @@ class Engine:
 
     def state(self) -> State:
         """Poses and velocities of all smarticles."""
-        rows = []
-        for clump in self._clumps:
-            x, v, w, q = clump.pos, clump.vel, clump.angVel, clump.ori * self._to_body
-            # Component by component: five times faster than letting NumPy convert YADE's vectors.
-            rows.append((x[0], x[1], x[2], v[0], v[1], v[2], w[0], w[1], w[2], q[0], q[1], q[2], q[3]))
-        table = np.array(rows).reshape(-1, 13)
-        positions, velocities, spins, quaternions = np.split(table, (3, 6, 9), axis=1)
-        rotations = Rotation.from_quat(quaternions).as_matrix() if rows else np.empty((0, 3, 3))
-        return State(positions, rotations, velocities, spins)
+        return self._assembly.state()
 
     def contacts(self) -> NDArray[np.int64]:
         """(N,) int64: how many other smarticles each one touches."""
         touching: set[tuple[int, int]] = set()
+        smarticle_of = self._assembly.smarticle_of
         for interaction in self._omega.interactions:
-            first = self._smarticle_of.get(interaction.id1)
-            second = self._smarticle_of.get(interaction.id2)
-            if first is None or second is None or not interaction.isReal:
+            first = smarticle_of.get(interaction.id1)
+            second = smarticle_of.get(interaction.id2)
+            if first is None or second is None or first == second or not interaction.isReal:
                 continue
             if interaction.phys.normalForce.squaredNorm() > 0:
                 touching.add((first, second) if first < second else (second, first))
@@ -419,10 +353,11 @@ class Engine:
     def touches(self) -> NDArray[np.int64]:
         """(N,) int64: contacts of each smarticle with others and with the container, spheres counted singly."""
         result = np.zeros(self.count, dtype=np.int64)
+        smarticle_of = self._assembly.smarticle_of
         for interaction in self._omega.interactions:
             if interaction.isReal:
                 for body in (interaction.id1, interaction.id2):
-                    k = self._smarticle_of.get(body)
+                    k = smarticle_of.get(body)
                     if k is not None:
                         result[k] += 1
         return result
@@ -442,17 +377,10 @@ class Engine:
         """
         if self._loaded is not None and self._loaded[0] == self.steps:
             return self._loaded[1]
-        if not self._clump_ids or not self._gravity:
+        if not self.count or not self.gravity:
             return math.inf
-        weight = self.particle.boxes.mass * self._gravity
-        total = 0.0
-        for clump in self._clump_ids:
-            x, y, z = self._omega.forces.f(clump)
-            total += math.sqrt(x * x + y * y + (z - weight) ** 2)
-        return total / (weight * len(self._clump_ids))
-
-    def kinetic_energy(self, state: State) -> float:
-        """Translational and rotational kinetic energy [J] of the smarticles in a state."""
-        spins = np.einsum("nij,ni->nj", state.rotations, state.angular_velocities)
-        mass, inertia = self.particle.boxes.mass, self.particle.boxes.inertia
-        return float(0.5 * mass * (state.velocities**2).sum() + 0.5 * (inertia * spins**2).sum())
+        weight = self.particle.boxes.mass * self.gravity
+        rows = [(f[0], f[1], f[2]) for f in map(self._omega.forces.f, self._assembly.bodies)]
+        forces = np.array(rows).reshape(self.count, -1, 3).sum(axis=1)
+        forces[:, 2] -= weight
+        return float(np.linalg.norm(forces, axis=1).mean() / weight)

@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine import State
 from dem.files import write_text, write_whole
-from dem.particle import LINKS, Boxes
+from dem.motor import Motors
+from dem.particle import LINKS
+from dem.state import State
 
 Array = NDArray[np.float64]
 
@@ -24,47 +26,60 @@ VERTICES = 4
 
 
 def frame_mesh(
-    boxes: Boxes,
     state: State,
     *,
     contacts: NDArray[np.int64],
     time: float,
     floor: float,
     phase: int,
+    hinged: bool = False,
+    motors: Motors | None = None,
 ) -> meshio.Mesh:
     """One frame as a mesh of lines.
 
     Args:
-        boxes: one smarticle.
         state: all smarticles at this time.
         contacts: (N,) how many others each smarticle touches.
         time: simulated time [s].
         floor: height of the container's floor [m].
         phase: index of the phase.
+        hinged: whether the scene has hinges and motors at all.
+        motors: those of all smarticles while they are at work; None while welded.
     """
-    n = len(state.positions)
-    vertices = state.points(boxes.vertices)
-    centres = (vertices[:, :-1] + vertices[:, 1:]) / 2
-    arms = centres - state.positions[:, None]
-    velocities = state.velocities[:, None] + np.cross(state.angular_velocities[:, None], arms)
+    n = state.count
     first = VERTICES * np.arange(n)[:, None] + np.arange(LINKS)
     lines = np.stack([first, first + 1], axis=-1).reshape(-1, 2)
     number = LINKS * n
     data = {
         "smarticle_id": np.repeat(np.arange(n), LINKS),
         "link": np.tile(np.arange(LINKS), n),
-        "velocity_m_per_s": velocities.reshape(-1, 3),
-        "angular_velocity_rad_per_s": np.repeat(state.angular_velocities, LINKS, axis=0),
+        "velocity_m_per_s": state.link_velocities.reshape(-1, 3),
+        "angular_velocity_rad_per_s": state.link_spins.reshape(-1, 3),
         "contacts": np.repeat(contacts, LINKS),
         "time_s": np.full(number, time),
         "floor_z_m": np.full(number, floor),
         "phase": np.full(number, phase, dtype=np.int64),
     }
+    if hinged:
+        none = np.full((n, 2), np.nan)
+        data |= {
+            "angle_rad": _per_link(state.angles),
+            "motor_torque_N_m": _per_link(none if motors is None else motors.torques),
+            "motor_work_J": _per_link(none if motors is None else motors.work),
+            "halted": np.nan_to_num(_per_link(none if motors is None else motors.halted)).astype(np.int64),
+        }
     return meshio.Mesh(
-        vertices.reshape(-1, 3),
+        state.vertices.reshape(-1, 3),
         [("line", lines)],
         cell_data={name: [values] for name, values in data.items()},
     )
+
+
+def _per_link(barbs: NDArray[Any]) -> Array:
+    """(3N,) values on the barbs, from (N, 2); NaN on the middle links."""
+    links = np.full((len(barbs), LINKS), np.nan)
+    links[:, [0, 2]] = barbs
+    return links.ravel()
 
 
 @dataclass

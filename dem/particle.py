@@ -21,6 +21,9 @@ from dem.errors import InputError
 Array = NDArray[np.float64]
 
 LINKS = 3
+# Free distance between a barb's first sphere and the hinge's, in diameters: as much as a loaded hinge may give way
+# before the links of one smarticle touch, so that they need no exclusion from contact while they turn.
+HINGE_CLEARANCE = 0.01
 
 
 def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
@@ -148,6 +151,34 @@ class Boxes:
         return np.diag(rotation.T @ tensor @ rotation).copy(), rotation
 
     @property
+    def link_masses(self) -> Array:
+        """(3,) float64 [kg]."""
+        return self.density * self.thickness_normal * self.thickness_in_plane * self.lengths
+
+    @property
+    def link_inertias(self) -> Array:
+        """(3, 3) float64 [kg m²]: principal moments of each link, along its length, in the plane, along the normal."""
+        t1, t2, length = self.thickness_normal, self.thickness_in_plane, self.lengths
+        squares = np.stack([np.full(LINKS, t1**2 + t2**2), length**2 + t1**2, length**2 + t2**2], axis=1)
+        moments: Array = self.link_masses[:, None] * squares / 12
+        return moments
+
+    @cached_property
+    def link_centres(self) -> Array:
+        """(3, 3) float64 [m]: centres of the links in the body frame."""
+        return self.to_body(self._plain_centres)
+
+    @cached_property
+    def link_rotations(self) -> Array:
+        """(3, 3, 3) float64: link frames in the body frame; columns: along the link, in the plane, normal.
+
+        Barbs point from the hinge to the tip, the middle link from hinge 1 to hinge 2.
+        """
+        normal = np.array([0.0, 0.0, 1.0])
+        frames = [np.stack([u, np.cross(normal, u), normal], axis=1) for u in self.directions]
+        return np.asarray(self._principal[1].T @ np.array(frames))
+
+    @property
     def inertia(self) -> Array:
         """(3,) float64 [kg m²]: principal moments about the centre of mass, along the body axes."""
         return self._principal[0]
@@ -218,9 +249,8 @@ class Particle:
             inset = 0.0 if self.boxes.barb_length > 0 else d / 2
             start, end = inset, self.boxes.middle_length - inset
         else:
-            # One diameter away from the hinge's sphere, so that the links of one smarticle never overlap while they
-            # turn; the last sphere's surface is the tip.
-            start, end = d, self.boxes.barb_length - d / 2
+            # A little more than one diameter away from the hinge's sphere; the last sphere's surface is the tip.
+            start, end = d * (1 + HINGE_CLEARANCE), self.boxes.barb_length - d / 2
             if end <= 0:
                 return np.empty(0)
             if end <= start:
@@ -251,6 +281,13 @@ class Particle:
     def links(self) -> NDArray[np.int64]:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]
+
+    @cached_property
+    def local_centres(self) -> Array:
+        """(S, 3) float64 [m]: sphere centres, each in the frame of its link (see `Boxes.link_rotations`)."""
+        arms = self.centres - self.boxes.link_centres[self.links]
+        local: Array = np.einsum("sij,si->sj", self.boxes.link_rotations[self.links], arms)
+        return local
 
     @property
     def radius(self) -> float:

@@ -1,4 +1,4 @@
-"""The stages of a run: pour, rest, shake.
+"""The stages of a run: pour, rest, shake, actuate.
 
 A stage is asked again and again when it wants to be asked next; in between, time passes and everything due is recorded.
 All that it remembers is plain data, so that a run can be stopped between any two steps and go on as if it had not been.
@@ -11,9 +11,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from dem.actuation import Drive, drive
 from dem.engine import Engine
 from dem.errors import RunError
-from dem.parts import Deposit, Phase, Relax, Settle, Shake
+from dem.parts import Deposit, Relax, Settle, Shake
 from dem.placement import place_layer
 from dem.scene import Scene, derive_seed
 
@@ -40,13 +41,16 @@ class Stage(Protocol):
         """
 
 
-def begin(phase: Phase, scene: Scene) -> Stage:
+def begin(scene: Scene, index: int) -> Stage:
     """The stage of a phase, at its beginning."""
+    phase = scene.phases[index]
     if isinstance(phase, Deposit):
         return Pouring(phase, scene)
     if isinstance(phase, Shake):
         return Shaking(phase, scene.gravity_m_per_s2)
-    return Resting(phase)
+    if isinstance(phase, Relax):
+        return Resting(phase)
+    return Actuating(drive(scene, index), scene.fidelity.control_interval_s)
 
 
 class Resting:
@@ -61,6 +65,7 @@ class Resting:
         if self.memory["begun"]:
             return 0.0
         self.memory["begun"] = True
+        engine.weld()
         return self._phase.duration_s
 
 
@@ -78,8 +83,30 @@ class Shaking:
             engine.stop_container()
             return 0.0
         self.memory["begun"] = True
+        engine.weld()
         engine.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)
         return self._phase.duration_s
+
+
+class Actuating:
+    """The motors follow their schedule, one look per control period; smarticles are articulated meanwhile."""
+
+    def __init__(self, schedule: Drive, interval: float) -> None:
+        self._drive = schedule
+        self._interval = interval
+        self._looks = math.ceil(schedule.duration / interval - 1e-9)
+        self.memory: Memory = {"look": 0}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        look: int = self.memory["look"]
+        if look == 0:
+            engine.articulate()
+        # The last look only takes note of the work since the one before.
+        time = min((look + 1) * self._interval, self._drive.duration)
+        engine.actuate(self._drive.targets(time), self._interval)
+        self.memory["look"] = look + 1
+        return self._interval if look < self._looks else 0.0
 
 
 class Pouring:
@@ -171,7 +198,7 @@ def container_height(scene: Scene) -> float:
 
 def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np.random.Generator) -> None:
     particle, state = scene.particle, engine.state()
-    tops = state.points(particle.boxes.vertices)[..., 2].max(axis=1) if engine.count else np.zeros(0)
+    tops = state.vertices[..., 2].max(axis=1)
     top = tops.max(initial=engine.floor)
     near = tops > top - 2 * particle.radius
     poses = place_layer(
@@ -180,7 +207,7 @@ def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np
         radius=engine.cylinder.inner_radius,
         bottom=top + particle.radius,
         height=phase.layer_height_w * scene.smarticle.middle_length_m,
-        obstacles=state.points(particle.centres)[near].reshape(-1, 3),
+        obstacles=state.spheres(particle)[near].reshape(-1, 3),
         rng=rng,
     )
     highest = poses.positions[:, 2].max() + particle.reach

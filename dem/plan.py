@@ -6,10 +6,11 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from dem.actuation import actuated
 from dem.parts import Deposit, Shake
 from dem.phases import container_height, shake_amplitude
 from dem.scene import Scene
-from dem.timestep import contact_law, stable_time_step, time_step
+from dem.timestep import stable_step, time_step
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
@@ -111,7 +112,7 @@ def plan(scene: Scene) -> Plan:
         spheres_per_smarticle=spheres,
         sphere_diameter_m=particle.chain.diameter,
         time_step_s=dt,
-        stable_time_step_s=stable_time_step(particle, contact_law(scene)),
+        stable_time_step_s=stable_step(scene),
         container_height_m=container_height(scene),
         phases=tuple(phases),
         effects=effects,
@@ -164,7 +165,37 @@ def _effects(scene: Scene) -> tuple[Effect, ...]:
             else f"every {recording.checkpoint_interval_s:g} s; a killed run goes on from the last one",
             "saving and reloading the simulation",
         ),
-        Effect("articulation", False, "no phase actuates; each smarticle is one welded clump", "none"),
+        *_actuation_effects(scene),
+        Effect(
+            "energy",
+            recording.energy,
+            "recording.energy is true" if recording.energy else "recording.energy is false",
+            "one sum over the container's bodies per step while it is shaken",
+        ),
+    )
+
+
+def _actuation_effects(scene: Scene) -> tuple[Effect, Effect]:
+    driven = [k for k, phase in enumerate(scene.phases) if actuated(phase)]
+    if not driven:
+        none = "no phase actuates; each smarticle is one welded clump"
+        return Effect("articulation", False, none, "none"), Effect("motors", False, none, "none")
+    numbers = ", ".join(map(str, driven))
+    motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
+    return (
+        Effect(
+            "articulation",
+            True,
+            f"phases {numbers}: three links and two hinges per smarticle, pins of {pin:g} N/m; welded in the others",
+            "a shorter time step throughout; two bonds per hinge and three bodies per smarticle while articulated",
+        ),
+        Effect(
+            "motors",
+            True,
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, τ_max = {scene.torque_limit:.3g} N m ({motor.law}), "
+            f"a look every {scene.fidelity.control_interval_s:g} s",
+            "two readings per smarticle and look",
+        ),
     )
 
 

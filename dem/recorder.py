@@ -46,12 +46,13 @@ class Recorder:
         phi = self.series.sample(engine, state, phase)
         if engine.count and engine.steps % self.frame_steps == 0:
             mesh = frame_mesh(
-                engine.particle.boxes,
                 state,
                 contacts=engine.contacts(),
                 time=engine.time,
                 floor=engine.floor,
                 phase=phase,
+                hinged=engine.hinged,
+                motors=engine.motors if engine.articulated else None,
             )
             self.frames.write(mesh, engine.time)
             self.series.write()

@@ -16,11 +16,15 @@ import h5py
 import meshio
 import numpy as np
 
+from dem.actuation import actuated
 from dem.checkpoint import has_checkpoint, read_checkpoint
-from dem.engine import Cylinder, Engine, yade_version
+from dem.container import Cylinder
+from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
+from dem.library import yade_version
+from dem.motor import MotorLaw
 from dem.parts import Shake
 from dem.phases import container_height, shake_amplitude
 from dem.progress import Progress
@@ -29,7 +33,7 @@ from dem.rundir import DONE, FAILED, MANIFEST, SCENE, claimed, log_of, mark_done
 from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
 from dem.simulation import Simulation, StopRequestedError
-from dem.timestep import contact_law, time_step
+from dem.timestep import contact_law, hinge_law, time_step
 from dem.watchdog import Watchdog
 
 FORMAT = 1
@@ -206,6 +210,18 @@ def _build_engine(scene: Scene, dt: float) -> Engine:
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
         shaken=any(isinstance(phase, Shake) for phase in scene.phases),
+        hinges=(hinge_law(scene), motor_law(scene)) if any(actuated(phase) for phase in scene.phases) else None,
+        track_work=scene.recording.energy,
+    )
+
+
+def motor_law(scene: Scene) -> MotorLaw:
+    """The motors of a scene that actuates."""
+    return MotorLaw(
+        torque_limit=scene.torque_limit,
+        speed_limit=scene.motor.speed_limit_rad_per_s,
+        stiffness=scene.motor.stiffness_N_m_per_rad,
+        law=scene.motor.law,
     )
 
 
@@ -222,7 +238,13 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         default=0.0,
     )
     return Recorder(
-        series=SeriesWriter(out, radius, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
+        series=SeriesWriter(
+            out,
+            radius,
+            {"scene_sha256": scene_hash(scene), "seed": scene.seed},
+            motors=engine.hinged,
+            energy=scene.recording.energy,
+        ),
         frames=FrameWriter(out),
         watchdog=Watchdog(radius=radius, height=height, speed=SPEED_MARGIN * max(fall, shaking)),
         progress=progress,

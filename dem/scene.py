@@ -16,9 +16,11 @@ from typing import Any, Literal, Self
 import yaml
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from dem.actuation_checks import check_actuation
 from dem.errors import InputError
+from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
-from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Part, Phase, Recording, Smarticle
+from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Motor, Phase, Recording, Smarticle
 from dem.yaml_text import StrictLoader
 
 SCHEMA_VERSION = 1
@@ -34,6 +36,7 @@ class Scene(Part):
     count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles [1]")
     container: Container = Field(default_factory=Container, description="the container")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
+    motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]")
     fidelity: Fidelity = Field(
         default_factory=lambda: Fidelity(base="standard", **FIDELITIES["standard"]),
@@ -61,6 +64,7 @@ class Scene(Part):
         self._check_section()
         self._check_container()
         self._check_recording()
+        check_actuation(self)
         return self
 
     def _check_phases(self) -> None:
@@ -115,8 +119,10 @@ class Scene(Part):
                 raise ValueError(msg)
         for number, phase in enumerate(self.phases):
             if not isinstance(phase, Deposit) and phase.duration_s < series:
+                # A shape change has no key for its length; it is the sum of three.
+                key = ".duration_s" if "duration_s" in type(phase).model_fields else ""
                 msg = (
-                    f"phases.{number}.duration_s: {phase.duration_s:g} s is shorter than "
+                    f"phases.{number}{key}: {phase.duration_s:g} s is shorter than "
                     f"recording.series_interval_s = {series:g} s; lengthen the phase or sample more often"
                 )
                 raise ValueError(msg)
@@ -131,6 +137,18 @@ class Scene(Part):
             width = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
             return width / chain_mean_width(self.fidelity.pitch)
         return smarticle.thickness_in_plane_m
+
+    def seed_for(self, purpose: str) -> int:
+        """See `derive_seed`."""
+        return derive_seed(self.seed, purpose)
+
+    @property
+    def torque_limit(self) -> float:
+        """τ_max [N m] of the motors: given, or by the rule that `Motor.torque_limit_N_m` states."""
+        if self.motor.torque_limit_N_m is not None:
+            return self.motor.torque_limit_N_m
+        paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
+        return paper.mass * self.gravity_m_per_s2 * paper.middle_length
 
     @cached_property
     def particle(self) -> Particle:
@@ -172,7 +190,7 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        msg = f"{source}: {_first_line(error)}"
+        msg = f"{source}: {_first_line(error, data)}"
         raise InputError(msg) from None
 
 
@@ -259,12 +277,12 @@ def _child(here: Any, part: str, override: str) -> Any:
     raise InputError(msg)
 
 
-def _first_line(error: ValidationError) -> str:
+def _first_line(error: ValidationError, data: Any) -> str:
     """The first of pydantic's errors as `key: what, value; way out`, and how many more there are."""
-    errors = error.errors()
+    # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
+    errors = [found for found in error.errors() if found["type"] != "default_factory_not_called"]
     first = errors[0]
-    # Members of a discriminated union carry the tag as an extra step of the path; it is no key of the file.
-    place = ".".join(str(step) for step in first["loc"] if step not in ("deposit", "relax", "shake"))
+    place = _key(first["loc"], data)
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "missing":
         text = "missing; it has no default"
@@ -272,3 +290,20 @@ def _first_line(error: ValidationError) -> str:
         text = f"{text[0].lower()}{text[1:]}, got {first['input']!r}"
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     return f"{place}: {text}{more}" if place else f"{text}{more}"
+
+
+def _key(steps: Sequence[int | str], data: Any) -> str:
+    """Pydantic's path to a value as the key of the scene file.
+
+    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
+    """
+    here, keys = data, []
+    for step in steps:
+        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
+            continue
+        keys.append(str(step))
+        if isinstance(here, Mapping):
+            here = here.get(step)
+        elif isinstance(here, list) and isinstance(step, int):
+            here = here[step]
+    return ".".join(keys)

@@ -13,8 +13,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine import Engine, State
+from dem.engine import Engine
 from dem.files import write_whole
+from dem.motor import Motors
+from dem.state import State
 
 FORMAT = 1
 
@@ -36,6 +38,22 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "1",
         "N V_s / (pi r² z), z the second-highest centre of mass above the floor",
     ),
+}
+
+# Only in scenes that actuate.
+MOTOR_COLUMNS: dict[str, tuple[str, str]] = {
+    "commanded_angle_rad": ("rad", "mean angle that the motors hold, barb 1 and barb 2"),
+    "angle_rad": ("rad", "mean actual angle, barb 1 and barb 2"),
+    "tracking_error_rad": ("rad", "largest difference of commanded and actual angle; NaN while welded"),
+    "motor_torque_N_m": ("N m", "root mean square torque of the motors; NaN while welded"),
+    "halted_fraction": ("1", "share of motors that are halted by their torque; NaN while welded"),
+    "motor_work_J": ("J", "work of all motors on the links since the start, sum of ∫ τ dα"),
+    "joint_gap_m": ("m", "how far the hinge that gives way most has done so"),
+}
+# Only in scenes that ask for energy.
+ENERGY_COLUMNS: dict[str, tuple[str, str]] = {
+    "gravitational_energy_J": ("J", "of all smarticles above the floor's height at the start"),
+    "container_work_J": ("J", "work of the moving container on the smarticles since the start, without its own weight"),
 }
 
 
@@ -61,13 +79,25 @@ class SeriesWriter:
         folder: the run directory.
         radius: of the container [m].
         attributes: root attributes: scene hash, seed.
+        motors: whether the scene has motors.
+        energy: whether the scene asks for energy.
     """
 
     folder: Path
     radius: float
     attributes: dict[str, Any]
-    _rows: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in COLUMNS})
+    motors: bool = False
+    energy: bool = False
+    _rows: dict[str, list[Any]] = field(default_factory=dict)
     _before: tuple[float, float, NDArray[np.float64]] | None = None
+
+    def __post_init__(self) -> None:
+        self._rows = {name: [] for name in self.described}
+
+    @property
+    def described(self) -> dict[str, tuple[str, str]]:
+        """Unit and description of each column."""
+        return COLUMNS | (MOTOR_COLUMNS if self.motors else {}) | (ENERGY_COLUMNS if self.energy else {})
 
     def sample(self, engine: Engine, state: State, phase: int) -> float:
         """Take one sample.
@@ -84,13 +114,20 @@ class SeriesWriter:
             "count": engine.count,
             "container_z_m": engine.floor,
             "container_velocity_m_per_s": engine.container_velocity,
-            "container_force_N": self._mean_force(engine, boxes.mass * state.velocities.sum(axis=0)),
+            "container_force_N": self._mean_force(engine, state.momentum),
             "com_height_m": heights.mean() if len(heights) else math.nan,
-            "kinetic_energy_J": engine.kinetic_energy(state),
+            "kinetic_energy_J": state.kinetic_energy,
             "max_speed_m_per_s": np.linalg.norm(state.velocities, axis=1).max(initial=0.0),
             "unbalanced_force": engine.unbalanced_force(),
             "packing_fraction": phi,
         }
+        if self.motors:
+            row |= _motor_row(engine, state)
+        if self.energy:
+            row |= {
+                "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
+                "container_work_J": engine.container_work,
+            }
         for name, value in row.items():
             self._rows[name].append(value)
         return phi
@@ -122,7 +159,7 @@ class SeriesWriter:
         """Go on from where `memory` and `columns` were taken."""
         before = memory["before"]
         self._before = None if before is None else (before[0], before[1], np.array(before[2]))
-        self._rows = {name: list(columns[name]) for name in COLUMNS}
+        self._rows = {name: list(columns[name]) for name in self.described}
 
     def write(self) -> None:
         """Rewrite the file with all samples.
@@ -140,8 +177,37 @@ class SeriesWriter:
             for name, value in self.attributes.items():
                 file.attrs[name] = value
             columns = self.columns
-            for name, (unit, description) in COLUMNS.items():
+            for name, (unit, description) in self.described.items():
                 dataset = file.create_dataset(name, data=columns[name])
                 dataset.attrs["unit"] = unit
                 dataset.attrs["description"] = description
         path.write_bytes(content.getvalue())
+
+
+def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
+    motors: Motors | None = engine.motors
+    angles = _mean(state.angles)
+    if motors is None or not engine.articulated:
+        unknown = math.nan
+        held = angles if motors is None else _mean(motors.commands)
+        error = torque = halted = unknown
+    else:
+        held = _mean(motors.commands)
+        error = np.abs(motors.commands - state.angles).max(initial=0.0)
+        torque = math.sqrt(np.square(motors.torques).mean())
+        halted = motors.halted.mean()
+    return {
+        "commanded_angle_rad": held,
+        "angle_rad": angles,
+        "tracking_error_rad": error,
+        "motor_torque_N_m": torque,
+        "halted_fraction": halted,
+        "motor_work_J": 0.0 if motors is None else motors.work.sum(),
+        "joint_gap_m": engine.joint_gaps().max(initial=0.0),
+    }
+
+
+def _mean(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) mean over smarticles of (N, 2); NaN without smarticles."""
+    mean: NDArray[np.float64] = angles.mean(axis=0) if len(angles) else np.full(2, math.nan)
+    return mean

@@ -79,7 +79,7 @@ class Simulation:
     def _run_phase(self) -> None:
         phase = self.scene.phases[self._phase]
         if self._stage is None:
-            self._stage = begin(phase, self.scene)
+            self._stage = begin(self.scene, self._phase)
             self._performed.append(
                 {"index": self._phase, "type": phase.type, "start_s": self.engine.time, "wall_s": -self.wall}
             )
@@ -170,7 +170,7 @@ class Simulation:
             saved.unlink(missing_ok=True)
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
-        self._stage = begin(self.scene.phases[self._phase], self.scene)
+        self._stage = begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
         self._performed = [dict(entry) for entry in state["performed"]]
         self._spent, self._began = state["wall_s"], time.monotonic()

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
+from dem.actuation import actuated
 from dem.errors import InputError
-from dem.particle import Particle
+from dem.hinges import HingeLaw
+from dem.particle import LINKS, Boxes, Particle
 from dem.scene import Scene
+
+Array = NDArray[np.float64]
 
 # Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
 # smarticle's chain touches two of them; more act along different directions and do not add up in one mode.
@@ -119,13 +126,116 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
     return min(steps)
 
 
+def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
+    """Largest stable time step [s] of an articulated smarticle, over its stiffest modes of hinges and contact together.
+
+    Three free links, 18 degrees of freedom, joined by the springs of the pins, in the same three surroundings as in
+    `stable_time_step`: the tip of a barb against another such tip, against the container, and all of it in a flat pile.
+    With M, K and C the matrices of mass, stiffness and damping, stable while K dt² + 2 C dt - 4 M has no positive
+    eigenvalue.
+
+    Args:
+        particle: one smarticle.
+        law: contact law.
+        hinges: stiffness of the hinges.
+    """
+    boxes = particle.boxes
+    mass = _mass_matrix(boxes)
+    pins = _hinge_stiffness(boxes, hinges)
+    tip = _push_shape(particle, [int(np.flatnonzero(particle.links == 0)[-1])], np.eye(3))
+    flat = _push_shape(particle, range(len(particle.centres)), np.array([[0.0, 0.0, 1.0]]))
+    steps = []
+    for shape, contacts, damping in (
+        (tip, 2 * CONTACTS_AT_A_TIP, law.normal_damping),
+        (tip, CONTACTS_AT_A_TIP, law.wall_damping),
+        (flat, 4, max(law.normal_damping, law.wall_damping / 2)),
+    ):
+        stiffness = pins + contacts * law.normal_stiffness * shape
+        damped = contacts * damping * shape
+        steps.append(_stable_step(mass, stiffness, damped))
+    return min(steps)
+
+
+def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
+    def excess(step: float) -> float:
+        return float(eigh(stiffness * step**2 + 2 * damping * step, mass, eigvals_only=True)[-1]) - 4
+
+    undamped = 2 / math.sqrt(float(eigh(stiffness, mass, eigvals_only=True)[-1]))
+    return float(brentq(excess, 0.0, undamped, xtol=1e-12)) if damping.any() else undamped
+
+
+def _mass_matrix(boxes: Boxes) -> Array:
+    """(18, 18) of three links: velocity and angular velocity of each, in the body frame."""
+    blocks = []
+    for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
+        blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
+    return np.asarray(block_diag(*blocks))
+
+
+def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
+    """(3, 18): velocity of a point of a link (3,) [m], body frame, from those of all links."""
+    x, y, z = point - boxes.link_centres[link]
+    rows = np.zeros((3, 6 * LINKS))
+    rows[:, 6 * link : 6 * link + 3] = np.eye(3)
+    rows[:, 6 * link + 3 : 6 * link + 6] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    return rows
+
+
+def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
+    """(18, 18): the stiffness matrix of both hinges."""
+    stiffness = np.zeros((6 * LINKS, 6 * LINKS))
+    plane = np.eye(3)[:2]
+    # The damper acts half way between the centre and the end of the axis (see `dem.hinges`).
+    damper = np.array([0.0, 0.0, boxes.thickness_normal / 4])
+    for hinge, barb in ((1, 0), (2, 2)):
+        centre = boxes.vertices[hinge]
+        apart = _velocity_of(boxes, barb, centre) - _velocity_of(boxes, 1, centre)
+        damped = plane @ (_velocity_of(boxes, barb, centre + damper) - _velocity_of(boxes, 1, centre + damper))
+        tilt = np.zeros((2, 6 * LINKS))
+        tilt[:, 6 * barb + 3 : 6 * barb + 6], tilt[:, 9:12] = plane, -plane
+        stiffness += law.pin_stiffness * apart.T @ apart
+        stiffness += law.damper_stiffness * damped.T @ damped
+        stiffness += law.tilt_stiffness * tilt.T @ tilt
+    return stiffness
+
+
+def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
+    """(18, 18): the stiffness matrix of springs of 1 N/m on spheres, along directions (k, 3)."""
+    shape = np.zeros((6 * LINKS, 6 * LINKS))
+    for sphere in spheres:
+        rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])
+        shape += rows.T @ rows
+    return shape
+
+
+def hinge_law(scene: Scene) -> HingeLaw:
+    """The hinges of a scene that actuates."""
+    motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
+    return HingeLaw(
+        pin_stiffness=pin,
+        # As if the pin were held at both faces of the links.
+        tilt_stiffness=pin * (scene.smarticle.thickness_normal_m / 2) ** 2,
+        shaft_stiffness=motor.stiffness_N_m_per_rad,
+        torque_cap=scene.torque_limit if motor.law == "slip" else None,
+    )
+
+
+def stable_step(scene: Scene) -> float:
+    """Largest stable time step [s] of a scene, articulated where a phase actuates."""
+    law = contact_law(scene)
+    stable = stable_time_step(scene.particle, law)
+    if any(actuated(phase) for phase in scene.phases):
+        stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
+    return stable
+
+
 def time_step(scene: Scene) -> float:
-    """The time step [s] of a scene, a whole fraction of its recording intervals.
+    """The time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
 
     Raises:
         InputError: the given `time_step_s` is above the stable one, or the recording intervals do not fit.
     """
-    stable = stable_time_step(scene.particle, contact_law(scene))
+    stable = stable_step(scene)
     given = scene.fidelity.time_step_s
     if given is not None and given > stable:
         msg = (
@@ -134,5 +244,6 @@ def time_step(scene: Scene) -> float:
         )
         raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
-    series = scene.recording.series_interval_s
-    return series / max(1, math.ceil(series / wanted * (1 - 1e-12)))
+    driven = any(actuated(phase) for phase in scene.phases)
+    whole = scene.fidelity.control_interval_s if driven else scene.recording.series_interval_s
+    return whole / max(1, math.ceil(whole / wanted * (1 - 1e-12)))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dem.engine import State
 from dem.errors import RunError
+from dem.state import State
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -40,12 +40,15 @@ class Frame:
         time: Simulated time [s].
         floor_z: Height of the container's floor [m]; heights are measured from it.
         phase: Index into `RunManifest.phases`.
-        vertices: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        vertices: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has
+            at that time.
         smarticle_ids: (N,) int64.
         link_velocity: (N, 3, 3) float64 [m/s], of the centres of barb 1, middle link, barb 2.
         link_angular_velocity: (N, 3, 3) float64 [rad/s].
         contacts: (N,) int64, how many other smarticles each one touches, by the engine.
-        cell_data: Further data of the file, (N, 3, …) one value per link, by name.
+        cell_data: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have
+            `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and
+            `halted`.
     """
 
     path: Path

@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 import pandas as pd
 
@@ -26,17 +25,7 @@ from postprocess.gravish_answers import (
     summarise_runs,
 )
 from postprocess.gravish_reference import DIGITISING_ERROR, SHAKE_TIME, read_reference
-from postprocess.manifest import RunManifest
-from postprocess.origin import (
-    closing_lines,
-    make_folder,
-    markdown_ending,
-    missing_table,
-    told_count,
-    write_provenance,
-    write_tables,
-    write_text,
-)
+from postprocess.origin import Origin, make_folder
 from postprocess.packing import DEFINITIONS
 from postprocess.study_runs import (
     ASPECT,
@@ -124,37 +113,29 @@ def analyse_gravish(
     summary = summarise_runs(runs, reference)
     deviations, steps = deviations_from_reference(summary), steps_between_ratios(summary)
     verdicts = answers(runs, summary, deviations, steps)
-    footer = _footer(manifests, runs, missing, note=note, command=command)
-    tables = {
-        "runs": runs,
-        "summary": summary,
-        "deviations": deviations,
-        "steps": steps,
-        "verdicts": pd.DataFrame([asdict(verdict) for verdict in verdicts]),
-        "missing": missing_table(missing),
-    }
-    written = write_tables(output, tables, footer)
-    text = _markdown(deviations, verdicts, missing, footer)
-    written["deviations.md"] = write_text(text, output / "deviations.md")
-    written["provenance.json"] = write_provenance(
-        output / "provenance.json",
-        study=_STUDY,
-        manifests=manifests,
-        missing=missing,
-        footer=footer,
-        note=note,
-        command=command,
-    )
-    drawn = gravish_figures.draw(
+    origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command)
+    footer = _footer(origin, runs)
+    files = origin.write(
         output,
-        summary=summary,
-        reference=reference,
-        manifests=manifests,
-        definition=DEFINITION,
-        reading_error=DIGITISING_ERROR,
-        footer=footer,
+        footer,
+        tables={
+            "runs": runs,
+            "summary": summary,
+            "deviations": deviations,
+            "steps": steps,
+            "verdicts": pd.DataFrame([asdict(verdict) for verdict in verdicts]),
+        },
+        text=("deviations.md", _markdown(deviations, verdicts)),
+        draw=lambda: gravish_figures.draw(
+            output,
+            summary=summary,
+            reference=reference,
+            manifests=manifests,
+            definition=DEFINITION,
+            reading_error=DIGITISING_ERROR,
+            footer=footer,
+        ),
     )
-    written |= {path.name: path for path in drawn}
     return GravishReport(
         runs=runs,
         summary=summary,
@@ -163,35 +144,21 @@ def analyse_gravish(
         verdicts=verdicts,
         missing=missing,
         footer=footer,
-        files=MappingProxyType(written),
+        files=files,
     )
 
 
-def _footer(
-    manifests: Sequence[RunManifest],
-    runs: pd.DataFrame,
-    missing: Sequence[MissingRun],
-    *,
-    note: str,
-    command: str,
-) -> tuple[str, ...]:
+def _footer(origin: Origin, runs: pd.DataFrame) -> tuple[str, ...]:
     counts = runs.groupby(ASPECT).size()
     ratios = " ".join(f"{ratio:g}" for ratio in counts.index)
-    return (
-        f"{told_count(_STUDY, manifests, missing)}; l/w {ratios}, {told_seeds(runs, counts, 'l/w')}; "
-        f"shaken for {told_shaken(runs)} (Gravish: {SHAKE_TIME:g} s).",
+    return origin.footer(
+        f"l/w {ratios}, {told_seeds(runs, counts, 'l/w')}; shaken for {told_shaken(runs)} (Gravish: {SHAKE_TIME:g} s).",
         f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame). "
         f"{told_bars(counts, 'l/w')}.",
-        *closing_lines(manifests, note=note, command=command),
     )
 
 
-def _markdown(
-    deviations: pd.DataFrame,
-    verdicts: Sequence[Verdict],
-    missing: Sequence[MissingRun],
-    footer: Sequence[str],
-) -> str:
+def _markdown(deviations: pd.DataFrame, verdicts: Sequence[Verdict]) -> list[str]:
     parts = ["# Packing of shaken smarticles against Gravish et al. 2012", "", "## Verdicts", ""]
     parts += ["| question | answer | evidence |", "| --- | --- | --- |"]
     parts += [f"| {v.question} | {v.answer} | {v.evidence} |" for v in verdicts]
@@ -214,4 +181,4 @@ def _markdown(
             f"| {row['stage']} | {row[ASPECT]:g} | {row[SEEDS]} | {row['phi [-]']:.4f}{bar} "
             f"| {row['phi Gravish [-]']:.4f} | {row['deviation [%]']:+.1f} % |"
         )
-    return "\n".join([*parts, *markdown_ending(missing, footer)])
+    return parts

@@ -43,7 +43,18 @@ _SERIES_COLUMNS = {
     "kinetic_energy_J": "kinetic energy",
     "max_speed_m_per_s": "max speed",
     "unbalanced_force": "unbalanced force",
+    "gravitational_energy_J": "gravitational energy",
+    "container_work_J": "container work",
+    "motor_work_J": "motor work",
+    "commanded_angle_rad": "commanded angle",
+    "angle_rad": "angle",
+    "tracking_error_rad": "tracking error",
+    "motor_torque_N_m": "motor torque",
+    "halted_fraction": "halted fraction",
+    "joint_gap_m": "joint gap",
 }
+# What the columns of a series of vectors are, by their number.
+_COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 # Recorded by the engine and measured here from the frames as well.
 _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
 
@@ -327,6 +338,6 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
         if values.ndim == 1:
             columns[f"{label} [{unit}]"] = float(values[index])
         else:
-            for axis, value in zip("xyz", values[index], strict=True):
-                columns[f"{label} {axis} [{unit}]"] = float(value)
+            for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
+                columns[f"{label} {component} [{unit}]"] = float(value)
     return columns

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import pandas as pd
 
@@ -35,72 +36,118 @@ def make_folder(path: Path | str) -> Path:
     return path
 
 
-def closing_lines(manifests: Sequence[RunManifest], *, note: str, command: str) -> tuple[str, ...]:
-    """The last statements of every footer: reference, note, versions, command."""
-    return (
-        f"Reference: {CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}.",
-        f"Note: {note}",
-        f"Versions: {'; '.join(_versions(manifests))}. Command: {command}",
-    )
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """What a study is compared with.
+
+    Attributes:
+        statement: Names it, for footers; without a full stop.
+        facts: The same for `provenance.json`.
+    """
+
+    statement: str
+    facts: Mapping[str, object]
 
 
-def told_count(study: str, manifests: Sequence[RunManifest], missing: Sequence[MissingRun]) -> str:
-    """The beginning of every footer: study, fidelity, how many runs."""
-    lacking = f", {len(missing)} missing" if missing else ""
-    total = len(manifests) + len(missing)
-    return f"Study {study}, fidelity {manifests[0].fidelity}: {len(manifests)} of {total} runs{lacking}"
+GRAVISH = Reference(
+    statement=f"{CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}",
+    facts=MappingProxyType(
+        {
+            "file": REFERENCE.name,
+            "sha256": hashlib.sha256(REFERENCE.read_bytes()).hexdigest(),
+            "digitising_error": DIGITISING_ERROR,
+        }
+    ),
+)
 
 
-def _versions(manifests: Sequence[RunManifest]) -> Iterator[str]:
-    """Each program with all its versions among the runs."""
-    for name in ("smarticles", "git", "yade"):
-        versions = sorted({run.versions.get(name, "unknown") for run in manifests})
-        yield f"{name} {', '.join(versions)}"
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Origin:
+    """What the results of a study come from.
 
-
-def write_provenance(
-    path: Path,
-    *,
-    study: str,
-    manifests: Sequence[RunManifest],
-    missing: Sequence[MissingRun],
-    footer: Sequence[str],
-    note: str,
-    command: str,
-) -> Path:
-    """Writes everything about the origin of a study's results as JSON.
-
-    Args:
-        path: Where to.
+    Attributes:
         study: Its name.
-        manifests: The runs used.
+        manifests: The runs used, one or more.
         missing: The runs that could not be used.
-        footer: What every table says.
         note: How these runs differ from the full study.
         command: Command line.
-
-    Returns:
-        The path written.
+        reference: What they are compared with.
     """
+
+    study: str
+    manifests: Sequence[RunManifest]
+    missing: tuple[MissingRun, ...]
+    note: str
+    command: str
+    reference: Reference = GRAVISH
+
+    def footer(self, points: str, *statements: str) -> tuple[str, ...]:
+        """What every table and figure says about its origin, one statement each.
+
+        Args:
+            points: Which runs there are; goes on from "… of … runs; ".
+            statements: What else is to be known, such as definitions.
+        """
+        lacking = f", {len(self.missing)} missing" if self.missing else ""
+        used, total = len(self.manifests), len(self.manifests) + len(self.missing)
+        versions = []
+        for name in ("smarticles", "git", "yade"):
+            found = sorted({run.versions.get(name, "unknown") for run in self.manifests})
+            versions.append(f"{name} {', '.join(found)}")
+        return (
+            f"Study {self.study}, fidelity {self.manifests[0].fidelity}: {used} of {total} runs{lacking}; {points}",
+            *statements,
+            f"Reference: {self.reference.statement}.",
+            f"Note: {self.note}",
+            f"Versions: {'; '.join(versions)}. Command: {self.command}",
+        )
+
+    def write(
+        self,
+        output: Path,
+        footer: Sequence[str],
+        *,
+        tables: Mapping[str, pd.DataFrame],
+        text: tuple[str, Sequence[str]],
+        draw: Callable[[], Sequence[Path]],
+    ) -> Mapping[str, Path]:
+        """Writes all results of a study: its tables and that of the missing runs, text, provenance, figures.
+
+        Args:
+            output: Folder, see `make_folder`.
+            footer: See `footer`.
+            tables: By name, without suffix.
+            text: Name of the Markdown file, and its lines; missing runs and footer are put below.
+            draw: Draws the figures into the folder.
+
+        Returns:
+            Everything that was written, by name.
+        """
+        written = write_tables(output, {**tables, "missing": missing_table(self.missing)}, footer)
+        name, lines = text
+        written[name] = write_text("\n".join([*lines, *markdown_ending(self.missing, footer)]), output / name)
+        provenance = output / "provenance.json"
+        written[provenance.name] = write_text(_provenance(self, footer), provenance)
+        return MappingProxyType(written | {path.name: path for path in draw()})
+
+
+def _provenance(origin: Origin, footer: Sequence[str]) -> str:
+    """Everything about the origin of a study's results as JSON."""
     try:
         version = importlib.metadata.version("smarticles")
     except importlib.metadata.PackageNotFoundError:
         version = "unknown"
-    origin = {
+    content = {
         "format": 1,
-        "study": study,
-        "note": note,
-        "command": command,
+        "study": origin.study,
+        "note": origin.note,
+        "command": origin.command,
         "footer": list(footer),
         "analysed_with": {"smarticles": version},
         "definition": DEFINITION,
         "definition_meaning": DEFINITIONS[DEFINITION],
         "frames_averaged_at_most": LAST_FRAMES,
-        "reference": {
-            "file": REFERENCE.name,
-            "sha256": hashlib.sha256(REFERENCE.read_bytes()).hexdigest(),
-            "digitising_error": DIGITISING_ERROR,
-        },
+        "reference": dict(origin.reference.facts),
         "runs": [
             {
                 "directory": str(run.directory),
@@ -113,11 +160,11 @@ def write_provenance(
                 "command": run.command,
                 "versions": dict(run.versions),
             }
-            for run in manifests
+            for run in origin.manifests
         ],
-        "missing": [asdict(run) for run in missing],
+        "missing": [asdict(run) for run in origin.missing],
     }
-    return write_text(json.dumps(origin, indent=2, ensure_ascii=False) + "\n", path)
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def write_tables(folder: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> dict[str, Path]:

@@ -1,4 +1,4 @@
-"""Means over seeds and their differences, with 95 % confidence intervals by Student's t.
+"""Means over seeds, their differences and slopes, with 95 % confidence intervals by Student's t.
 
 Runs that differ in their seed alone are independent, unlike successive frames of one run, see
 `postprocess.averages`. One seed has a mean and no error.
@@ -7,7 +7,7 @@ Runs that differ in their seed alone are independent, unlike successive frames o
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,6 +103,64 @@ def difference(mean: SeedMean, baseline: SeedMean) -> Difference:
         return Difference(value=value, half_width=0.0)
     freedom = total**2 / (squares[0] ** 2 / (mean.count - 1) + squares[1] ** 2 / (baseline.count - 1))
     return Difference(value=value, half_width=_quantile(freedom) * math.sqrt(total))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slope:
+    """A slope common to several blocks of points.
+
+    Attributes:
+        value: NaN where x is the same throughout every block.
+        standard_error: NaN without a degree of freedom to spare.
+        half_width: Of the 95 % confidence interval; NaN without an error.
+        count: Points.
+    """
+
+    value: float
+    standard_error: float
+    half_width: float
+    count: int
+
+
+def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> Slope:
+    """Least-squares slope of y against x, the same in all blocks, each of which has a level of its own.
+
+    What the points of a block share, such as the pile that they all began with, does not count as scatter.
+
+    Args:
+        x: One per point.
+        y: One per point; points with NaN are left out.
+        blocks: Block of each point; all the same for one straight line.
+
+    Returns:
+        The slope, in the unit of y over that of x; n − blocks − 1 degrees of freedom.
+
+    Example:
+        >>> slope_within([0, 1, 0, 1], [5, 7, 1, 3], ["a", "a", "b", "b"]).value
+        2.0
+    """
+    across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    known = np.isfinite(across) & np.isfinite(up)
+    across, up = across[known], up[known]
+    numbers: dict[Hashable, int] = {}
+    own = [block for block, kept in zip(blocks, known, strict=True) if kept]
+    block = np.array([numbers.setdefault(name, len(numbers)) for name in own], dtype=np.int64)
+    count, nan = len(across), math.nan
+    if count == 0:
+        return Slope(value=nan, standard_error=nan, half_width=nan, count=0)
+    members = np.bincount(block)
+    across = across - (np.bincount(block, across) / members)[block]
+    up = up - (np.bincount(block, up) / members)[block]
+    spread = float(across @ across)
+    if spread == 0:
+        return Slope(value=nan, standard_error=nan, half_width=nan, count=count)
+    value = float(across @ up) / spread
+    freedom = count - len(numbers) - 1
+    if freedom < 1:
+        return Slope(value=value, standard_error=nan, half_width=nan, count=count)
+    rest = up - value * across
+    error = math.sqrt(float(rest @ rest) / freedom / spread)
+    return Slope(value=value, standard_error=error, half_width=_quantile(freedom) * error, count=count)
 
 
 def _quantile(freedom: float) -> float:

@@ -19,16 +19,7 @@ from dem.errors import InputError
 from postprocess import sensitivity_figure
 from postprocess.gravish_reference import read_reference, reference_at
 from postprocess.manifest import RunManifest
-from postprocess.origin import (
-    closing_lines,
-    make_folder,
-    markdown_ending,
-    missing_table,
-    told_count,
-    write_provenance,
-    write_tables,
-    write_text,
-)
+from postprocess.origin import Origin, make_folder
 from postprocess.seeds import Difference, SeedMean, difference, mean_over_seeds
 from postprocess.study_runs import (
     ASPECT,
@@ -115,31 +106,25 @@ def analyse_sensitivity(
     summary = summarise_variants(runs, variants)
     aspect = manifests[0].aspect_ratio
     reference = {stage: reference_at(read_reference(), aspect, stage) for stage in ("phi_0", "phi_f")}
-    footer = _footer(study, manifests, runs, missing, baseline=variants[0], note=note, command=command)
-    written = write_tables(output, {"runs": runs, "summary": summary, "missing": missing_table(missing)}, footer)
+    origin = Origin(study=study, manifests=manifests, missing=missing, note=note, command=command)
+    footer = _footer(origin, runs, baseline=variants[0])
     title = f"Study {study}: packing at l/w = {aspect:g}"
-    text = _markdown(title, summary, reference, missing, footer)
-    written["summary.md"] = write_text(text, output / "summary.md")
-    written["provenance.json"] = write_provenance(
-        output / "provenance.json",
-        study=study,
-        manifests=manifests,
-        missing=missing,
-        footer=footer,
-        note=note,
-        command=command,
+    files = origin.write(
+        output,
+        footer,
+        tables={"runs": runs, "summary": summary},
+        text=("summary.md", _markdown(title, summary, reference)),
+        draw=lambda: sensitivity_figure.draw(
+            output / "sensitivity", runs=runs, summary=summary, reference=reference, footer=footer
+        ),
     )
-    drawn = sensitivity_figure.draw(
-        output / "sensitivity", runs=runs, summary=summary, reference=reference, footer=footer
-    )
-    written |= {path.name: path for path in drawn}
     return SensitivityReport(
         baseline=variants[0],
         runs=runs,
         summary=summary,
         missing=missing,
         footer=footer,
-        files=MappingProxyType(written),
+        files=files,
     )
 
 
@@ -208,34 +193,18 @@ def _variants(run_dirs: Sequence[Path | str]) -> list[str]:
     return list(dict.fromkeys(_named(path)[0] for path in run_dirs if _RUN_NAME.fullmatch(Path(path).name)))
 
 
-def _footer(
-    study: str,
-    manifests: Sequence[RunManifest],
-    runs: pd.DataFrame,
-    missing: Sequence[MissingRun],
-    *,
-    baseline: str,
-    note: str,
-    command: str,
-) -> tuple[str, ...]:
+def _footer(origin: Origin, runs: pd.DataFrame, *, baseline: str) -> tuple[str, ...]:
     counts = runs.groupby(VARIANT, sort=False).size()
-    return (
-        f"{told_count(study, manifests, missing)}; l/w = {runs[ASPECT].iloc[0]:g}, {manifests[0].count} smarticles, "
+    return origin.footer(
+        f"l/w = {runs[ASPECT].iloc[0]:g}, {origin.manifests[0].count} smarticles, "
         f"{told_seeds(runs, counts, VARIANT)}; shaken for {told_shaken(runs)}.",
         f"φ by {DEFINITION}; {WHEN}. {told_bars(counts, VARIANT)}.",
         f"Changes are against the baseline {baseline}, their errors 95 % by Welch: where a choice changes nothing "
         "at all, one change in twenty is still beyond its error.",
-        *closing_lines(manifests, note=note, command=command),
     )
 
 
-def _markdown(
-    title: str,
-    summary: pd.DataFrame,
-    reference: Mapping[str, float],
-    missing: Sequence[MissingRun],
-    footer: Sequence[str],
-) -> str:
+def _markdown(title: str, summary: pd.DataFrame, reference: Mapping[str, float]) -> list[str]:
     known = [f"{stage} = {value:.4f}" for stage, value in reference.items() if math.isfinite(value)]
     parts = [f"# {title}", ""]
     parts += [f"Gravish et al. 2012 at this l/w: {', '.join(known)}." if known else "Gravish has no point at this l/w."]
@@ -248,7 +217,7 @@ def _markdown(
             change = told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"])
             cells.append(f"**{change}**" if row[f"{name} clear"] else change)
         parts.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*parts, *markdown_ending(missing, footer)])
+    return parts
 
 
 def told_value(value: float, half_width: float, name: str) -> str:

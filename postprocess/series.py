@@ -28,7 +28,8 @@ class Series:
 
     Attributes:
         path: The file it came from.
-        data: (n,) or (n, 3) arrays by name, e.g. "com_height_m".
+        data: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. What
+            there is depends on the scene: one that never actuates has no motors to tell of.
         units: Unit of each, e.g. "m"; "-" for none.
         descriptions: What each one is.
         scene_sha256: Hash of the scene the run was made from.
@@ -130,7 +131,7 @@ def _check(path: Path, attributes: dict[str, Any], data: dict[str, NDArray[Any]]
     if rows == 0:
         refuse("series", path, "it holds no sample yet", _REMEDY)
     for name, values in data.items():
-        if values.shape not in ((rows,), (rows, 3)):
+        if values.shape not in ((rows,), (rows, 2), (rows, 3)):
             cause = f"'{name}' has shape {values.shape}, 'time_s' has {rows} samples"
             refuse("series", path, cause, _REMEDY)
 

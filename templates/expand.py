@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dem.errors import InputError
@@ -94,16 +94,24 @@ def _assignments(sweep: Sweep) -> Iterator[dict[str, Value]]:
     used = {where: rows for where, rows in sources.items() if rows}
     _refuse_shared(sweep, {where: set(rows[0]) for where, rows in used.items()})
     repeats = sweep.content.repeats
-    for parts in itertools.product(*used.values()):
+    assigned = list(_without_seed(sweep, list(used.values())))
+    if repeats is None:
+        yield from assigned
+    elif repeats.seed_by_seed:
+        yield from ({**values, SEED: seed} for seed in repeats.seeds for values in assigned)
+    else:
+        yield from ({**values, SEED: seed} for values in assigned for seed in repeats.seeds)
+
+
+def _without_seed(sweep: Sweep, sources: Sequence[Sequence[Mapping[str, Value]]]) -> Iterator[dict[str, Value]]:
+    """Values of all variables but the seed, point by point."""
+    for parts in itertools.product(*sources):
         values = {name: value for part in parts for name, value in part.items()}
         for name, expression in sweep.content.derived.items():
             where = f"{sweep.path}: derived.{name}"
             literal = not isinstance(expression, str)
             values[name] = expression if literal else evaluate(str(expression), values, where)
-        if repeats is None:
-            yield values
-        else:
-            yield from ({**values, SEED: seed} for seed in repeats.seeds)
+        yield values
 
 
 def _refuse_shared(sweep: Sweep, names: Mapping[str, set[str]]) -> None:

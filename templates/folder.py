@@ -23,7 +23,7 @@ from dem.files import write_json, write_text
 from dem.scene import Scene, dump_scene
 from templates.expand import Point
 from templates.render import Value
-from templates.sweep import Sweep
+from templates.sweep import SEED, Sweep
 from templates.texts import read_json
 
 FORMAT = 1
@@ -131,12 +131,20 @@ class Folder:
         name: the sweep's name.
         command: the command that made it.
         entries: its runs.
+        seed_by_seed: whether the runs with the first seed start before all others.
     """
 
     path: Path
     name: str
     command: str
     entries: tuple[Entry, ...]
+    seed_by_seed: bool = False
+
+    def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
+        """Runs in the order in which to start them: the longest first, seed by seed where the sweep says so."""
+        seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries)) if self.seed_by_seed else []
+        ranks = {seed: rank for rank, seed in enumerate(seeds)}
+        return sorted(entries, key=lambda entry: (ranks.get(entry.values.get(SEED), 0), -entry.expected_s))
 
     def scene(self, entry: Entry) -> Path:
         """Scene file of a run."""
@@ -277,6 +285,7 @@ def _manifest(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": dict(versions),
         "files": files,
+        "seed_by_seed": sweep.content.repeats is not None and sweep.content.repeats.seed_by_seed,
         "points": [
             {
                 "name": point.name,
@@ -330,6 +339,8 @@ def open_folder(path: Path) -> Folder:
             path=path,
             name=str(content["name"]),
             command=str(content["command"]),
+            # Manifests of before this was known lack it.
+            seed_by_seed=bool(content.get("seed_by_seed", False)),
             entries=tuple(
                 Entry(
                     name=str(point["name"]),

@@ -1,6 +1,7 @@
 """Run many runs on this machine: one process each, at most one per core, the longest first.
 
-A run that fails does not stop the others. Ctrl-C stops all of them in an orderly way.
+A sweep may want its runs seed by seed; then the longest of each seed come first. A run that fails does not stop the
+others. Ctrl-C stops all of them in an orderly way.
 """
 
 from __future__ import annotations
@@ -216,7 +217,7 @@ class _Runner:
                 self._ended(Outcome(name=entry.name, status="kept"))
             else:
                 self.pending.append(entry)
-        self.pending.sort(key=lambda entry: -entry.expected_s)
+        self.pending = self.folder.in_order_of_start(self.pending)
         try:
             while self.pending or self.active:
                 while self.pending and len(self.active) < self.slots:

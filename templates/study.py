@@ -68,6 +68,8 @@ def _distinct(points: Sequence[Point], name: str) -> str:
     for point in points:
         if point.values[name] not in values:
             values.append(point.values[name])
+    if all(isinstance(value, int | float) for value in values):
+        values.sort()
     return ", ".join(map(str, values))
 
 

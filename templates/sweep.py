@@ -12,6 +12,7 @@ points:                             # any of these; several are crossed with eac
   grid: {friction: [0.2, 0.4], count: [90, 100]}            # every combination
 derived: {half: "(count / 2) | round | int"}                # expressions, in order
 repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+                                    # `seed_by_seed: true` beside it: all points with the first seed come first
 """
 
 from __future__ import annotations
@@ -102,6 +103,11 @@ class Repeats(_Model):
     """The same point with other random numbers."""
 
     seeds: tuple[int, ...] = Field(min_length=1, description="seeds of the scene, one run each")
+    seed_by_seed: bool = Field(
+        default=False,
+        description="start every point with the first seed before any with the second, so that what is there when the "
+        "sweep is interrupted covers all points",
+    )
 
     @field_validator("seeds")
     @classmethod

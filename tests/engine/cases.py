@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.engine import Cylinder, Engine, yade_version
+from dem.container import Cylinder
+from dem.engine import Engine
 from dem.errors import InputError, RunError
+from dem.library import yade_version
 from dem.phases import container_height, shake_amplitude
 from dem.placement import Poses, place_layer
 from dem.run import run_scene
 from dem.scene import Scene, parse_scene
 from dem.series import SeriesWriter
+from dem.state import State
 from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step, typical_effective_mass
 
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
@@ -57,23 +59,26 @@ def add(engine: Engine, position: Any, rotation: Rotation = FLAT) -> None:
 
 
 def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> None:
-    """Give a smarticle a velocity; YADE integrates the angular momentum, so that is set too."""
-    clump = engine._clumps[k]
-    rotation = engine.state().rotations[k]
+    """Give a welded smarticle a velocity; YADE integrates the angular momentum, so that is set too."""
+    clump = engine._omega.bodies[engine._assembly.bodies[k]].state
+    rotation = body_rotations(engine.state())[k]
     momentum = rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
-    clump.vel = engine._vector(*map(float, velocity))
-    clump.angVel = engine._vector(*map(float, spin))
-    clump.angMom = engine._vector(*momentum)
+    vector = engine._yade.vector
+    clump.vel = vector(*map(float, velocity))
+    clump.angVel = vector(*map(float, spin))
+    clump.angMom = vector(*momentum)
+
+
+def body_rotations(state: State) -> np.ndarray:
+    """(N, 3, 3) body frame to laboratory frame of welded smarticles."""
+    return state.link_rotations[:, 1] @ state.boxes.link_rotations[1].T
 
 
 def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:
-    """Advance, and call `look` after each step, inside one long run: stops between steps cost milliseconds."""
-    main = sys.modules["__main__"]
-    main.look = look  # type: ignore[attr-defined] # YADE runs the command there
-    before = engine._omega.engines
-    engine._omega.engines = [*before, engine._yade.PyRunner(command="look()", iterPeriod=1, initRun=True)]
-    engine.advance(steps)
-    engine._omega.engines = before
+    """Advance, and call `look` after each step."""
+    for _ in range(steps):
+        engine.advance(1)
+        look()
 
 
 def version() -> str:
@@ -96,7 +101,7 @@ def fall(data: dict[str, Any], *, height: float, steps: list[int]) -> dict[str, 
         "v": np.array(speeds),
         "dt": engine.time_step,
         "xy": engine.state().positions[0, :2],
-        "rotation": engine.state().rotations[0],
+        "rotation": body_rotations(engine.state())[0],
     }
 
 
@@ -109,16 +114,16 @@ def spin(data: dict[str, Any], *, spin: list[float], dt: float, samples: int, ev
     start = engine.state()
     for _ in range(samples):
         engine.advance(every - 1)
-        out["before"].append(engine.state().rotations[0])
+        out["before"].append(body_rotations(engine.state())[0])
         engine.advance(1)
         state = engine.state()
         out["time"].append(engine.time)
-        out["rotation"].append(state.rotations[0])
-        out["spin"].append(state.angular_velocities[0])
+        out["rotation"].append(body_rotations(state)[0])
+        out["spin"].append(state.link_spins[0, 1])
         out["z"].append(state.positions[0])
     return {
         **{key: np.array(value) for key, value in out.items()},
-        "start": start.rotations[0],
+        "start": body_rotations(start)[0],
         "inertia": engine.particle.boxes.inertia,
     }
 
@@ -137,22 +142,23 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     engine.advance(steps)
     state = engine.state()
     members = {k: [] for k in range(count)}
-    for body, k in engine._smarticle_of.items():
+    for body, k in engine._assembly.smarticle_of.items():
         members[k].append(np.array(engine._omega.bodies[body].state.pos))
     tensors = []
-    for clump in engine._clumps:
+    clumps = [engine._omega.bodies[body].state for body in engine._assembly.bodies]
+    for clump in clumps:
         axes = np.array(clump.ori.toRotationMatrix()).reshape(3, 3)
         tensors.append(axes @ np.diag(np.array(clump.inertia)) @ axes.T)
     return {
         "asked": np.array([r.as_matrix() for r in rotations]),
         "asked_positions": positions,
-        "start": start.rotations,
+        "start": body_rotations(start),
         "start_positions": start.positions,
-        "rotations": state.rotations,
+        "rotations": body_rotations(state),
         "tensors": np.array(tensors),
-        "masses": np.array([clump.mass for clump in engine._clumps]),
+        "masses": np.array([clump.mass for clump in clumps]),
         "spheres": np.array([members[k] for k in range(count)]),
-        "expected_spheres": state.points(scene.particle.centres),
+        "expected_spheres": state.spheres(scene.particle),
     }
 
 
@@ -175,7 +181,7 @@ def rebound(data: dict[str, Any], *, speed: float, refine: float, resize: bool =
     state = engine.state()
     return {
         "after": state.velocities[0],
-        "spin": state.angular_velocities[0],
+        "spin": state.link_spins[0, 1],
         "mass": engine.particle.boxes.mass,
         "law": dataclasses.asdict(law),
     }
@@ -220,7 +226,7 @@ def slide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, A
         "y": np.array(ys),
         "v": np.array(vs),
         "x": state.positions[0, 0],
-        "spin": state.angular_velocities[0],
+        "spin": state.link_spins[0, 1],
     }
 
 
@@ -371,7 +377,7 @@ def still(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
             force = np.array(interaction.phys.normalForce + interaction.phys.shearForce)
             touching += 1
             for body, sign in ((interaction.id1, -1), (interaction.id2, 1)):
-                k = engine._smarticle_of.get(body)
+                k = engine._assembly.smarticle_of.get(body)
                 if k is not None:
                     net[k] += sign * force
     return {

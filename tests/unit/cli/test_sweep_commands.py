@@ -197,6 +197,63 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     assert "voronoi" not in header
 
 
+def test_a_study_can_be_analysed_without_starting_a_run(finished_study: Path, smarticles: Smarticles) -> None:
+    said = smarticles("study", "gravish", "--quick", "--analyse", "--out", finished_study)
+    assert said.status == 0
+    assert "Is phi_f above phi_0 at every l/w? YES" in said.out.splitlines()
+    assert "lw1.00_seed3" in (finished_study / "results" / "missing.csv").read_text(encoding="utf-8")
+    assert not (finished_study / "runs" / "lw1.00_seed3").exists()
+
+
+def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("study", "gravish", "--quick", "--analyse", "--out", tmp_path / "out")
+    assert said.status == 2
+    assert "is finished; leave --analyse out to start them" in said.err
+    assert not (tmp_path / "out" / "results").exists()
+
+
+def test_the_study_of_procedures_is_analysed(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "study"
+    points = expand(load_sweep(study_file("procedures", quick=True)))
+    smarticles("sweep", study_file("procedures", quick=True), "--out", out)
+    after = {"external": 0.115, "shape-change": 0.09, "internal": 0.13}
+    for point in points[:-1]:
+        values = point.values
+        run = write_run(
+            out / "runs" / point.name,
+            aspect_ratio=values["l_over_w"],
+            theta=values["theta_deg"],
+            count=6,
+            frames_per_phase=1,
+            phases=tuple(phase.type for phase in point.scene.phases),
+            packing=(0.1, 0.1, after[values["procedure"]], after[values["procedure"]]),
+            shake_time=2.0,
+            oscillate_time=2.0,
+            straight=1.3,
+            work=1e-5,
+        )
+        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        manifest["scene_sha256"] = point.scene_sha256
+        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    monkeypatch.setattr("postprocess.procedures_figures.draw", lambda *_, **__: [])
+    said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0].startswith("not the full study: 11 runs instead of 87; ")
+    assert lines[1].split()[:6] == ["procedure", "θ", "l/w", "seeds", "φ_f", "⟨N⟩"]
+    assert [line.split()[0] for line in lines[2:14]] == (
+        ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3
+    )
+    assert "FOUND: Shape change: the centre of mass rises when the smarticles straighten" in lines
+    assert "NO DATA: Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5" in lines
+    findings = (out / "results" / "findings.csv").read_text(encoding="utf-8")
+    assert "Study procedures, fidelity draft: 10 of 11 runs, 1 missing" in findings
+    assert "internal30_lw1.00_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

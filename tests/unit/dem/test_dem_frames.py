@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine import State
 from dem.frames import FrameWriter, frame_mesh
+from dem.motor import MotorLaw, Motors
 from dem.particle import Boxes
+from dem.state import State
 
 W, RATIO = 0.0117, 0.7
 BOXES = Boxes(middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
 COUNT = 5
 
 
-def make_state(seed: int = 0) -> State:
+def make_state(seed: int = 0, boxes: Boxes = BOXES) -> State:
     rng = np.random.default_rng(seed)
-    return State(
+    return State.rigid(
+        boxes,
         rng.normal(size=(COUNT, 3)),
         Rotation.random(COUNT, random_state=rng).as_matrix(),
         rng.normal(size=(COUNT, 3)),
@@ -31,7 +33,7 @@ def make_state(seed: int = 0) -> State:
 
 
 def written(folder: Path, state: State) -> meshio.Mesh:
-    mesh = frame_mesh(BOXES, state, contacts=np.arange(COUNT) * 2, time=0.125, floor=-0.001, phase=2)
+    mesh = frame_mesh(state, contacts=np.arange(COUNT) * 2, time=0.125, floor=-0.001, phase=2)
     FrameWriter(folder).write(mesh, 0.125)
     return meshio.read(folder / "frames" / "frame_000000.vtu")
 
@@ -48,8 +50,8 @@ def test_points_are_tip_hinge_hinge_tip_of_each_smarticle(tmp_path: Path) -> Non
     centres = (points[:, 1:] + points[:, :-1]) / 2
     assert np.average(centres, axis=1, weights=[RATIO, 1, RATIO]) == pytest.approx(state.positions, abs=1e-15)
     # Body x runs from the first hinge to the second; body y from the middle link to the mouth.
-    assert (points[:, 2] - points[:, 1]) / W == pytest.approx(state.rotations[:, :, 0], abs=1e-12)
-    assert (points[:, 0] - points[:, 1]) / (RATIO * W) == pytest.approx(state.rotations[:, :, 1], abs=1e-12)
+    assert (points[:, 2] - points[:, 1]) / W == pytest.approx(state.link_rotations[:, 1, :, 0], abs=1e-12)
+    assert (points[:, 0] - points[:, 1]) / (RATIO * W) == pytest.approx(state.link_rotations[:, 1, :, 1], abs=1e-12)
 
 
 def test_cells_and_data_follow_the_contract(tmp_path: Path) -> None:
@@ -79,28 +81,47 @@ def test_cells_and_data_follow_the_contract(tmp_path: Path) -> None:
     assert np.array_equal(data["floor_z_m"], np.full(3 * COUNT, -0.001))
 
 
+def test_scenes_with_motors_carry_angle_torque_work_and_halts_of_each_barb(tmp_path: Path) -> None:
+    angles = np.linspace(0.2, 1.1, 2 * COUNT).reshape(COUNT, 2)
+    motors = Motors(MotorLaw(torque_limit=1.0, speed_limit=6.0, stiffness=1.0, law="halt"), angles)
+    motors.torques, motors.work = angles + 1, angles + 2
+    motors.halted[1, 0] = True
+    state, common = make_state(), {"contacts": np.zeros(COUNT, dtype=np.int64), "time": 0, "floor": 0, "phase": 0}
+    for at_work in (motors, None):
+        FrameWriter(tmp_path).write(frame_mesh(state, hinged=True, motors=at_work, **common), 0)
+        mesh = meshio.read(tmp_path / "frames" / "frame_000000.vtu")
+        data = {name: values[0].reshape(COUNT, 3) for name, values in mesh.cell_data.items() if values[0].ndim == 1}
+        assert data["angle_rad"][:, [0, 2]] == pytest.approx(np.full((COUNT, 2), math.pi / 2))
+        assert np.isnan(data["angle_rad"][:, 1]).all()
+        expected = (angles + 1, angles + 2) if at_work else 2 * (np.full((COUNT, 2), math.nan),)
+        for name, values in zip(("motor_torque_N_m", "motor_work_J"), expected, strict=True):
+            assert np.array_equal(data[name][:, [0, 2]], values, equal_nan=True)
+            assert np.isnan(data[name][:, 1]).all()
+        assert np.flatnonzero(data["halted"]).tolist() == ([3] if at_work else [])
+
+
 def test_velocities_are_those_of_the_link_centres(tmp_path: Path) -> None:
     # Against a small rigid motion in time, not against a cross product.
     state, dt = make_state(), 1e-6
     mesh = written(tmp_path, state)
-    turned = Rotation.from_rotvec(state.angular_velocities * dt).as_matrix() @ state.rotations
-    later = State(state.positions + dt * state.velocities, turned, state.velocities, state.angular_velocities)
+    spins, bodies = state.link_spins[:, 1], state.link_rotations[:, 1] @ BOXES.link_rotations[1].T
+    turned = Rotation.from_rotvec(spins * dt).as_matrix() @ bodies
+    later = State.rigid(BOXES, state.positions + dt * state.velocities, turned, state.velocities, spins)
 
     def centres(at: State) -> np.ndarray:
-        points = at.points(BOXES.vertices)
+        points = at.vertices
         return ((points[:, 1:] + points[:, :-1]) / 2).reshape(-1, 3)
 
     moved = (centres(later) - centres(state)) / dt
     # Second order in dt: 40 rad/s squared times 6 mm times half of dt is 5e-6 m/s.
     assert mesh.cell_data["velocity_m_per_s"][0] == pytest.approx(moved, abs=5e-5)
     assert np.abs(moved - np.repeat(state.velocities, 3, axis=0)).max() > 0.1
-    spins = mesh.cell_data["angular_velocity_rad_per_s"][0]
-    assert np.array_equal(spins, np.repeat(state.angular_velocities, 3, axis=0))
+    assert np.array_equal(mesh.cell_data["angular_velocity_rad_per_s"][0], np.repeat(spins, 3, axis=0))
 
 
 def test_bar_without_barbs_still_has_four_points(tmp_path: Path) -> None:
     boxes = Boxes(middle_length=W, barb_length=0.0, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
-    mesh = frame_mesh(boxes, make_state(), contacts=np.zeros(COUNT, dtype=np.int64), time=0, floor=0, phase=0)
+    mesh = frame_mesh(make_state(boxes=boxes), contacts=np.zeros(COUNT, dtype=np.int64), time=0, floor=0, phase=0)
     FrameWriter(tmp_path).write(mesh, 0)
     points = meshio.read(tmp_path / "frames" / "frame_000000.vtu").points.reshape(COUNT, 4, 3)
     assert np.array_equal(points[:, 0], points[:, 1])
@@ -111,7 +132,7 @@ def test_collection_lists_all_frames_in_time_order(tmp_path: Path) -> None:
     writer = FrameWriter(tmp_path)
     times = [0.0, 0.04, 0.08, 123.456]
     for k, time in enumerate(times):
-        mesh = frame_mesh(BOXES, make_state(k), contacts=np.zeros(COUNT, dtype=np.int64), time=time, floor=0, phase=0)
+        mesh = frame_mesh(make_state(k), contacts=np.zeros(COUNT, dtype=np.int64), time=time, floor=0, phase=0)
         writer.write(mesh, time)
         listed = ElementTree.parse(tmp_path / "frames.pvd").getroot().findall("Collection/DataSet")
         assert [float(row.attrib["timestep"]) for row in listed] == pytest.approx(times[: k + 1], rel=1e-8)

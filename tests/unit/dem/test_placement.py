@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
-from dem.engine import Cylinder
+from dem.container import Cylinder
 from dem.errors import RunError
 from dem.particle import Boxes, Particle, SphereChain
 from dem.placement import Poses, place_layer

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from dem.engine import Engine, import_yade
+from dem.engine import Engine
 from dem.errors import RunError
+from dem.library import import_yade
 from dem.run import run_scene
 from dem.scene import Scene
 
@@ -56,19 +58,26 @@ class Omega:
     """What `Engine.advance` sees of YADE."""
 
     def __init__(self, stops_at: int | None = None) -> None:
-        self.iter, self.time, self.asked, self.running = 0, 0.0, [], False
+        self.iter, self.time, self.asked = 0, 0.0, 0
         self._stops_at = stops_at
 
-    def run(self, steps: int, wait: bool) -> None:
-        assert not wait
-        self.asked.append(steps)
-        self.iter = self.iter + steps if self._stops_at is None else min(self.iter + steps, self._stops_at)
+    def step(self) -> None:
+        self.asked += 1
+        self.iter = self.iter + 1 if self._stops_at is None else min(self.iter + 1, self._stops_at)
 
 
 def make_engine(omega: Omega) -> Engine:
     engine = Engine.__new__(Engine)
     # What `advance` needs, without YADE: Omega, and what counts the smarticles' seconds.
-    vars(engine).update(_omega=omega, _clumps=[], _smarticle_seconds=0.0, time_step=1e-5)
+    vars(engine).update(
+        _yade=SimpleNamespace(omega=omega),
+        _omega=omega,
+        _assembly=SimpleNamespace(count=0),
+        _shaker=None,
+        _track_work=False,
+        _smarticle_seconds=0.0,
+        time_step=1e-5,
+    )
     return engine
 
 
@@ -83,4 +92,4 @@ def test_engine_that_stops_early_is_a_run_error() -> None:
 def test_no_steps_are_no_run() -> None:
     omega = Omega()
     make_engine(omega).advance(0)
-    assert omega.asked == []
+    assert omega.asked == 0

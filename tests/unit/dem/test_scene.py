@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -132,6 +132,7 @@ def test_hash_is_stable_over_notation_and_sensitive_to_everything(make_scene: Ma
         {"recording.frame_interval_s": 0.08},
         {"gravity_m_per_s2": 9.8},
         {"container.radius_m": 0.03},
+        {"motor.speed_limit_rad_per_s": 5.0},
     ]
     hashes = {scene_hash(make_scene(change)) for change in changes}
     assert len(hashes | {scene_hash(scene)}) == len(changes) + 1
@@ -152,29 +153,32 @@ def test_scene_and_its_parts_are_frozen(make_scene: MakeScene) -> None:
     assert isinstance(scene.phases, tuple)
 
 
-def models(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    """A model and all models it is made of."""
-    yield model
-    for field in model.model_fields.values():
-        found = [field.annotation]
-        while found:
-            annotation = found.pop()
-            if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-                yield from models(annotation)
-            else:
-                found += get_args(annotation)
+def models(*made_of: Any) -> list[type[BaseModel]]:
+    """All models that types are made of, themselves included; a sequence of motions may hold sequences."""
+    seen: list[type[BaseModel]] = []
+    waiting = list(made_of)
+    while waiting:
+        annotation = waiting.pop()
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            if annotation not in seen:
+                seen.append(annotation)
+                waiting += [field.annotation for field in annotation.model_fields.values()]
+        else:
+            waiting += get_args(annotation)
+    return seen
 
 
 def test_every_field_says_what_it_is_and_in_which_unit() -> None:
-    seen = list(dict.fromkeys(models(Scene)))
+    seen = models(Scene)
     assert {"Scene", "Smarticle", "Container", "Contact", "Fidelity", "Settle", "Deposit", "Relax", "Shake"} <= {
         model.__name__ for model in seen
     }
-    units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N/m", "m/s", "m/s²"}
+    assert {"Motor", "Actuate", "ShapeChange", "InternalOscillation", "Sequence", "Sine"} <= {m.__name__ for m in seen}
+    units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N/m", "m/s", "m/s²", "rad/s", "N m", "N m/rad"}
     numbers = 0
     for model in seen:
         for name, field in model.model_fields.items():
-            if name == "type":  # the tag of a phase: the phase's own docstring describes it
+            if name == "type":  # the tag of a phase or motion: its own docstring describes it
                 assert model.__doc__
                 continue
             assert field.description, f"{model.__name__}.{name} has no description"
@@ -187,7 +191,8 @@ def test_every_field_says_what_it_is_and_in_which_unit() -> None:
 
 
 def test_names_and_units_agree() -> None:
-    suffixes = {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
+    suffixes = {"_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s", "_N_m": "N m"}
+    suffixes |= {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
     suffixes |= {"_hz": "Hz", "_m": "m", "_s": "s"}
     checked = set()
     for model in models(Scene):

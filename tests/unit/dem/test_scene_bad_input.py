@@ -133,7 +133,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (
         {"phases.1.type": "rest"},
         "phases.1: input tag 'rest' found using 'type' does not match any of the expected tags: "
-        "'deposit', 'relax', 'shake', got {'type': 'rest', 'duration_s': 0.1}",
+        "'deposit', 'relax', 'shake', 'actuate', 'shape-change', 'internal-oscillation', "
+        "got {'type': 'rest', 'duration_s': 0.1}",
     ),
     (
         {"recording.frame_interval_s": 0.05},

@@ -8,17 +8,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dem.engine import State
 from dem.errors import RunError
+from dem.particle import Boxes
+from dem.state import State
 from dem.watchdog import Watchdog
 
+BOXES = Boxes(
+    middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
+)
 WATCHDOG = Watchdog(radius=0.0234, height=0.1, speed=5.0)
 
 
 def healthy() -> State:
     positions = np.array([[0.0, 0.0, 0.01], [0.02, 0.0, 0.02], [0.0, -0.023, 0.099], [0.0, 0.0, 0.001]])
     velocities = np.array([[0.0, 0.0, -4.9], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    return State(positions, np.tile(np.eye(3), (4, 1, 1)), velocities, np.zeros((4, 3)))
+    return State.rigid(BOXES, positions, np.tile(np.eye(3), (4, 1, 1)), velocities, np.zeros((4, 3)))
 
 
 def check(state: State, floor: float = 0.0) -> None:
@@ -27,7 +31,8 @@ def check(state: State, floor: float = 0.0) -> None:
 
 def test_healthy_states_pass() -> None:
     check(healthy())
-    check(State(*(np.empty((0, 3)) for _ in range(4))))  # nothing poured yet
+    none = np.empty((0, 3))
+    check(State.rigid(BOXES, none, np.empty((0, 3, 3)), none, none))  # nothing poured yet
     lifted = healthy()
     lifted.positions[:, 2] += 5.0
     check(lifted, floor=5.0)  # heights are above the floor, wherever it is
@@ -82,6 +87,6 @@ def test_each_cause_stops_the_run(harm: Callable[[State], None], text: str) -> N
 
 def test_many_smarticles_are_counted_and_the_first_named() -> None:
     positions = np.full((8, 3), -0.01)
-    state = State(positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
+    state = State.rigid(BOXES, positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
     with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
         check(state)

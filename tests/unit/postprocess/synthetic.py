@@ -10,16 +10,23 @@ from pathlib import Path
 import h5py
 import meshio
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 W, T1, T2, RADIUS = 0.0117, 0.00127, 0.0005, 0.0234
 PHASES = ("deposit", "relax", "shake", "relax")
+SETTINGS = {"shape-change": {"straight_deg": 0.0, "opening_s": 1.5, "straight_hold_s": 0.0, "closing_s": 1.5}}
+ACTUATED = ("shape-change", "internal-oscillation")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SyntheticRun:
-    """What a made-up run is to look like; `packing` is φ at the end of each phase."""
+    """What a made-up run is to look like; `packing` is φ at the end of each phase.
+
+    `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
+    a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it.
+    """
 
     aspect_ratio: float = 0.7
     seed: int = 1
@@ -28,6 +35,10 @@ class SyntheticRun:
     packing: tuple[float, float, float, float] = (0.100, 0.105, 0.130, 0.132)
     frames_per_phase: int = 4
     shake_time: float = 20.0
+    oscillate_time: float = 5.0
+    theta: float = 10.0
+    work: float | None = None
+    straight: float = 1.0
     status: str = "done"
     series: bool = True
     floor_z: float = 0.0
@@ -42,12 +53,32 @@ class SyntheticRun:
         """Second-highest centre of mass [m] that makes this packing fraction."""
         return self.count * self.solid_volume / (math.pi * RADIUS**2 * packing)
 
-    def vertices(self, packing: float) -> NDArray[np.float64]:
-        """(N, 4, 3) [m]; the two highest centres of mass share the height that φ asks for."""
+    @property
+    def durations(self) -> dict[str, float]:
+        """How long each type of phase takes [s]."""
+        return {
+            "deposit": 1.0,
+            "relax": 0.5,
+            "shake": self.shake_time,
+            "shape-change": 3.0,
+            "internal-oscillation": self.oscillate_time,
+        }
+
+    def shares(self) -> NDArray[np.float64]:
+        """(N,) centres of mass over the second-highest one."""
+        return self._poses()[2]
+
+    def _poses(self) -> tuple[np.random.Generator, NDArray[np.float64], NDArray[np.float64]]:
+        """A random generator with which to go on, (N, 3, 3) rotations and (N,) shares of the height."""
         random = np.random.default_rng(self.seed)
         turn = Rotation.random(self.count, rng=random).as_matrix()
         share = np.sort(random.uniform(0.0, 1.0, self.count))
         share[-2:] = 1.0
+        return random, turn, share
+
+    def vertices(self, packing: float) -> NDArray[np.float64]:
+        """(N, 4, 3) [m]; the two highest centres of mass share the height that φ asks for."""
+        random, turn, share = self._poses()
         radius = (RADIUS - 0.8 * W) * np.sqrt(random.uniform(0.0, 1.0, self.count))
         angle = random.uniform(0, 2 * math.pi, self.count)
         z = share * self.height(packing) + self.floor_z
@@ -97,12 +128,12 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
     run = run or SyntheticRun()
     directory.mkdir(parents=True, exist_ok=True)
     _write_manifest(directory, run)
-    durations = {"deposit": 1.0, "relax": 0.5, "shake": run.shake_time}
+    _write_scene(directory, run)
     (directory / "frames").mkdir(exist_ok=True)
     entries, rows, timed, start = [], [], [], 0.0
     previous = run.packing[0]
     for index, kind in enumerate(run.phases):
-        end = start + durations[kind]
+        end = start + run.durations[kind]
         target = run.packing[index]
         # Frames at the end of a phase scatter about its φ; their mean is φ to second order.
         times = np.linspace(start, end, run.frames_per_phase + 1)[1:]
@@ -113,8 +144,12 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
             write_frame(directory / name, vertices, time=time, phase=index, floor_z=run.floor_z)
             entries.append((time, name))
         for time in np.linspace(start, end, 200)[1:]:
-            progress = 1 - math.exp(-5 * (time - start) / (end - start))
-            rows.append((time, index, previous + (target - previous) * progress))
+            part = (time - start) / (end - start)
+            packing = previous + (target - previous) * (1 - math.exp(-5 * part))
+            rise = 1 + (run.straight - 1) * (1 - abs(2 * part - 1)) if kind == "shape-change" else 1.0
+            active = kind not in ("deposit", "relax")
+            done = part if active else float(any(row[4] > 0 for row in rows))
+            rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
         timed.append({"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": 1.0})
         start, previous = end, target
     sets = "".join(f'<DataSet timestep="{t!r}" file="{n}"/>' for t, n in map(_plain, entries))
@@ -168,6 +203,12 @@ def _write_manifest(directory: Path, run: SyntheticRun) -> None:
     (directory / "run.json").write_text(json.dumps(manifest))
 
 
+def _write_scene(directory: Path, run: SyntheticRun) -> None:
+    settings = {"internal-oscillation": {"theta_deg": run.theta, "scaled": True}, **SETTINGS}
+    phases = [{"type": kind, **settings.get(kind, {"duration_s": run.durations[kind]})} for kind in run.phases]
+    (directory / "scene.yaml").write_text(yaml.safe_dump({"schema_version": 1, "phases": phases}))
+
+
 def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64]) -> None:
     with h5py.File(directory / "series.h5", "w") as file:
         file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": run.seed})
@@ -175,7 +216,15 @@ def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64])
             "time_s": (rows[:, 0], "s"),
             "phase": (rows[:, 1].astype(np.int64), "-"),
             "packing_fraction": (rows[:, 2], "-"),
+            "com_height_m": (rows[:, 3], "m"),
         }
+        moved = [kind for kind in run.phases if kind in ACTUATED]
+        if moved:
+            angle = np.full((len(rows), 2), math.pi / 2)
+            columns |= {"commanded_angle_rad": (angle, "rad"), "angle_rad": (angle, "rad")}
+            columns |= {"tracking_error_rad": (np.full(len(rows), math.nan), "rad")}
+        if run.work is not None:
+            columns["motor_work_J" if moved else "container_work_J"] = (run.work * rows[:, 4], "J")
         for name, (values, unit) in columns.items():
             file[name] = values
             file[name].attrs.update({"unit": unit, "description": name})

@@ -1,3 +1,4 @@
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -87,6 +88,47 @@ def test_one_row_per_frame_with_every_measure(make_run):
     assert row["unbalanced force [-]"] == pytest.approx(0.8)
     # One smarticle has no packing fraction.
     assert np.isnan(table[PHI][0])
+
+
+def test_columns_of_motors_and_energies_where_there_are_any(make_run):
+    directory = make_run()
+    columns = {
+        "angle_rad": (np.array([[1.5, 1.5], [1.4, 1.3], [0.1, 0.2]]), "rad"),
+        "motor_work_J": (np.array([0.0, 1e-6, 3e-6]), "J"),
+        "halted_fraction": (np.array([np.nan, 0.5, 0.25]), "1"),
+        "gravitational_energy_J": (np.array([1e-4, 2e-4, 3e-4]), "J"),
+    }
+    with h5py.File(directory / "series.h5", "a") as file:
+        for name, (values, unit) in columns.items():
+            file.create_dataset(name, data=values).attrs.update({"unit": unit, "description": name})
+    table = measure_run(directory, definitions=CHEAP)
+    assert table["angle barb 1 [rad]"].tolist() == [1.5, 1.4, 0.1]
+    assert table["angle barb 2 [rad]"].tolist() == [1.5, 1.3, 0.2]
+    assert table["motor work [J]"].tolist() == [0.0, 1e-6, 3e-6]
+    assert table["halted fraction [-]"].tolist()[1:] == [0.5, 0.25]
+    assert table["gravitational energy [J]"].iloc[-1] == 3e-4
+    assert "motor work [J]" not in measure_run(make_run(), definitions=CHEAP)
+    summary = summarise_run(directory, definitions=CHEAP)
+    assert summary["motor work [J]"].iloc[-1] == 3e-6
+    assert np.isnan(summary["halted fraction [-]"][0])
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (90.0, 0.0), (105.0, -15.0)])
+def test_measures_take_any_shape(make_run, scene, write_frame, angles):
+    """Straight smarticles have no plane, so no crossings; everything else is defined."""
+    directory = make_run()
+    pile = scene(6, 3, box=1.5, width=11.7e-3, angles=angles) - [0.006, 0.006, 0.0]
+    path = write_frame(directory, pile, time=0.2, phase=2, floor_z=-0.002)
+    path.rename(directory / "frames" / "frame_000002.vtu")
+    row = measure_run(directory).iloc[2]
+    straight = angles == (0.0, 0.0)
+    assert row["planes [-]"] == (0 if straight else 6)
+    assert np.isnan(row["crossings mean [-]"]) == straight
+    middles = (pile[:, 1:] + pile[:, :-1]) / 2
+    weights = np.array([0.7, 1.0, 0.7]) / 2.4
+    expected = (middles[..., 2] * weights).sum(axis=1).mean() + 0.002
+    assert row["com height [m]"] == pytest.approx(expected)
+    assert row[["phi second-highest-com [-]", "phi top-percentile [-]", "phi voxel [-]"]].notna().all()
 
 
 def test_costly_definitions_only_where_asked_for(make_run):

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import ttest_ind
+from scipy.stats import linregress, ttest_ind
 
-from postprocess.seeds import Difference, difference, mean_over_seeds
+from postprocess.seeds import Difference, difference, mean_over_seeds, slope_within
 
 
 def test_half_width_is_student_t():
@@ -63,6 +63,51 @@ def test_difference_without_errors_is_never_clear():
     assert math.isnan(found.half_width)
     assert not found.clear
     assert math.isnan(difference(mean_over_seeds([]), pair).value)
+
+
+def test_slope_is_that_of_a_straight_line():
+    x, y = [0.4, 0.5, 0.7, 0.9, 1.0], [1.0, 1.3, 1.2, 2.0, 1.9]
+    found, expected = slope_within(x, y, ["all"] * 5), linregress(x, y)
+    assert found.value == pytest.approx(expected.slope)
+    assert found.standard_error == pytest.approx(expected.stderr)
+    assert found.half_width == pytest.approx(3.182446 * expected.stderr)  # t(0.975; 3), from printed tables
+    assert found.count == 5
+
+
+def test_what_a_block_shares_is_no_scatter():
+    """Levels of blocks that differ by far more than the slope, and a block of one point, which tells nothing."""
+    x, blocks = np.array([0.0, 1.0, 2.0] * 2 + [5.0]), ["a"] * 3 + ["b"] * 3 + ["c"]
+    noise = np.array([0.1, -0.1, 0.0, 0.0, 0.1, -0.1, 0.0])
+    found = slope_within(x, 2 * x + np.array([100.0] * 3 + [-70.0] * 3 + [9.0]) + noise, blocks)
+    # By hand: Σ(x − x̄)(y − ȳ) over Σ(x − x̄)² = 8 − 0.1 − 0.1 over 4, and 6 − 2 − 1 degrees of freedom.
+    assert found.value == pytest.approx(2 - 0.2 / 4)
+    rest = np.array([0.05, -0.1, 0.05, -0.05, 0.1, -0.05])
+    assert found.standard_error == pytest.approx(math.sqrt(rest @ rest / 3 / 4))
+    assert found.count == 7
+    assert math.isnan(slope_within([5.0, math.nan], [9.0, 1.0], ["c", "c"]).value)
+
+
+def test_slope_covers_the_truth_as_often_as_it_says():
+    random = np.random.default_rng(11)
+    x, blocks = np.tile([5.0, 10.0, 15.0], 4), np.repeat(np.arange(4), 3)
+    inside = 0
+    for _ in range(2000):
+        y = 0.3 * x + 10 * random.standard_normal(4)[blocks] + random.standard_normal(12)
+        found = slope_within(x, y, list(blocks))
+        inside += abs(found.value - 0.3) < found.half_width
+    assert inside / 2000 == pytest.approx(0.95, abs=0.015)
+
+
+@pytest.mark.parametrize(("x", "y"), [([], []), ([1.0, 1.0], [1.0, 2.0]), ([math.nan], [1.0])])
+def test_no_slope_without_different_x(x, y):
+    assert math.isnan(slope_within(x, y, ["all"] * len(x)).value)
+
+
+def test_slope_without_a_point_to_spare_has_no_error():
+    found = slope_within([1.0, 2.0], [1.0, 3.0], ["all", "all"])
+    assert found.value == pytest.approx(2.0)
+    assert math.isnan(found.standard_error)
+    assert math.isnan(found.half_width)
 
 
 def test_equal_values_differ_by_nothing():

@@ -18,6 +18,15 @@ def test_series_holds_values_units_and_descriptions(run):
         series.time[0] = 1
 
 
+def test_series_of_a_scene_that_actuates_holds_a_column_per_barb(run):
+    angles = np.radians([[90.0, 90.0], [80.0, 100.0], [0.0, -5.0]])
+    with h5py.File(run / "series.h5", "a") as file:
+        file.create_dataset("angle_rad", data=angles).attrs.update({"unit": "rad", "description": ""})
+    series = read_series(run)
+    np.testing.assert_array_equal(series["angle_rad"], angles)
+    assert series.units["angle_rad"] == "rad"
+
+
 def test_unknown_name_lists_what_there_is(run):
     with pytest.raises(InputError, match=r"no series 'heat'; choose one of: .*kinetic_energy_J"):
         read_series(run)["heat"]
@@ -59,7 +68,8 @@ def _replace(name, values):
         (_drop("time_s"), "dataset 'time_s' is missing"),
         (_drop("phase"), "dataset 'phase' is missing"),
         (_replace("phase", np.zeros(2)), "'phase' has shape"),
-        (_replace("kinetic_energy_J", np.zeros((3, 2))), "'kinetic_energy_J' has shape"),
+        (_replace("kinetic_energy_J", np.zeros((3, 4))), "'kinetic_energy_J' has shape"),
+        (_replace("kinetic_energy_J", np.zeros((2, 2))), "'kinetic_energy_J' has shape"),
         (lambda file: file.attrs.__delitem__("seed"), "attribute 'seed' is missing"),
         (lambda file: file.attrs.__setitem__("format", 9), "'format' must be 1: got 9"),
         (lambda file: file["phase"].attrs.__delitem__("unit"), "KeyError"),

@@ -41,6 +41,13 @@ def test_grid_is_crossed_with_the_seeds(write_sweep: WriteSweep) -> None:
     assert len({point.scene_sha256 for point in found}) == 4
 
 
+def test_seed_by_seed_all_points_have_the_first_seed_first(write_sweep: WriteSweep) -> None:
+    text = SWEEP.replace("{seeds: [1, 2]}", "{seeds: [2, 1], seed_by_seed: true}")
+    found = points(text, write_sweep)
+    assert [point.name for point in found] == ["n10_seed2", "n20_seed2", "n10_seed1", "n20_seed1"]
+    assert {point.scene_sha256 for point in found} == {point.scene_sha256 for point in points(SWEEP, write_sweep)}
+
+
 def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:
     found = points(
         sweep_with("{zip: {count: [10, 20], seed_: [3, 4]}}").replace("{{ seed }}", "{{ seed_ }}"),

@@ -29,6 +29,33 @@ def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> 
     assert content["points"][0]["expected_s"] == 10.0
 
 
+def test_runs_start_the_longest_first(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    assert not folder.seed_by_seed
+    started = [entry.name for entry in folder.in_order_of_start(folder.entries)]
+    assert started == ["n20_seed1", "n20_seed2", "n10_seed1", "n10_seed2"]
+
+
+def test_runs_start_seed_by_seed_where_the_sweep_says_so(make_folder: MakeFolder) -> None:
+    folder = make_folder(SWEEP.replace("{seeds: [1, 2]}", "{seeds: [2, 1], seed_by_seed: true}"))
+    assert folder.seed_by_seed
+    assert open_folder(folder.path) == folder
+    started = [entry.name for entry in folder.in_order_of_start(folder.entries)]
+    assert started == ["n20_seed2", "n10_seed2", "n20_seed1", "n10_seed1"]
+    # Of what is left, the first seed still comes first.
+    left = [entry for entry in folder.entries if entry.name != "n20_seed2"]
+    assert folder.in_order_of_start(left)[0].name == "n10_seed2"
+
+
+def test_manifest_of_before_orders_were_known(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    file = folder.path / "sweep.json"
+    content = json.loads(file.read_text(encoding="utf-8"))
+    del content["seed_by_seed"]
+    file.write_text(json.dumps(content), encoding="utf-8")
+    assert open_folder(folder.path) == folder
+
+
 def test_scene_files_are_the_scenes_of_the_manifest(make_folder: MakeFolder) -> None:
     folder = make_folder()
     assert len(folder.entries) == 4

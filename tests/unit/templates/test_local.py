@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -103,6 +103,12 @@ def test_all_runs_run_once_with_one_thread_the_longest_first(folder: Folder) -> 
     last = watcher.snapshots[-1]
     assert (last.total, last.ended, last.failed, last.running) == (4, 4, 0, ())
     assert last.left_s == 0
+
+
+def test_a_sweep_can_want_its_runs_seed_by_seed(folder: Folder) -> None:
+    watcher = Watcher()
+    run_folder(replace(folder, seed_by_seed=True), watcher, slots=1, command=fake(), timing=QUICK)
+    assert watcher.starts == ["n20_seed1", "n10_seed1", "n20_seed2", "n10_seed2"]
 
 
 @pytest.mark.parametrize("slots", [1, 3])

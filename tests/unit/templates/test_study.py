@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import templates
+from dem.actuation import InternalOscillation, ShapeChange
 from dem.errors import InputError
 from dem.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
 from templates.expand import Point, expand
@@ -107,6 +108,78 @@ def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in data.items():
         found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
     return found
+
+
+AMPLITUDES = (5, 10, 15, 20, 30)
+RATIOS, RATIOS_OF_AMPLITUDES = (0.4, 0.55, 0.7, 0.85, 1.0), (0.4, 0.5, 0.7, 1.0)
+
+
+def procedures(*, quick: bool) -> list[Point]:
+    return expand(load_sweep(study_file("procedures", quick=quick)))
+
+
+def test_the_procedures_are_those_of_the_paper() -> None:
+    found = procedures(quick=False)
+    assert len(found) == 87
+    # Seed by seed, so that an interrupted study has all points.
+    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3) for _ in range(29)]
+    assert len({point.scene_sha256 for point in found}) == 87
+    for point in found:
+        deposit, rest, activity, again = point.scene.phases
+        assert isinstance(deposit, Deposit)
+        assert deposit.per_layer == 10
+        assert isinstance(rest, Relax)
+        assert isinstance(again, Relax)
+        assert rest.duration_s == again.duration_s == 0.5
+        assert point.scene.count == 100
+        assert point.scene.fidelity.base == "draft"
+        assert point.scene.recording.energy
+        if isinstance(activity, Shake):
+            assert (activity.duration_s, activity.frequency_hz, activity.peak_acceleration_g) == (5.0, 30, 2)
+        elif isinstance(activity, ShapeChange):
+            assert (activity.straight_deg, activity.opening_s, activity.closing_s) == (0, 1.5, 1.5)
+        else:
+            assert isinstance(activity, InternalOscillation)
+            assert activity.theta_deg == point.values["theta_deg"]
+            assert activity.scaled
+            assert activity.duration_s == 5.0
+
+
+@pytest.mark.parametrize("activity", [Shake, ShapeChange])
+def test_every_procedure_is_run_at_every_aspect_ratio(activity: type) -> None:
+    found = procedures(quick=False)[:29]
+    ratios = [point.scene.smarticle.aspect_ratio for point in found if isinstance(point.scene.phases[2], activity)]
+    assert tuple(ratios) == RATIOS
+
+
+def test_amplitudes_are_left_out_by_the_rule_of_the_hinge() -> None:
+    """90° + θ/2 · 0.7/(l/w) is at most 105°; every other combination is there, and none twice."""
+    found = [
+        (point.scene.smarticle.aspect_ratio, activity.theta_deg)
+        for point in procedures(quick=False)[:29]
+        if isinstance(activity := point.scene.phases[2], InternalOscillation)
+    ]
+    wanted = {(ratio, 10.0) for ratio in RATIOS}
+    wanted |= {
+        (ratio, float(theta))
+        for ratio in RATIOS_OF_AMPLITUDES
+        for theta in AMPLITUDES
+        if theta * 0.7 / ratio <= 30 * (1 + 1e-9)
+    }
+    assert sorted(found) == sorted(wanted)
+    assert len(wanted) < len(RATIOS_OF_AMPLITUDES) * len(AMPLITUDES) + 2
+
+
+def test_the_quick_procedures_say_how_they_differ() -> None:
+    found = procedures(quick=True)
+    assert len(found) == 11
+    assert {point.scene.seed for point in found} == {1}
+    lines = differences(found, procedures(quick=False))
+    assert lines[0] == "11 runs instead of 87"
+    assert {"count: 60 instead of 100", "shake_s: 2.0 instead of 5.0", "oscillate_s: 2.0 instead of 5.0"} <= set(lines)
+    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.55, 0.7, 0.85, 1.0" in lines
+    assert "theta_deg: only 0, 10, 30 of 0, 5, 10, 15, 20, 30" in lines
+    assert "seed: only 1 of 1, 2, 3" in lines
 
 
 def test_every_data_file_of_a_study_is_named_in_its_readme() -> None:

@@ -1,0 +1,81 @@
+"""The distribution's YADE. The only module that imports `yade`."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dem.errors import RunError
+
+
+@dataclass(frozen=True)
+class Yade:
+    """What this project uses of YADE.
+
+    Args:
+        classes: YADE's classes: bodies, shapes, engines, functors.
+        utils: its helpers that make bodies and interactions.
+        omega: the simulation; YADE has one per process.
+        vector: constructor of a vector from three numbers.
+        quaternion: constructor of a unit quaternion from (w, x, y, z).
+    """
+
+    classes: Any
+    utils: Any
+    omega: Any
+    vector: Any
+    quaternion: Any
+
+
+def load_yade() -> Yade:
+    """YADE with an empty simulation.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    import_yade()
+    from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
+    from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
+
+    omega = wrapper.Omega()
+    omega.reset()
+    return Yade(wrapper, utils, omega, Vector3, Quaternion)
+
+
+def yade_version() -> str:
+    """Version of the YADE that runs.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    import_yade()
+    return str(importlib.import_module("yade.config").version)
+
+
+def import_yade() -> Any:
+    """The distribution's YADE, imported into this process.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    # Threads that find no free core spin; a run of seconds would take minutes.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    for folder in Path("/usr/lib").glob("*/yade*/py"):
+        if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
+            sys.path.append(str(folder))
+    try:
+        # YADE greets on standard output, which belongs to the command's own answer.
+        with contextlib.redirect_stdout(io.StringIO()):
+            return importlib.import_module("yade")
+    except ImportError as error:
+        msg = (
+            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, "
+            "see environment.md; `smarticles doctor` tells what is missing"
+        )
+        raise RunError(msg) from None

@@ -1,0 +1,87 @@
+"""What every part of a scene is made of: strict, frozen models, and the kinds of numbers that several parts share."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Annotated, Any, get_args
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+HINGE_RANGE = (-15.0, 105.0)  # deg; the range of the hinges
+REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle that the paper states torques and swings for
+
+
+class Part(BaseModel):
+    """A frozen part of a scene: no unknown keys, no NaN, no infinity, no silent conversion of text to numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            for key in data:
+                if key not in cls.model_fields:
+                    msg = f"unknown key {key!r}; {cls._nearest(str(key))}"
+                    raise ValueError(msg)
+        return data
+
+    @classmethod
+    def _nearest(cls, key: str) -> str:
+        """The way out for an unknown key: a key of this part that is spelt alike, or of the part it belongs in."""
+        here = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
+        if here:
+            return f"did you mean {here[0]!r}?"
+        for part in Part.__subclasses__():
+            if "type" in part.model_fields and ("type" in cls.model_fields or part.__subclasses__()):
+                continue  # phases share keys, but one's keys do not belong in another; a base is no part of a file
+            there = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
+            if there:
+                return f"{there[0]!r} belongs in {part._tag()}"
+        return "known keys: " + ", ".join(cls.model_fields)
+
+    @classmethod
+    def _tag(cls) -> str:
+        """What a scene file calls this part: the value of its `type`, or its key."""
+        kind = cls.model_fields.get("type")
+        return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_other_kinds_as_numbers(cls, data: Any) -> Any:
+        # YAML reads `yes` and `on` as true, and true would pass as 1; "0.4" in quotes would pass as 0.4.
+        if isinstance(data, Mapping):
+            for key, value in data.items():
+                field = cls.model_fields.get(str(key))
+                if field is None:
+                    continue
+                for item in value if isinstance(value, list) else [value]:
+                    if isinstance(item, bool) and field.annotation is not bool:
+                        msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(field.annotation)}"
+                        raise ValueError(msg)
+                    if isinstance(item, str) and _kind(field.annotation) == "a number":
+                        msg = f"{key}: got the text {item!r}, expected a number; leave out the quotes and the unit"
+                        raise ValueError(msg)
+        return data
+
+
+_NUMBERS = (int, float, float | None, int | None, tuple[float, float])
+
+
+def _kind(annotation: Any) -> str:
+    return "a number" if annotation in _NUMBERS else "a value of its kind"
+
+
+def in_hinge_range(angle: float) -> float:
+    """The angle [deg], refused outside the range of the hinges."""
+    low, high = HINGE_RANGE
+    if not low <= angle <= high:
+        msg = f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges"
+        raise ValueError(msg)
+    return angle
+
+
+Length = Annotated[float, Field(gt=0)]
+Duration = Annotated[float, Field(gt=0)]
+HingeAngle = Annotated[float, AfterValidator(in_hinge_range)]

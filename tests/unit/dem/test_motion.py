@@ -1,0 +1,347 @@
+"""Motions against hand-computed angles, and their extremes and speeds against dense sampling."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
+
+from dem.motion import Motion
+
+ADAPTER: TypeAdapter[Motion] = TypeAdapter(Motion)
+
+
+def motion(**data: Any) -> Motion:
+    return ADAPTER.validate_python(data)
+
+
+def degrees(data: dict[str, Any], times: Any, start: Any = 90.0) -> NDArray[np.float64]:
+    """Angles [deg] of a motion that begins at `start` [deg]."""
+    return np.degrees(ADAPTER.validate_python(data).angle(np.asarray(times, dtype=float), np.radians(start)))
+
+
+def ramp(to: float, length: float) -> dict[str, Any]:
+    return {"type": "ramp", "to_deg": to, "duration_s": length}
+
+
+def hold(length: float | None = None) -> dict[str, Any]:
+    return {"type": "hold", "duration_s": length}
+
+
+def back(length: float) -> dict[str, Any]:
+    return {"type": "return", "duration_s": length}
+
+
+def sequence(*steps: dict[str, Any], repeat: int | None = 1) -> dict[str, Any]:
+    return {"type": "sequence", "steps": list(steps), "repeat": repeat}
+
+
+def sine(**changes: Any) -> dict[str, Any]:
+    return {"type": "sine", "centre_deg": 60.0, "amplitude_deg": 20.0, "frequency_hz": 2.0, **changes}
+
+
+def triangle(**changes: Any) -> dict[str, Any]:
+    # 20° at 2π/9 rad/s = 40°/s: a quarter of a cycle takes 0.5 s.
+    data = {"type": "triangle", "centre_deg": 60.0, "amplitude_deg": 20.0, "speed_rad_per_s": 2 * math.pi / 9}
+    return {**data, **changes}
+
+
+@pytest.mark.parametrize(
+    ("data", "times", "expected"),
+    [
+        (hold(), [0, 1, 100], [90, 90, 90]),
+        (ramp(0, 1.5), [0, 0.5, 0.75, 1.5, 9], [90, 60, 45, 0, 0]),
+        (ramp(105, 1), [0, 0.5, 1], [90, 97.5, 105]),
+        (back(1), [0, 0.5, 1], [90, 90, 90]),
+        (sine(), [0, 1 / 24, 1 / 8, 1 / 4, 3 / 8, 1 / 2], [60, 70, 80, 60, 40, 60]),
+        (sine(cycles_offset=0.25), [0, 1 / 8, 1 / 4, 3 / 8], [80, 60, 40, 60]),
+        (triangle(), [0, 0.25, 0.5, 0.75, 1, 1.5, 2, 2.25], [60, 70, 80, 70, 60, 40, 60, 70]),
+        (triangle(cycles_offset=0.75), [0, 0.25, 0.5, 1], [40, 50, 60, 80]),
+        (triangle(cycles_offset=-0.25), [0, 0.25, 0.5, 1], [40, 50, 60, 80]),
+    ],
+)
+def test_angles_by_hand(data: dict[str, Any], times: list[float], expected: list[float]) -> None:
+    assert degrees(data, times) == pytest.approx(expected, abs=1e-9)
+
+
+def test_steps_begin_where_the_one_before_ended() -> None:
+    data = sequence(ramp(0, 1.5), hold(0.5), ramp(30, 1), hold(1), back(2))
+    times = [0, 0.75, 1.5, 1.9, 2.0, 2.5, 3.0, 3.9, 5, 6, 7]
+    assert degrees(data, times) == pytest.approx([90, 45, 0, 0, 0, 15, 30, 30, 60, 90, 90], abs=1e-9)
+    assert motion(**data).duration == 6
+    assert motion(**data).period is None
+
+
+def test_a_swing_as_a_step_starts_anew_and_is_left_where_it_is() -> None:
+    data = sequence(ramp(60, 1), triangle(duration_s=0.75), hold(1), back(1))
+    assert degrees(data, [1, 1.25, 1.5, 1.75, 2.0, 2.7, 3.25, 3.75]) == pytest.approx(
+        [60, 70, 80, 70, 70, 70, 80, 90], abs=1e-9
+    )
+
+
+def test_an_end_belongs_to_the_step_that_ends_there() -> None:
+    # The second step jumps to 80°: a motion that is cut at 1 s has ended at 0°.
+    data = sequence(ramp(0, 1), sine(cycles_offset=0.25))
+    assert degrees(data, [1.0, 1.0 + 1e-12]) == pytest.approx([0, 80], abs=1e-6)
+    assert degrees(data, 1.0) == pytest.approx(0)
+    assert degrees(data, 1.0 + 1e-12) == pytest.approx(80)
+    again = sequence(sine(cycles_offset=0.25, duration_s=0.125), repeat=3)
+    assert degrees(again, [0.125, 0.25, 0.375]) == pytest.approx([60, 60, 60], abs=1e-9)
+
+
+def test_beyond_the_end_what_is_periodic_goes_on_and_all_else_stays() -> None:
+    assert degrees(ramp(0, 1), 5) == pytest.approx(0)
+    assert degrees(sequence(ramp(0, 1), back(1)), 5) == pytest.approx(90)
+    assert degrees(sine(duration_s=0.25), 0.625) == pytest.approx(80)
+    assert degrees(sequence(ramp(0, 1), ramp(60, 1), repeat=2), [4.5, 5, 6]) == pytest.approx([30, 0, 60])
+
+
+@pytest.mark.parametrize("repeat", [3, None])
+def test_repeated_sequence(repeat: int | None) -> None:
+    data = sequence(ramp(0, 1), ramp(60, 1), repeat=repeat)
+    # The first time from 90°, later from 60°.
+    assert degrees(data, [0, 0.5, 1, 2, 2.5, 3, 4, 4.5, 5, 6]) == pytest.approx(
+        [90, 45, 0, 60, 30, 0, 60, 30, 0, 60], abs=1e-9
+    )
+    found = motion(**data)
+    assert found.duration == (6 if repeat else math.inf)
+    assert found.period == 2
+
+
+def test_sequences_within_sequences() -> None:
+    wave = sequence(ramp(80, 0.5), ramp(40, 0.5), repeat=2)
+    data = sequence(ramp(40, 1), wave, back(1))
+    assert degrees(data, [1, 1.5, 2, 2.5, 3, 3.5, 4]) == pytest.approx([40, 80, 40, 80, 40, 65, 90], abs=1e-9)
+    # `return` leads to the beginning of the phase, not of the inner sequence.
+    inner = sequence(ramp(40, 1), sequence(ramp(0, 1), back(1)), repeat=None)
+    assert degrees(inner, [1, 2, 3, 4, 5, 6]) == pytest.approx([40, 0, 90, 40, 0, 90], abs=1e-9)
+
+
+def test_many_starts_and_times_at_once() -> None:
+    data = sequence(ramp(0, 1), back(1), repeat=None)
+    table = degrees(data, np.array([[0.0], [0.5], [2.0], [3.5]]), np.array([90.0, 60.0, 30.0]))
+    assert table == pytest.approx(np.array([[90, 60, 30], [45, 30, 15], [90, 60, 30], [45, 30, 15]]), abs=1e-9)
+    alike = degrees(sine(), 0.125, np.array([90.0, 60.0]))
+    assert alike == pytest.approx([80, 80])
+    each = degrees(data, np.array([0.25, 1.5, 2.75]), np.array([80.0, 40.0, 20.0]))
+    assert each == pytest.approx([60, 20, 5], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("data", "duration", "period"),
+    [
+        (hold(), math.inf, None),
+        (hold(2), 2, None),
+        (ramp(0, 1.5), 1.5, None),
+        (back(3), 3, None),
+        (sine(), math.inf, 0.5),
+        (sine(duration_s=4), 4, 0.5),
+        (triangle(), math.inf, 2),
+        (sequence(ramp(0, 1), hold(), repeat=1), math.inf, None),
+        (sequence(ramp(0, 1), ramp(9, 0.5), repeat=4), 6, 1.5),
+    ],
+)
+def test_duration_and_period(data: dict[str, Any], duration: float, period: float | None) -> None:
+    found = motion(**data)
+    assert found.duration == duration
+    assert found.period == (None if period is None else pytest.approx(period))
+
+
+@pytest.mark.parametrize(
+    ("data", "until", "expected"),
+    [
+        (hold(), 5, (90, 90)),
+        (ramp(0, 1), 5, (0, 90)),
+        (ramp(0, 1), 0.5, (45, 90)),
+        (sine(), 5, (40, 80)),
+        (sine(), 1 / 8, (60, 80)),
+        (sine(), 1 / 24, (60, 70)),
+        (sine(cycles_offset=0.25), 1 / 4, (40, 80)),
+        (sine(cycles_offset=0.25), 1 / 8, (60, 80)),
+        (triangle(), 0.25, (60, 70)),
+        (triangle(), 1.25, (50, 80)),
+        (triangle(duration_s=0.25), 0.25, (60, 70)),
+        # A swing within a sequence is cut at its end; one at the end of it goes on.
+        (sequence(ramp(85, 1), triangle(centre_deg=80, duration_s=0.25), hold(1)), 2.25, (80, 90)),
+        (sequence(ramp(85, 1), triangle(centre_deg=80, duration_s=0.25)), 1.5, (80, 100)),
+        (sequence(ramp(0, 1), ramp(100, 1)), 2, (0, 100)),
+        (sequence(ramp(0, 1), ramp(100, 1)), 1, (0, 90)),
+        (sequence(ramp(0, 1), ramp(100, 1)), 1.5, (0, 90)),
+        (sequence(hold(1), ramp(30, 1), repeat=None), 1.5, (60, 90)),
+        (sequence(ramp(95, 1), sequence(ramp(60, 1), ramp(20, 1)), repeat=2), 9, (20, 95)),
+    ],
+)
+def test_extremes_by_hand(data: dict[str, Any], until: float, expected: tuple[float, float]) -> None:
+    low, high = motion(**data).extremes(math.radians(90), until)
+    assert (math.degrees(low), math.degrees(high)) == pytest.approx(expected, abs=1e-9)
+
+
+def test_extremes_for_each_start() -> None:
+    low, high = motion(**sequence(ramp(40, 1), back(1))).extremes(np.radians([90.0, 10.0]), 2)
+    assert np.degrees(low) == pytest.approx([40, 10])
+    assert np.degrees(high) == pytest.approx([90, 40])
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (hold(), 0),
+        (ramp(0, 1.5), math.pi / 2 / 1.5),
+        (back(1), 0),
+        (sine(), 2 * math.pi * 2 * math.radians(20)),
+        (triangle(), 2 * math.pi / 9),
+        (sequence(ramp(60, 1), ramp(0, 0.5), back(1)), math.radians(120)),
+        # From 90° the first time, from 0° each later one.
+        (sequence(ramp(60, 0.5), ramp(0, 1), repeat=2), math.radians(120)),
+        (sequence(ramp(90, 1), sine(cycles_offset=0.25, amplitude_deg=0.1)), 2 * math.pi * 2 * math.radians(0.1)),
+    ],
+)
+def test_speed_by_hand_without_jumps(data: dict[str, Any], expected: float) -> None:
+    assert motion(**data).speed(math.radians(90)) == pytest.approx(expected)
+
+
+def test_speed_is_the_greatest_over_all_starts_and_within_the_time() -> None:
+    assert motion(**ramp(60, 1)).speed(np.radians([90.0, 0.0])) == pytest.approx(math.radians(60))
+    slow_then_fast = motion(**sequence(ramp(80, 1), ramp(0, 1)))
+    assert slow_then_fast.speed(math.radians(90), until=1) == pytest.approx(math.radians(10))
+
+
+ANGLES = st.floats(-15, 105)
+LENGTHS = st.floats(0.1, 3)
+STEPS = st.one_of(
+    st.builds(ramp, ANGLES, LENGTHS),
+    st.builds(hold, LENGTHS),
+    st.builds(back, LENGTHS),
+    st.builds(
+        sine,
+        centre_deg=ANGLES,
+        amplitude_deg=st.floats(0.1, 40),
+        frequency_hz=st.floats(0.1, 5),
+        cycles_offset=st.floats(-2, 2),
+        duration_s=LENGTHS,
+    ),
+    st.builds(
+        triangle,
+        centre_deg=ANGLES,
+        amplitude_deg=st.floats(1, 40),
+        speed_rad_per_s=st.floats(0.1, 6),
+        cycles_offset=st.floats(-2, 2),
+        duration_s=LENGTHS,
+    ),
+)
+SEQUENCES = st.builds(
+    lambda steps, repeat: sequence(*steps, repeat=repeat), st.lists(STEPS, min_size=1, max_size=4), st.integers(1, 3)
+)
+MOTIONS = st.one_of(
+    STEPS, SEQUENCES, st.builds(lambda a, b, c, n: sequence(a, b, c, repeat=n), STEPS, SEQUENCES, STEPS, st.just(2))
+)
+
+
+@settings(max_examples=150)
+@given(data=MOTIONS, start=ANGLES, share=st.floats(0.05, 1.5))
+def test_extremes_are_those_of_dense_sampling(data: dict[str, Any], start: float, share: float) -> None:
+    found, begun = motion(**data), math.radians(start)
+    until = share * found.duration
+    times = np.linspace(0, until, 20_001)
+    angles = found.angle(times, begun)
+    low, high = found.extremes(begun, until)
+    reach = found.speed(begun, until) * times[1]  # between two samples
+    # Both ways: nothing lies outside, and the extremes are met. Of a jump, only one side falls on a sample.
+    assert low - 1e-9 <= angles.min() <= low + reach + 1e-9
+    assert high - reach - 1e-9 <= angles.max() <= high + 1e-9
+
+
+@given(data=STEPS, start=ANGLES)
+def test_speed_is_that_of_dense_sampling(data: dict[str, Any], start: float) -> None:
+    found, begun = motion(**data), math.radians(start)
+    # Several periods, beyond the length of a swing, so that its fastest point is among them.
+    length = found.duration if found.period is None else 3 * found.period
+    times = np.linspace(0, length, 20_001)
+    steepest = np.abs(np.diff(found.angle(times, begun))).max() / times[1]
+    assert steepest == pytest.approx(found.speed(begun), rel=1e-3, abs=1e-6)
+
+
+@given(data=SEQUENCES, start=ANGLES, times=st.lists(st.floats(0, 1), min_size=2, max_size=20))
+def test_one_time_and_many_times_agree(data: dict[str, Any], start: float, times: list[float]) -> None:
+    found = motion(**data)
+    # The same with a last step that has no end.
+    endless = motion(**sequence(*data["steps"], hold()))
+    asked = found.duration * np.array(times)
+    last = [endless.angle(np.array([time]), math.radians(start))[0] for time in asked]
+    assert endless.angle(asked, math.radians(start)) == pytest.approx(last, abs=1e-9)
+    alone = [found.angle(np.array([time]), math.radians(start))[0] for time in asked]
+    assert found.angle(asked, math.radians(start)) == pytest.approx(alone, abs=1e-9)
+
+
+@given(data=SEQUENCES, start=ANGLES, share=st.floats(0.01, 0.99))
+def test_from_the_second_time_on_a_sequence_is_periodic(data: dict[str, Any], start: float, share: float) -> None:
+    found = motion(**{**data, "repeat": None})
+    assert found.period is not None
+    times = found.period * (np.array([1, 2, 3, 7]) + share)
+    # A jump may fall to either side of a time by rounding: the angle a moment earlier or later is as good.
+    angles = [found.angle(times + shift, math.radians(start)) for shift in (0, -1e-9, 1e-9)]
+    for other in range(1, 4):
+        assert min(abs(row[other] - angles[0][0]) for row in angles) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (ramp(106, 1), "106° is outside -15° … 105°, the range of the hinges"),
+        (sine(centre_deg=-16), "-16° is outside -15° … 105°, the range of the hinges"),
+        (triangle(centre_deg=200), "200° is outside -15° … 105°, the range of the hinges"),
+        (sequence(), "steps: is empty; give at least one motion"),
+        (
+            sequence(ramp(0, 1), hold(), ramp(9, 1)),
+            "steps.1: hold has no end; give it a duration_s, as each step but the last needs one",
+        ),
+        (
+            sequence(ramp(0, 1), sine(), repeat=2),
+            "steps.1: sine has no end; give it a duration_s, as each step of a sequence that is repeated needs one",
+        ),
+        (
+            sequence(sequence(hold(1), repeat=None), hold(1)),
+            "steps.0: sequence has no end; give it a finite repeat, as each step but the last needs one",
+        ),
+        ({"type": "hold", "to_deg": 3}, "unknown key 'to_deg'; known keys: type, duration_s"),
+        (sine(duration_s="4"), "duration_s: got the text '4', expected a number; leave out the quotes and the unit"),
+    ],
+)
+def test_refused(data: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        ADAPTER.validate_python(data)
+    errors = caught.value.errors()
+    assert [error["msg"] for error in errors] == [f"Value error, {message}"]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        hold(0),
+        ramp(0, -1),
+        {"type": "ramp", "to_deg": 0},
+        back(math.inf),
+        sine(amplitude_deg=0),
+        sine(frequency_hz=-1),
+        sine(centre_deg=math.nan),
+        triangle(speed_rad_per_s=0),
+        sequence(hold(1), repeat=0),
+        sequence(hold(1), repeat=True),
+        {"type": "square"},
+    ],
+)
+def test_refused_values(data: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        ADAPTER.validate_python(data)
+
+
+def test_motions_are_frozen_and_compare_by_value() -> None:
+    assert motion(**sequence(hold(1), sine())) == motion(**sequence(hold(1), sine()))
+    with pytest.raises(ValidationError, match="frozen"):
+        motion(**hold(1)).duration_s = 2
