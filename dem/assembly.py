@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.clump import Body, clump
+from dem.errors import RunError
 from dem.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.library import Yade
 from dem.particle import LINKS, Particle
@@ -99,13 +100,18 @@ class Assembly:
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
-        """Poses and velocities of all links."""
+        """Poses and velocities of all links.
+
+        Raises:
+            RunError: the simulation has blown up.
+        """
         rows = []
         for body, to_body in zip(self._states, self._to_body, strict=True):
             x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body
             # Component by component: five times faster than letting NumPy convert YADE's vectors.
             rows.append((x[0], x[1], x[2], v[0], v[1], v[2], w[0], w[1], w[2], q[0], q[1], q[2], q[3]))
         table = np.array(rows).reshape(-1, 13)
+        self._check(table)
         positions, velocities, spins, quaternions = np.split(table, (3, 6, 9), axis=1)
         rotations = Rotation.from_quat(quaternions).as_matrix() if rows else np.empty((0, 3, 3))
         boxes = self._particle.boxes
@@ -127,6 +133,18 @@ class Assembly:
             velocities[:, None] + np.cross(shared, arms),
             shared,
         )
+
+    def _check(self, table: Array) -> None:
+        broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
+        if broken.any():
+            per = len(table) // self.count
+            ids = np.unique(np.flatnonzero(broken) // per)
+            shown = ", ".join(map(str, ids[:5])) + (", …" if len(ids) > 5 else "")
+            msg = (
+                f"at t = {self._yade.omega.time:.4f} s: {len(ids)} smarticle(s) ({shown}): positions or velocities are "
+                "no numbers, the simulation has blown up; lower fidelity.time_step_fraction"
+            )
+            raise RunError(msg)
 
     # -- welding -----------------------------------------------------------------------------------------------
 

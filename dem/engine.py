@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.account import Account
 from dem.assembly import SMARTICLE_MATERIAL, Assembly
-from dem.container import WALL_MATERIAL, Cylinder, add_container
+from dem.container import WALL_MATERIAL, Cylinder
 from dem.errors import RunError
+from dem.fixtures import Fixtures
 from dem.hinges import HINGE_MATERIAL, HingeLaw
+from dem.hooks import Cross
 from dem.library import load_yade
 from dem.motor import MotorLaw, Motors
 from dem.particle import Particle
@@ -46,6 +49,8 @@ class Engine:
         hinges: stiffness of the hinges and what all motors have in common; None where smarticles stay welded: then
             nothing of a hinge exists.
         track_work: whether to add up the work of the moving container.
+        dissipation_steps: every how many steps to sample what is dissipated; 0: never.
+        hooks: the lower and the upper hook; None: nothing of a hook exists.
 
     Raises:
         RunError: YADE is not installed.
@@ -62,6 +67,8 @@ class Engine:
         shaken: bool,
         hinges: tuple[HingeLaw, MotorLaw] | None = None,
         track_work: bool = False,
+        dissipation_steps: int = 0,
+        hooks: tuple[Cross, Cross] | None = None,
     ) -> None:
         self._yade = load_yade()
         self._omega = self._yade.omega
@@ -77,13 +84,20 @@ class Engine:
             hinge_law, self._motor_law = hinges
         self._assembly = Assembly(self._yade, particle, hinge_law)
         self._smarticle_seconds = 0.0
-        self._container_work = 0.0
-        self._weld_loss = 0.0
-        self._track_work = track_work
         # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
         self._loaded: tuple[int, float] | None = None
         self._add_materials(law, hinged=hinges is not None)
-        self._container = add_container(self._yade, cylinder)
+        self.fixtures = Fixtures(self._yade, cylinder, hooks)
+        """The container and the hooks."""
+        self.account = Account(
+            self._yade,
+            self._assembly,
+            self.fixtures,
+            time_step=time_step,
+            works=track_work,
+            dissipation_steps=dissipation_steps,
+        )
+        """Work and dissipation since the start."""
         self._assemble(law, shaken=shaken, hinged=hinge_law)
 
     # -- construction ------------------------------------------------------------------------------------------
@@ -113,12 +127,15 @@ class Engine:
     def _assemble(self, law: ContactLaw, *, shaken: bool, hinged: HingeLaw | None) -> None:
         yade = self._yade.classes
         friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
-        shaker = [yade.HarmonicMotionEngine(ids=self._container, dead=True)] if shaken else []
+        shaker = [yade.HarmonicMotionEngine(ids=self.fixtures.bodies, dead=True)] if shaken else []
+        hooked = bool(self.fixtures.hooks)
+        bars = [yade.Bo1_Box_Aabb()] if hooked else []
         collider = yade.InsertionSortCollider(
-            [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb()],
+            [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb(), *bars],
             verletDist=VERLET_DISTANCE * self.particle.radius,
         )
         geometry = [yade.Ig2_Sphere_Sphere_ScGeom(), yade.Ig2_Facet_Sphere_ScGeom(), yade.Ig2_Wall_Sphere_ScGeom()]
+        geometry += [yade.Ig2_Box_Sphere_ScGeom()] if hooked else []
         physics = [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)]
         laws = [yade.Law2_ScGeom_ViscElPhys_Basic()]
         if hinged is not None:
@@ -129,7 +146,7 @@ class Engine:
                 yade.Law2_ScGeom6D_CohFrictPhys_CohesionMoment(
                     useIncrementalForm=True,
                     shear_creep=True,
-                    creep_viscosity=float(__import__("os").environ.get("DV", "0.15")),
+                    creep_viscosity=hinged.damper_viscosity,
                 )
             )
         gravity = self._yade.vector(0, 0, -self.gravity)
@@ -145,8 +162,9 @@ class Engine:
 
     def _bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
-        bodies, engines, classes = self._omega.bodies, self._omega.engines, self._yade.classes
-        self._floor = bodies[self._container[-1]].state
+        engines, classes = self._omega.engines, self._yade.classes
+        self.fixtures.bind()
+        self._floor = self.fixtures.floor
         self._shaker = next((e for e in engines if isinstance(e, classes.HarmonicMotionEngine)), None)
         self._collider = next(e for e in engines if isinstance(e, classes.InsertionSortCollider))
         self._assembly.bind()
@@ -162,8 +180,8 @@ class Engine:
             "assembly": self._assembly.memory,
             "motors": None if self.motors is None else self.motors.memory,
             "smarticle_seconds": self._smarticle_seconds,
-            "container_work": self._container_work,
-            "weld_loss": self._weld_loss,
+            "fixtures": self.fixtures.memory,
+            "account": self.account.memory,
             "unbalanced": self.unbalanced_force(),
         }
 
@@ -177,8 +195,8 @@ class Engine:
         self._omega.load(str(path), quiet=True)
         self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
-        self._container_work = memory["container_work"]
-        self._weld_loss = memory["weld_loss"]
+        self.fixtures.restore(memory["fixtures"])
+        self.account.restore(memory["account"])
         if memory["motors"] is not None:
             assert self._motor_law is not None  # a checkpoint belongs to its scene
             self.motors = Motors(self._motor_law, np.zeros((self.count, 2)))
@@ -189,6 +207,7 @@ class Engine:
     def add(self, poses: Poses) -> None:
         """Add smarticles at rest."""
         self._assembly.add(poses)
+        self.account.added += self.particle.boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
 
     # -- time --------------------------------------------------------------------------------------------------
 
@@ -210,23 +229,19 @@ class Engine:
         """
         if steps <= 0:
             return
-        step, omega = self._omega.step, self._omega
-        target = self.steps + steps
-        tracked = self._track_work and self._shaker is not None and not self._shaker.dead
+        step, target, hooked = self._omega.step, self.steps + steps, bool(self.fixtures.hooks)
         # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
         # arrives between two steps.
-        for _ in range(steps):
-            step()
-            if tracked:
-                self._container_work -= self._lift() * self._floor.vel[2] * self.time_step
-        if int(omega.iter) != target:
+        for number in range(self.steps + 1, target + 1):
+            self.account.step(number, step)
+            if hooked:
+                self.fixtures.feel()
+        if self._assembly.hinges is not None:
+            self._assembly.hinges.moved()
+        if self.steps != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
         self._smarticle_seconds += steps * self.time_step * self.count
-
-    def _lift(self) -> float:
-        """Vertical force of the smarticles on the container in the last step [N]."""
-        return float(self._yade.utils.sumForces(self._container, self._yade.vector(0, 0, 1)))
 
     def shake(self, *, amplitude: float, frequency: float) -> None:
         """Move the container as z = A sin(2πf t), t from now; it starts at the position where it is.
@@ -246,13 +261,17 @@ class Engine:
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
         self._shaker.dead = False
+        self.fixtures.moving = self.fixtures.bodies
+
+    def remove_wall(self) -> None:
+        """Take the container's wall away; what its contacts had stored is lost."""
+        self.account.removed(self.fixtures.remove_wall)
 
     def stop_container(self) -> None:
         """Bring the container to rest where it is."""
         if self._shaker is not None:
             self._shaker.dead = True
-        for body in self._container:
-            self._omega.bodies[body].state.vel = self._yade.vector(0, 0, 0)
+        self.fixtures.stop()
 
     # -- articulation ------------------------------------------------------------------------------------------
 
@@ -281,7 +300,7 @@ class Engine:
 
     def weld(self) -> None:
         """Make each smarticle one rigid body of the shape that it has: motors that hold, at a third of the cost."""
-        self._weld_loss += self._assembly.weld()
+        self.account.dissipated += self._assembly.weld()
 
     def actuate(self, targets: Array, interval: float) -> None:
         """Let the motors look at their barbs and act for one control period.
@@ -291,7 +310,8 @@ class Engine:
             interval: length of the period [s].
         """
         assert self.motors is not None  # only articulated smarticles are actuated
-        self._hinges.set_torques(self.motors.look(self._hinges.angles(), targets, interval))
+        torques = self.motors.look(self._hinges.angles(), targets, interval, self.time_step)
+        self._hinges.set_torques(torques, self.time_step)
 
     @property
     def _hinges(self) -> Any:
@@ -314,11 +334,6 @@ class Engine:
     def gravity_impulse(self) -> float:
         """What gravity has given to all smarticles, each since it was added [N s], downwards."""
         return self._smarticle_seconds * self.particle.boxes.mass * self.gravity
-
-    @property
-    def container_work(self) -> float:
-        """Work of the moving container on the smarticles since the start [J]; 0 where it is not tracked."""
-        return self._container_work
 
     @property
     def floor(self) -> float:
@@ -365,7 +380,7 @@ class Engine:
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""
         force = np.zeros(3)
-        for body in self._container:
+        for body in self.fixtures.container:
             force += self._omega.forces.f(body)
         return force
 

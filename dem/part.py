@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 HINGE_RANGE = (-15.0, 105.0)  # deg; the range of the hinges
+LONGEST_LENGTH = 1.0  # m; a longer smarticle or container is taken for a mistaken unit
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle that the paper states torques and swings for
 
 
@@ -80,6 +81,17 @@ def in_hinge_range(angle: float) -> float:
         msg = f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges"
         raise ValueError(msg)
     return angle
+
+
+def refuse_wrong_unit(value: float | None) -> float | None:
+    """The length [m], refused where it can only be millimetres."""
+    if value is not None and value > LONGEST_LENGTH:
+        msg = (
+            f"{value:g} means {value:g} m, which no smarticle scene needs; "
+            f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
+        )
+        raise ValueError(msg)
+    return value
 
 
 Length = Annotated[float, Field(gt=0)]

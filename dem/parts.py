@@ -7,25 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from dem.actuation import Actuate, InternalOscillation, ShapeChange
-from dem.part import Duration, Length, Part, in_hinge_range
+from dem.hooks import PullHook
+from dem.part import Duration, Length, Part, in_hinge_range, refuse_wrong_unit
 from dem.particle import Boxes
-
-LONGEST_LENGTH = 1.0  # m; a longer smarticle or container is taken for a mistaken unit
-
-
-def _refuse_wrong_unit(value: float | None) -> float | None:
-    if value is not None and value > LONGEST_LENGTH:
-        msg = (
-            f"{value:g} means {value:g} m, which no smarticle scene needs; "
-            f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
-        )
-        raise ValueError(msg)
-    return value
+from dem.release import RemoveContainer
 
 
 class Smarticle(Part):
@@ -47,7 +38,7 @@ class Smarticle(Part):
         description="barb angles (α1, α2) [deg]: 0 straight, 90 the U; from -15 to 105",
     )
 
-    _length_unit = field_validator("middle_length_m", "thickness_normal_m", "thickness_in_plane_m")(_refuse_wrong_unit)
+    _length_unit = field_validator("middle_length_m", "thickness_normal_m", "thickness_in_plane_m")(refuse_wrong_unit)
 
     @field_validator("density_kg_per_m3")
     @classmethod
@@ -101,15 +92,63 @@ class Smarticle(Part):
         )
 
 
+class Tier(Part):
+    """One of several coaxial cylinders that stand on each other."""
+
+    radius_m: Length = Field(..., description="inner radius [m]; at most that of the tier below")
+    height_m: Length = Field(..., description="height of this tier alone [m]")
+
+    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
+
+
 class Container(Part):
-    """Upright hollow cylinder, closed at the bottom, open at the top."""
+    """Upright hollow cylinder, closed at the bottom, open at the top; or a mould of several tiers."""
 
     radius_m: Length = Field(0.0234, description="inner radius [m]; the paper's is 2w")
     height_m: float | None = Field(
         None, gt=0, description="height of the wall [m]; by default high enough for the pour"
     )
 
-    _length_unit = field_validator("radius_m", "height_m")(_refuse_wrong_unit)
+    tiers: tuple[Tier, ...] | None = Field(
+        None,
+        min_length=1,
+        description="instead of radius_m and height_m: coaxial cylinders from the bottom up, none wider than the one "
+        "below; a flat ceiling closes each step, the top tier is open",
+    )
+
+    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _size_of_tiers(cls, data: Any) -> Any:
+        # What needs one radius and one height takes the widest and the whole one.
+        try:
+            tiers = data["tiers"]
+            size = {"radius_m": tiers[0]["radius_m"], "height_m": math.fsum(tier["height_m"] for tier in tiers)}
+        except (KeyError, IndexError, TypeError):
+            return data  # there are none, or validation says what is wrong with them
+        return size | {key: value for key, value in data.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _narrower_upwards(self) -> Self:
+        tiers = self.tiers or ()
+        for number, (below, tier) in enumerate(pairwise(tiers), 1):
+            if tier.radius_m > below.radius_m:
+                msg = (
+                    f"tiers.{number}.radius_m: {tier.radius_m:g} m is wider than the tier below, {below.radius_m:g} m; "
+                    "a mould is filled from the top and lifted off: order tiers from wide to narrow"
+                )
+                raise ValueError(msg)
+        if tiers:
+            whole = math.fsum(tier.height_m for tier in tiers)
+            for key, given, own in (
+                ("radius_m", self.radius_m, tiers[0].radius_m),
+                ("height_m", self.height_m, whole),
+            ):
+                if given is not None and not math.isclose(given, own, rel_tol=1e-9):
+                    msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
+                    raise ValueError(msg)
+        return self
 
 
 class Contact(Part):
@@ -271,7 +310,10 @@ class Shake(Part):
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
 
 
-Phase = Annotated[Deposit | Relax | Shake | Actuate | ShapeChange | InternalOscillation, Field(discriminator="type")]
+Phase = Annotated[
+    Deposit | Relax | Shake | Actuate | ShapeChange | InternalOscillation | RemoveContainer | PullHook,
+    Field(discriminator="type"),
+]
 
 
 class Recording(Part):
@@ -285,6 +327,12 @@ class Recording(Part):
     series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
         False, description="whether to record energies and the work of the container as well as the motors'"
+    )
+    dissipation_interval_s: float | None = Field(
+        None,
+        gt=0,
+        description="time between samples of what contacts dissipate [s], which closes the account of energies; null: "
+        "none. A sample costs about as much as five steps; 2e-4 s is dense enough",
     )
     checkpoint_interval_s: float | None = Field(
         0.4,

@@ -1,4 +1,4 @@
-"""The stages of a run: pour, rest, shake, actuate.
+"""The stages of a run: pour, rest, shake, actuate, take the container away, pull a hook.
 
 A stage is asked again and again when it wants to be asked next; in between, time passes and everything due is recorded.
 All that it remembers is plain data, so that a run can be stopped between any two steps and go on as if it had not been.
@@ -14,8 +14,10 @@ import numpy as np
 from dem.actuation import Drive, drive
 from dem.engine import Engine
 from dem.errors import RunError
+from dem.hooks import PullHook
 from dem.parts import Deposit, Relax, Settle, Shake
 from dem.placement import place_layer
+from dem.release import RemoveContainer
 from dem.scene import Scene, derive_seed
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down or a pile has settled
@@ -50,6 +52,10 @@ def begin(scene: Scene, index: int) -> Stage:
         return Shaking(phase, scene.gravity_m_per_s2)
     if isinstance(phase, Relax):
         return Resting(phase)
+    if isinstance(phase, RemoveContainer):
+        return Removing(phase)
+    if isinstance(phase, PullHook):
+        return Pulling(phase)
     return Actuating(drive(scene, index), scene.fidelity.control_interval_s)
 
 
@@ -86,6 +92,64 @@ class Shaking:
         engine.weld()
         engine.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)
         return self._phase.duration_s
+
+
+class Removing:
+    """The container's wall goes away, at once or upwards, and the pile rests on the floor."""
+
+    def __init__(self, phase: RemoveContainer) -> None:
+        self._phase = phase
+        self.memory: Memory = {"end": None, "lifting": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory, speed = self.memory, self._phase.speed_m_per_s
+        if memory["end"] is None:
+            memory["end"] = engine.time + self._phase.duration_s
+            engine.weld()
+            if speed is None:
+                engine.remove_wall()
+            else:
+                engine.fixtures.lift_wall(speed)
+                memory["lifting"] = True
+        left = _time_left(engine, memory["end"])
+        if memory["lifting"]:
+            top = engine.state().vertices[..., 2].max() + engine.particle.radius
+            if engine.fixtures.wall_bottom > top:
+                engine.remove_wall()
+                memory["lifting"] = False
+            elif not left:
+                engine.fixtures.stop()
+            else:
+                return min(CHECK_INTERVAL, left)
+        return left
+
+
+class Pulling:
+    """The upper hook is raised, and then stays where it is."""
+
+    def __init__(self, phase: PullHook) -> None:
+        self._phase = phase
+        self.memory: Memory = {"end": None, "raising": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory, phase = self.memory, self._phase
+        if memory["end"] is None:
+            memory.update(end=engine.time + phase.duration_s, raising=True)
+            engine.weld()
+            engine.fixtures.raise_upper(phase.speed_m_per_s)
+            return phase.distance_m / phase.speed_m_per_s
+        if memory["raising"]:
+            memory["raising"] = False
+            engine.fixtures.stop()
+        return _time_left(engine, memory["end"])
+
+
+def _time_left(engine: Engine, end: float) -> float:
+    """Time [s] until `end`; 0 where it is nearer than half a step, as near as steps come."""
+    left = end - engine.time
+    return left if left > engine.time_step / 2 else 0.0
 
 
 class Actuating:
@@ -181,41 +245,29 @@ def shake_amplitude(phase: Shake, gravity: float) -> float:
     return phase.peak_acceleration_g * gravity / (2 * math.pi * phase.frequency_hz) ** 2
 
 
-def container_height(scene: Scene) -> float:
-    """Height of the wall [m]: given, or enough for the loosest pile plus a layer being poured.
-
-    A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0, 0.7
-    and 1.4, with d the mean width of the section); half of that is taken as the loosest.
-    """
-    given = scene.container.height_m
-    if given is not None:
-        return given
-    boxes = scene.smarticle.boxes
-    loosest = 1.2 * scene.sphere_diameter / float(boxes.lengths.sum())
-    pile = scene.count * boxes.volume / (math.pi * scene.container.radius_m**2 * loosest)
-    return pile + 4 * scene.particle.reach + 6 * boxes.middle_length
-
-
 def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np.random.Generator) -> None:
     particle, state = scene.particle, engine.state()
     tops = state.vertices[..., 2].max(axis=1)
     top = tops.max(initial=engine.floor)
     near = tops > top - 2 * particle.radius
+    cylinder, bottom = engine.cylinder, top + particle.radius
+    hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
     poses = place_layer(
         particle,
         count=size,
-        radius=engine.cylinder.inner_radius,
-        bottom=top + particle.radius,
+        radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
+        bottom=bottom,
         height=phase.layer_height_w * scene.smarticle.middle_length_m,
-        obstacles=state.spheres(particle)[near].reshape(-1, 3),
+        obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
         rng=rng,
+        narrower=cylinder.inner_radii if cylinder.upper else None,
     )
     highest = poses.positions[:, 2].max() + particle.reach
-    wall = container_height(scene)
-    if highest > wall:
+    if highest > cylinder.height:
+        key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
         msg = (
             f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} m, "
-            f"above container.height_m = {wall:.3g} m; lower count or raise container.height_m"
+            f"above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
         )
         raise RunError(msg)
     engine.add(poses)

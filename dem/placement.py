@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +39,7 @@ def place_layer(
     height: float,
     obstacles: Array,
     rng: np.random.Generator,
+    narrower: Callable[[Array], Array] | None = None,
 ) -> Poses:
     """Random, non-overlapping poses in a slab of a cylinder.
 
@@ -52,13 +54,16 @@ def place_layer(
         height: height of the slab [m], in which the lowest spheres of the smarticles lie.
         obstacles: (n, 3) centres of spheres [m], of the same diameter, that are there already.
         rng: source of randomness.
+        narrower: inner radii of the cylinder [m] at heights [m], where it is narrower in places; it must not be wider
+            higher up.
 
     Raises:
         RunError: no room was found.
     """
     diameter = particle.chain.diameter
     apart = diameter * (1 + CLEARANCE)
-    widest = radius - particle.radius * (1 + 2 * CLEARANCE)
+    margin = particle.radius * (1 + 2 * CLEARANCE)
+    widest = radius - margin
     taken = obstacles
     positions: list[Array] = []
     rotations: list[Rotation] = []
@@ -82,7 +87,11 @@ def place_layer(
                 ]
             )
             spheres += centre
-            if np.hypot(spheres[:, 0], spheres[:, 1]).max() > widest:
+            off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
+            if off_axis.max() > widest:
+                continue
+            # As wide as the cylinder is at the tops of the spheres, they touch neither wall nor ceiling.
+            if narrower is not None and (off_axis > narrower(spheres[:, 2] + margin) - margin).any():
                 continue
             if tree is not None and tree.query(spheres, distance_upper_bound=apart)[0].min() < apart:
                 continue

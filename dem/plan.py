@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
+from dem.hooks import PullHook
 from dem.parts import Deposit, Shake
-from dem.phases import container_height, shake_amplitude
+from dem.phases import shake_amplitude
+from dem.release import RemoveContainer
 from dem.scene import Scene
 from dem.timestep import stable_step, time_step
 
@@ -69,14 +71,14 @@ class Plan:
             f"d = {1e3 * self.sphere_diameter_m:.3g} mm, wall {1e3 * self.container_height_m:.0f} mm high",
             f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)",
             "",
-            f"{'phase':<12}{'simulated':>12}{'expected wall time':>22}",
+            f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
         ]
         for phase in self.phases:
             guess = "" if phase.duration_s is not None else "≈ "
             label = f"{phase.index} {phase.type}"
-            lines.append(f"{label:<12}{f'{guess}{phase.estimate_s:.2f} s':>12}{f'{phase.wall_s:.0f} s':>22}")
+            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{f'{phase.wall_s:.0f} s':>22}")
         lines += [
-            f"{'total':<12}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{f'{self.wall_s:.0f} s':>22}",
+            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{f'{self.wall_s:.0f} s':>22}",
             "(one core; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why",
@@ -113,7 +115,7 @@ def plan(scene: Scene) -> Plan:
         sphere_diameter_m=particle.chain.diameter,
         time_step_s=dt,
         stable_time_step_s=stable_step(scene),
-        container_height_m=container_height(scene),
+        container_height_m=scene.cylinder.height,
         phases=tuple(phases),
         effects=effects,
         engines=_engines(effects),
@@ -166,12 +168,39 @@ def _effects(scene: Scene) -> tuple[Effect, ...]:
             "saving and reloading the simulation",
         ),
         *_actuation_effects(scene),
+        *_test_effects(scene),
         Effect(
             "energy",
             recording.energy,
             "recording.energy is true" if recording.energy else "recording.energy is false",
             "one sum over the container's bodies per step while it is shaken",
         ),
+    )
+
+
+def _test_effects(scene: Scene) -> tuple[Effect, Effect]:
+    hooks, why = scene.hooks, "no key hooks"
+    if hooks is not None:
+        pulls = [
+            f"phase {k} raises the upper one by {1e3 * phase.distance_m:.3g} mm at {1e3 * phase.speed_m_per_s:.3g} mm/s"
+            for k, phase in enumerate(scene.phases)
+            if isinstance(phase, PullHook)
+        ]
+        why = (
+            f"crosses at {1e3 * hooks.lower_height_m:.3g} and {1e3 * hooks.upper_height_m:.3g} mm, bars of "
+            f"{1e3 * hooks.side_m:.3g} mm; {', '.join(pulls) or 'no phase pulls one'}"
+        )
+    removals = [
+        f"phase {k}: "
+        + ("at once" if phase.speed_m_per_s is None else f"lifted at {1e3 * phase.speed_m_per_s:.3g} mm/s")
+        for k, phase in enumerate(scene.phases)
+        if isinstance(phase, RemoveContainer)
+    ]
+    return (
+        Effect(
+            "hooks", hooks is not None, why, "four bodies, and their forces summed in every step" if hooks else "none"
+        ),
+        Effect("wall removal", bool(removals), ", ".join(removals) or "no phase of type remove-container", "none"),
     )
 
 

@@ -57,7 +57,13 @@ class Recorder:
             self.frames.write(mesh, engine.time)
             self.series.write()
         # After the frame is written: the last picture of a run that fails is worth having.
-        self.watchdog.check(state, floor=engine.floor, time=engine.time)
+        self.watchdog.check(
+            state,
+            floor=engine.floor,
+            time=engine.time,
+            raised=engine.fixtures.raised,
+            gaps=engine.joint_gaps() if engine.articulated else None,
+        )
         self.progress.update(time=engine.time, phi=phi, count=engine.count)
         self.next_step = engine.steps + self.series_steps
 

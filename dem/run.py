@@ -18,17 +18,18 @@ import numpy as np
 
 from dem.actuation import actuated
 from dem.checkpoint import has_checkpoint, read_checkpoint
-from dem.container import Cylinder
 from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
+from dem.hooks import PullHook
 from dem.library import yade_version
 from dem.motor import MotorLaw
 from dem.parts import Shake
-from dem.phases import container_height, shake_amplitude
+from dem.phases import shake_amplitude
 from dem.progress import Progress
 from dem.recorder import Recorder
+from dem.release import RemoveContainer
 from dem.rundir import DONE, FAILED, MANIFEST, SCENE, claimed, log_of, mark_done, mark_failed, recorded_scene_hash
 from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
@@ -37,6 +38,7 @@ from dem.timestep import contact_law, hinge_law, time_step
 from dem.watchdog import Watchdog
 
 FORMAT = 1
+GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
 SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
 
 
@@ -200,18 +202,17 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
 
 
 def _build_engine(scene: Scene, dt: float) -> Engine:
-    cylinder = Cylinder(
-        radius=scene.container.radius_m, height=container_height(scene), facets=scene.fidelity.wall_facets
-    )
     return Engine(
         particle=scene.particle,
-        cylinder=cylinder,
+        cylinder=scene.cylinder,
         law=contact_law(scene),
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
         shaken=any(isinstance(phase, Shake) for phase in scene.phases),
         hinges=(hinge_law(scene), motor_law(scene)) if any(actuated(phase) for phase in scene.phases) else None,
-        track_work=scene.recording.energy,
+        track_work=scene.recording.energy or scene.recording.dissipation_interval_s is not None,
+        dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
+        hooks=None if scene.hooks is None else scene.hooks.crosses,
     )
 
 
@@ -226,9 +227,11 @@ def motor_law(scene: Scene) -> MotorLaw:
 
 
 def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
-    radius, gravity, dt = scene.container.radius_m, scene.gravity_m_per_s2, engine.time_step
-    height = container_height(scene)
-    fall = math.sqrt(2 * gravity * height)
+    gravity, dt = scene.gravity_m_per_s2, engine.time_step
+    # No one radius gives the volume of a mould of tiers.
+    radius = math.nan if scene.cylinder.upper else scene.container.radius_m
+    raised = sum(phase.distance_m for phase in scene.phases if isinstance(phase, PullHook))
+    fall = math.sqrt(2 * gravity * (scene.cylinder.height + raised))
     shaking = max(
         (
             shake_amplitude(phase, gravity) * 2 * math.pi * phase.frequency_hz
@@ -237,16 +240,24 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         ),
         default=0.0,
     )
+    moved = max((getattr(phase, "speed_m_per_s", None) or 0.0 for phase in scene.phases), default=0.0)
     return Recorder(
         series=SeriesWriter(
             out,
             radius,
             {"scene_sha256": scene_hash(scene), "seed": scene.seed},
             motors=engine.hinged,
-            energy=scene.recording.energy,
+            energy=scene.recording.energy or scene.recording.dissipation_interval_s is not None,
+            ledger=scene.recording.dissipation_interval_s is not None,
+            hooks=scene.hooks is not None,
+            release=any(isinstance(phase, RemoveContainer) for phase in scene.phases),
         ),
         frames=FrameWriter(out),
-        watchdog=Watchdog(radius=radius, height=height, speed=SPEED_MARGIN * max(fall, shaking)),
+        watchdog=Watchdog(
+            cylinder=scene.cylinder,
+            speed=SPEED_MARGIN * max(fall, shaking, moved),
+            gap=GAP_LIMIT * scene.sphere_diameter,
+        ),
         progress=progress,
         series_steps=round(scene.recording.series_interval_s / dt),
         frame_steps=round(scene.recording.frame_interval_s / dt),

@@ -10,17 +10,21 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import yaml
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from dem.actuation_checks import check_actuation
+from dem.container import Cylinder
 from dem.errors import InputError
+from dem.hooks import Hooks, check_hooks, with_hook_defaults, with_pull_defaults
 from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Motor, Phase, Recording, Smarticle
+from dem.release import check_release
 from dem.yaml_text import StrictLoader
 
 SCHEMA_VERSION = 1
@@ -35,6 +39,7 @@ class Scene(Part):
     smarticle: Smarticle = Field(default_factory=Smarticle, description="geometry and material of one smarticle")
     count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles [1]")
     container: Container = Field(default_factory=Container, description="the container")
+    hooks: Hooks | None = Field(None, description="hooks in the pile, for phases that pull one; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]")
@@ -58,6 +63,18 @@ class Scene(Part):
             raise ValueError(msg)
         return {"base": base, **FIDELITIES[base], **value}
 
+    @field_validator("hooks", mode="before")
+    @classmethod
+    def _hooks_of_smarticle(cls, value: Any, info: ValidationInfo) -> Any:
+        return with_hook_defaults(value, info.data.get("smarticle") or Smarticle())
+
+    @field_validator("phases", mode="before")
+    @classmethod
+    def _pulls_of_smarticle(cls, value: Any, info: ValidationInfo) -> Any:
+        if not isinstance(value, list | tuple):
+            return value
+        return [with_pull_defaults(phase, info.data.get("smarticle") or Smarticle()) for phase in value]
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_phases()
@@ -65,6 +82,8 @@ class Scene(Part):
         self._check_container()
         self._check_recording()
         check_actuation(self)
+        check_release(self)
+        check_hooks(self)
         return self
 
     def _check_phases(self) -> None:
@@ -94,14 +113,24 @@ class Scene(Part):
                 f"from its centre of mass; use at least {reach:.4g} m"
             )
             raise ValueError(msg)
+        tiers = self.container.tiers or ()
+        for number, tier in enumerate(tiers):
+            if reach > tier.radius_m:
+                msg = (
+                    f"container.tiers.{number}.radius_m: {tier.radius_m:g} m is narrower than a smarticle, whose "
+                    f"farthest point is {reach:.4g} m from its centre of mass; use at least {reach:.4g} m"
+                )
+                raise ValueError(msg)
         height = self.container.height_m
         if height is not None:
             # No random packing of thin bars comes near one half; a scene beyond it cannot fit, whatever the pour.
-            most = int(0.5 * math.pi * radius**2 * height / self.smarticle.boxes.volume)
+            space = math.fsum(t.radius_m**2 * t.height_m for t in tiers) if tiers else radius**2 * height
+            most = int(0.5 * math.pi * space / self.smarticle.boxes.volume)
             if self.count > most:
+                way_out = "make the top tier higher" if tiers else "leave height_m out"
                 msg = (
                     f"count: {self.count} smarticles cannot fit into {height:g} m of container.height_m "
-                    f"(half full is {most}); lower the count or leave height_m out"
+                    f"(half full is {most}); lower the count or {way_out}"
                 )
                 raise ValueError(msg)
 
@@ -126,6 +155,36 @@ class Scene(Part):
                     f"recording.series_interval_s = {series:g} s; lengthen the phase or sample more often"
                 )
                 raise ValueError(msg)
+
+    @cached_property
+    def cylinder(self) -> Cylinder:
+        """The container as the engine builds it."""
+        container, upper = self.container, []
+        tiers, bottom = container.tiers or (), 0.0
+        for below, tier in pairwise(tiers):
+            bottom += below.height_m
+            if tier.radius_m < below.radius_m:
+                upper.append((bottom, tier.radius_m))
+        return Cylinder(
+            radius=container.radius_m,
+            height=self._ample_height if container.height_m is None else container.height_m,
+            facets=self.fidelity.wall_facets,
+            upper=tuple(upper),
+        )
+
+    @property
+    def _ample_height(self) -> float:
+        """Height [m] of a wall that is enough for the loosest pile, hooks in it, and a layer being poured.
+
+        A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0,
+        0.7 and 1.4, with d the mean width of the section); half of that is taken as the loosest.
+        """
+        boxes = self.smarticle.boxes
+        loosest = 1.2 * self.sphere_diameter / float(boxes.lengths.sum())
+        pile = self.count * boxes.volume / (math.pi * self.container.radius_m**2 * loosest)
+        top = 0.0 if self.hooks is None else self.hooks.upper_height_m + self.hooks.side_m / 2
+        # What is poured may come to lie on a hook.
+        return max(pile, top) + 4 * self.particle.reach + 6 * boxes.middle_length
 
     @property
     def sphere_diameter(self) -> float:
@@ -240,6 +299,9 @@ def json_schema() -> dict[str, Any]:
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
+    # These follow from the smarticle where they are not given.
+    schema["$defs"]["Hooks"].pop("required")
+    schema["$defs"]["PullHook"]["required"] = ["type"]
     return schema
 
 

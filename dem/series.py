@@ -36,7 +36,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "unbalanced_force": ("1", "mean net force on a smarticle over its weight"),
     "packing_fraction": (
         "1",
-        "N V_s / (pi r² z), z the second-highest centre of mass above the floor",
+        "N V_s / (pi r² z), z the second-highest centre of mass above the floor; NaN in a mould of tiers and once the "
+        "container is taken away",
     ),
 }
 
@@ -54,6 +55,26 @@ MOTOR_COLUMNS: dict[str, tuple[str, str]] = {
 ENERGY_COLUMNS: dict[str, tuple[str, str]] = {
     "gravitational_energy_J": ("J", "of all smarticles above the floor's height at the start"),
     "container_work_J": ("J", "work of the moving container on the smarticles since the start, without its own weight"),
+}
+
+# Only in scenes that sample dissipation.
+LEDGER_COLUMNS: dict[str, tuple[str, str]] = {
+    "added_energy_J": ("J", "gravitational energy that smarticles had when they were poured, above the same height"),
+    "contact_elastic_energy_J": ("J", "in the springs of all contacts"),
+    "hinge_elastic_energy_J": ("J", "in the pins and dampers of all hinges"),
+    "dissipated_energy_J": ("J", "by contacts, hinges and welding since the start, sampled"),
+    "energy_residual_J": ("J", "added energy and work less everything stored and dissipated: the account's error"),
+}
+
+# Only in scenes with hooks.
+HOOK_COLUMNS: dict[str, tuple[str, str]] = {
+    "hook_upper_force_N": ("N", "force of the smarticles on the upper hook (x, y, z), mean since the sample before"),
+    "hook_lower_force_N": ("N", "force of the smarticles on the lower hook (x, y, z), mean since the sample before"),
+    "hook_upper_z_m": ("m", "height of the upper hook's centre"),
+}
+# Only in scenes that take the container away.
+RELEASE_COLUMNS: dict[str, tuple[str, str]] = {
+    "outside_count": ("1", "smarticles whose centre of mass is farther from the axis than the container's radius"),
 }
 
 
@@ -81,6 +102,9 @@ class SeriesWriter:
         attributes: root attributes: scene hash, seed.
         motors: whether the scene has motors.
         energy: whether the scene asks for energy.
+        ledger: whether the scene samples dissipation, and energy with it.
+        hooks: whether the scene has hooks.
+        release: whether the scene takes the container away.
     """
 
     folder: Path
@@ -88,8 +112,12 @@ class SeriesWriter:
     attributes: dict[str, Any]
     motors: bool = False
     energy: bool = False
+    ledger: bool = False
+    hooks: bool = False
+    release: bool = False
     _rows: dict[str, list[Any]] = field(default_factory=dict)
     _before: tuple[float, float, NDArray[np.float64]] | None = None
+    _hooks_before: tuple[int, NDArray[np.float64]] | None = None
 
     def __post_init__(self) -> None:
         self._rows = {name: [] for name in self.described}
@@ -97,7 +125,17 @@ class SeriesWriter:
     @property
     def described(self) -> dict[str, tuple[str, str]]:
         """Unit and description of each column."""
-        return COLUMNS | (MOTOR_COLUMNS if self.motors else {}) | (ENERGY_COLUMNS if self.energy else {})
+        columns = dict(COLUMNS)
+        for wanted, more in (
+            (self.motors, MOTOR_COLUMNS),
+            (self.energy, ENERGY_COLUMNS),
+            (self.ledger, LEDGER_COLUMNS),
+            (self.hooks, HOOK_COLUMNS),
+            (self.release, RELEASE_COLUMNS),
+        ):
+            if wanted:
+                columns |= more
+        return columns
 
     def sample(self, engine: Engine, state: State, phase: int) -> float:
         """Take one sample.
@@ -108,13 +146,29 @@ class SeriesWriter:
         boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
+        container_force = self._mean_force(engine, state.momentum)
+        more: dict[str, Any] = {}
+        if self.hooks:
+            lower, upper = self._hook_forces(engine)
+            # The balance does not tell hooks from the container.
+            container_force -= lower + upper
+            more |= {
+                "hook_upper_force_N": upper,
+                "hook_lower_force_N": lower,
+                "hook_upper_z_m": engine.fixtures.upper_height,
+            }
+        if self.release:
+            outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
+            more["outside_count"] = np.count_nonzero(outside)
+            if not engine.fixtures.enclosed:
+                phi = math.nan  # a pile that spreads fills no cylinder
         row = {
             "time_s": engine.time,
             "phase": phase,
             "count": engine.count,
             "container_z_m": engine.floor,
             "container_velocity_m_per_s": engine.container_velocity,
-            "container_force_N": self._mean_force(engine, state.momentum),
+            "container_force_N": container_force,
             "com_height_m": heights.mean() if len(heights) else math.nan,
             "kinetic_energy_J": state.kinetic_energy,
             "max_speed_m_per_s": np.linalg.norm(state.velocities, axis=1).max(initial=0.0),
@@ -126,9 +180,11 @@ class SeriesWriter:
         if self.energy:
             row |= {
                 "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
-                "container_work_J": engine.container_work,
+                "container_work_J": engine.account.container_work,
             }
-        for name, value in row.items():
+        if self.ledger:
+            row |= _ledger_row(engine, row)
+        for name, value in (row | more).items():
             self._rows[name].append(value)
         return phi
 
@@ -144,11 +200,22 @@ class SeriesWriter:
         mean: NDArray[np.float64] = lost / (time - before[0])
         return mean
 
+    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
+        steps, sums, before = engine.steps, engine.fixtures.hook_sums, self._hooks_before
+        self._hooks_before = (steps, sums)
+        if before is None or steps <= before[0]:
+            return np.full_like(sums, math.nan)
+        mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
+        return mean
+
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns."""
-        before = self._before
-        return {"before": None if before is None else [before[0], before[1], before[2].tolist()]}
+        before, hooks = self._before, self._hooks_before
+        return {
+            "before": None if before is None else [before[0], before[1], before[2].tolist()],
+            "hooks": None if hooks is None else [hooks[0], hooks[1].tolist()],
+        }
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -159,6 +226,8 @@ class SeriesWriter:
         """Go on from where `memory` and `columns` were taken."""
         before = memory["before"]
         self._before = None if before is None else (before[0], before[1], np.array(before[2]))
+        hooks = memory["hooks"]
+        self._hooks_before = None if hooks is None else (hooks[0], np.array(hooks[1]))
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def write(self) -> None:
@@ -204,6 +273,19 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
         "halted_fraction": halted,
         "motor_work_J": 0.0 if motors is None else motors.work.sum(),
         "joint_gap_m": engine.joint_gaps().max(initial=0.0),
+    }
+
+
+def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
+    contacts, hinges = engine.account.elastic()
+    given = engine.account.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
+    stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
+    return {
+        "added_energy_J": engine.account.added,
+        "contact_elastic_energy_J": contacts,
+        "hinge_elastic_energy_J": hinges,
+        "dissipated_energy_J": engine.account.dissipated,
+        "energy_residual_J": given - stored - engine.account.dissipated,
     }
 
 

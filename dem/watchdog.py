@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dem.container import Cylinder
 from dem.errors import RunError
 from dem.state import State
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,17 +21,26 @@ class Watchdog:
     """Limits that no smarticle may pass.
 
     Args:
-        radius: of the container [m]; a centre of mass beyond it has escaped.
-        height: of the container's wall [m]; a centre of mass above it has been thrown out.
+        cylinder: the container; a centre of mass beyond its wall has escaped, one above it has been thrown out.
         speed: [m/s]; faster than anything that falls or is shaken in the scene.
+        gap: [m]; a hinge whose links are farther apart is broken.
     """
 
-    radius: float
-    height: float
+    cylinder: Cylinder
     speed: float
+    gap: float = math.inf
 
-    def check(self, state: State, *, floor: float, time: float) -> None:
+    def check(
+        self, state: State, *, floor: float, time: float, raised: float | None = 0.0, gaps: Array | None = None
+    ) -> None:
         """Look at all smarticles once.
+
+        Args:
+            state: the smarticles.
+            floor: height of the floor [m].
+            time: simulated time [s].
+            raised: how far a hook may have raised smarticles [m]; None: nothing holds them, so that none escapes.
+            gaps: (N, 2) how far the links of each hinge are apart [m]; None while welded.
 
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
@@ -47,17 +62,28 @@ class Watchdog:
             "which nothing in this scene explains",
             "lower fidelity.time_step_fraction",
         )
-        outside = (np.hypot(positions[:, 0], positions[:, 1]) > self.radius) | (heights < 0)
+        if gaps is not None:
+            # A gap that is no number is not below the limit either.
+            self._refuse(
+                (~np.less_equal(gaps, self.gap)).any(axis=1),
+                time,
+                f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
+                "lower fidelity.time_step_fraction, or raise fidelity.hinge_stiffness_N_per_m",
+            )
+        radii, height = np.full(state.count, math.inf), math.inf
+        if raised is not None:
+            radii, height = self.cylinder.radii(heights - raised), self.cylinder.height + raised
+        outside = (np.hypot(positions[:, 0], positions[:, 1]) > radii) | (heights < 0)
         self._refuse(outside, time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
         self._refuse(
-            heights > self.height,
+            heights > height,
             time,
-            f"thrown out over the wall of {self.height:.3g} m",
+            f"thrown out over the wall of {self.cylinder.height:.3g} m",
             "raise container.height_m or shake less",
         )
 
     @staticmethod
-    def _refuse(concerned: np.ndarray, time: float, cause: str, way_out: str) -> None:
+    def _refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
         if concerned.any():
             ids = np.flatnonzero(concerned)
             shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")

@@ -19,7 +19,7 @@ from dem.container import Cylinder
 from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.library import yade_version
-from dem.phases import container_height, shake_amplitude
+from dem.phases import shake_amplitude
 from dem.placement import Poses, place_layer
 from dem.run import run_scene
 from dem.scene import Scene, parse_scene
@@ -46,7 +46,7 @@ def build(
 ) -> Engine:
     return Engine(
         particle=scene.particle,
-        cylinder=Cylinder(radius=radius or scene.container.radius_m, height=container_height(scene), facets=64),
+        cylinder=Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=64),
         law=law or contact_law(scene),
         gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
         time_step=dt or time_step(scene),
@@ -267,7 +267,7 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
 
 def _wall(engine: Engine) -> float:
     """Height of the first facet of the wall."""
-    return float(engine._omega.bodies[engine._container[0]].state.pos[2])
+    return float(engine._omega.bodies[engine.fixtures.container[0]].state.pos[2])
 
 
 def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0) -> dict[str, Any]:

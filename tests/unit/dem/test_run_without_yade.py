@@ -72,9 +72,10 @@ def make_engine(omega: Omega) -> Engine:
     vars(engine).update(
         _yade=SimpleNamespace(omega=omega),
         _omega=omega,
-        _assembly=SimpleNamespace(count=0),
+        _assembly=SimpleNamespace(count=0, hinges=None),
         _shaker=None,
-        _track_work=False,
+        fixtures=SimpleNamespace(moving=[], hooks=()),
+        account=SimpleNamespace(step=lambda number, advance: advance()),
         _smarticle_seconds=0.0,
         time_step=1e-5,
     )

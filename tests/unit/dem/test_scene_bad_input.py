@@ -85,7 +85,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"smarticle.aspect_ration": 0.5}, "smarticle: unknown key 'aspect_ration'; did you mean 'aspect_ratio'?"),
     ({"phases.1.duration": 3}, "phases.1: unknown key 'duration'; did you mean 'duration_s'?"),
     ({"cont": 3}, "unknown key 'cont'; did you mean 'count'?"),
-    ({"container.zzz": 3}, "container: unknown key 'zzz'; known keys: radius_m, height_m"),
+    ({"container.zzz": 3}, "container: unknown key 'zzz'; known keys: radius_m, height_m, tiers"),
     ({"phases.0.settle.timeout": 3}, "phases.0.settle: unknown key 'timeout'; did you mean 'timeout_s'?"),
     (
         {"fricton": 1},
@@ -134,7 +134,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"phases.1.type": "rest"},
         "phases.1: input tag 'rest' found using 'type' does not match any of the expected tags: "
         "'deposit', 'relax', 'shake', 'actuate', 'shape-change', 'internal-oscillation', "
-        "got {'type': 'rest', 'duration_s': 0.1}",
+        "'remove-container', 'pull-hook', got {'type': 'rest', 'duration_s': 0.1}",
     ),
     (
         {"recording.frame_interval_s": 0.05},

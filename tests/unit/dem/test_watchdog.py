@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from dem.container import Cylinder
 from dem.errors import RunError
 from dem.particle import Boxes
 from dem.state import State
@@ -16,7 +17,7 @@ from dem.watchdog import Watchdog
 BOXES = Boxes(
     middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
 )
-WATCHDOG = Watchdog(radius=0.0234, height=0.1, speed=5.0)
+WATCHDOG = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed=5.0)
 
 
 def healthy() -> State:
@@ -90,3 +91,14 @@ def test_many_smarticles_are_counted_and_the_first_named() -> None:
     state = State.rigid(BOXES, positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
     with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
         check(state)
+
+
+def test_broken_hinge_is_named_with_its_gap() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, gap=2e-4)
+    gaps = np.full((4, 2), 1e-6)
+    dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+    dog.check(healthy(), floor=0.0, time=1.25, gaps=None)  # welded
+    for bad in (3e-4, math.nan):
+        gaps[2, 1] = bad
+        with pytest.raises(RunError, match=r"1\.2500 s: 1 smarticle\(s\) \(2\): links more than 0\.0002 m apart"):
+            dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)

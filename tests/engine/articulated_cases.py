@@ -1,0 +1,264 @@
+"""Small simulations of articulated smarticles whose answer is known; like `cases.py`, for the same worker process.
+
+Momenta and energies are taken from YADE's bodies themselves, not from `State`, which is under test as well. SI
+throughout. Velocities belong to the half step before the positions (leapfrog).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import cases
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.container import Cylinder
+from dem.engine import Engine
+from dem.placement import place_layer
+from dem.run import motor_law
+from dem.scene import Scene
+from dem.timestep import contact_law, hinge_law, time_step
+
+TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
+Targets = Callable[[float], Any]
+
+
+def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> Engine:
+    """A wide container, so that nothing but the floor is near."""
+    return Engine(
+        particle=scene.particle,
+        cylinder=Cylinder(radius=radius, height=scene.cylinder.height, facets=16),
+        law=contact_law(scene),
+        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
+        time_step=dt or time_step(scene),
+        shaken=False,
+        hinges=(hinge_law(scene), motor_law(scene)),
+    )
+
+
+def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, Engine]:
+    """One smarticle, welded, without gravity, far from everything."""
+    scene = cases.load(data)
+    engine = build(scene, gravity=0.0)
+    cases.add(engine, (0, 0, 0.05), TILTED)
+    cases.push(engine, 0, velocity=velocity, spin=spin)
+    return scene, engine
+
+
+def bodies(engine: Engine) -> list[Any]:
+    """States of YADE's rigid bodies: one per smarticle, or three."""
+    return [engine._omega.bodies[body].state for body in engine._assembly.bodies]
+
+
+def vec(value: Any) -> np.ndarray:
+    return np.array([value[0], value[1], value[2]])
+
+
+def momentum(engine: Engine) -> np.ndarray:
+    return sum((b.mass * vec(b.vel) for b in bodies(engine)), np.zeros(3))
+
+
+def angular_momentum(engine: Engine) -> np.ndarray:
+    """About the origin."""
+    parts = (np.cross(vec(b.pos), b.mass * vec(b.vel)) + vec(b.angMom) for b in bodies(engine))
+    return sum(parts, np.zeros(3))
+
+
+def kinetic_energy(engine: Engine) -> float:
+    """From velocities and from the angular momenta that YADE integrates."""
+    total = 0.0
+    for b in bodies(engine):
+        axes = np.array(b.ori.toRotationMatrix()).reshape(3, 3)
+        own = axes.T @ vec(b.angMom)
+        total += 0.5 * b.mass * vec(b.vel) @ vec(b.vel) + 0.5 * float((own**2 / vec(b.inertia)).sum())
+    return total
+
+
+def sphere_positions(engine: Engine) -> np.ndarray:
+    """(S, 3) of all smarticles, sphere by sphere, where YADE has them."""
+    return np.array([vec(engine._omega.bodies[s].state.pos) for s in sorted(engine._assembly.smarticle_of)])
+
+
+def sphere_velocities(engine: Engine) -> np.ndarray:
+    return np.array([vec(engine._omega.bodies[s].state.vel) for s in sorted(engine._assembly.smarticle_of)])
+
+
+def drive(
+    engine: Engine,
+    scene: Scene,
+    duration: float,
+    targets: Targets,
+    *,
+    log: tuple[list[Any], list[Any]] | None = None,
+    interval: float | None = None,
+) -> Iterator[float]:
+    """Let the motors follow `targets(t)` [rad] from now on; gives the time since then after each control period.
+
+    `log` takes torques and angles of smarticle 0 after each step, as YADE has them.
+    """
+    interval = interval or scene.fidelity.control_interval_s
+    steps = round(interval / engine.time_step)
+    for look in range(1, round(duration / interval) + 1):
+        engine.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
+        if log is None:
+            engine.advance(steps)
+        else:
+            for _ in range(steps):
+                engine.advance(1)
+                log[0].append(engine._hinges.torques()[0])
+                log[1].append(engine._hinges.angles()[0])
+        yield look * interval
+
+
+def snapshot(engine: Engine) -> dict[str, Any]:
+    return {
+        "p": momentum(engine),
+        "l": angular_momentum(engine),
+        "e": kinetic_energy(engine),
+        "e_state": engine.state().kinetic_energy,
+        "spheres": sphere_positions(engine),
+        "sphere_velocities": sphere_velocities(engine),
+        "vertices": engine.state().vertices,
+        "angles": engine.state().angles,
+        "gap": engine.joint_gaps().max(),
+    }
+
+
+# -- welding and splitting ---------------------------------------------------------------------------------------------
+
+
+def inertia_tensor(engine: Engine) -> np.ndarray:
+    """(3, 3) of all bodies about their common centre of mass, where YADE has them."""
+    links = bodies(engine)
+    mass = sum(b.mass for b in links)
+    centre = sum(b.mass * vec(b.pos) for b in links) / mass
+    total = np.zeros((3, 3))
+    for b in links:
+        axes, arm = np.array(b.ori.toRotationMatrix()).reshape(3, 3), vec(b.pos) - centre
+        total += axes @ np.diag(vec(b.inertia)) @ axes.T + b.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return total
+
+
+def split_and_weld(data: dict[str, Any], *, velocity: Any, spin: Any, steps: int) -> dict[str, Any]:
+    """A flying, spinning smarticle is split, welded and split again, all between two steps."""
+    _, engine = floating(data, velocity=velocity, spin=spin)
+    engine.advance(steps)
+    out = {"before": snapshot(engine)}
+    engine.articulate()
+    out["split"] = snapshot(engine)
+    out["loss"] = engine._assembly.weld()
+    out["welded"] = snapshot(engine)
+    out["moments"] = np.sort(vec(bodies(engine)[0].inertia))
+    engine.articulate()
+    out["again"] = snapshot(engine)
+    return {**out, "dt": engine.time_step, "size": engine.particle.reach}
+
+
+def weld_in_motion(data: dict[str, Any], *, targets_deg: Any, spin: Any, time: float) -> dict[str, Any]:
+    """Barbs that are on their way are welded; what rigid bodies say about the loss."""
+    scene, engine = floating(data, velocity=(0.1, -0.2, 0.3), spin=spin)
+    engine.advance(1)
+    engine.articulate()
+    begun, goal = engine.state().angles[0], np.radians(targets_deg)
+    for _ in drive(engine, scene, time, lambda t: begun + (goal - begun) * t / time):
+        pass
+    before = snapshot(engine)
+    mass, tensor = scene.smarticle.boxes.mass, inertia_tensor(engine)
+    centre = engine.state().positions[0]
+    own = before["l"] - np.cross(centre, before["p"])
+    rigid = before["p"] @ before["p"] / (2 * mass) + own @ np.linalg.solve(tensor, own) / 2
+    loss = engine._assembly.weld()
+    after = snapshot(engine)
+    exact = dataclasses.replace(scene.smarticle.boxes, angles=tuple(after["angles"][0]))
+    engine.advance(200)
+    return {
+        "before": before,
+        "after": after,
+        "loss": loss,
+        "relative": before["e"] - rigid,
+        "tensor": np.sort(np.linalg.eigvalsh(inertia_tensor(engine))),
+        "exact": np.sort(exact.inertia),
+        "mass": bodies(engine)[0].mass,
+        "exact_mass": exact.mass,
+        "gap": before["gap"],
+        "later": snapshot(engine),
+    }
+
+
+def forces(engine: Engine) -> dict[tuple[int, int], np.ndarray]:
+    """Forces of all contacts that carry one, by sphere."""
+    owner = engine._assembly.smarticle_of
+    return {
+        (i.id1, i.id2): vec(i.phys.normalForce + i.phys.shearForce)
+        for i in engine._omega.interactions
+        if i.isReal and (i.id1 in owner or i.id2 in owner) and i.phys.normalForce.norm() > 0
+    }
+
+
+def bonds(engine: Engine) -> int:
+    return sum(type(i.phys).__name__ == "CohFrictPhys" for i in engine._omega.interactions)
+
+
+def stale(engine: Engine) -> int:
+    """Interactions with a body that no longer exists."""
+    omega, count = engine._omega, len(engine._omega.bodies)
+    return sum(any(body >= count or omega.bodies[body] is None for body in (i.id1, i.id2)) for i in omega.interactions)
+
+
+def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str) -> dict[str, Any]:
+    """A settled pile; contact forces one step after it was split ("split"), welded again ("weld"), or left alone.
+
+    The same steps lead up to the change, so that a pile left alone is the answer.
+    """
+    scene = cases.load(data)
+    engine = build(scene, radius=scene.container.radius_m)
+    rng = np.random.default_rng(scene.seed)
+    layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}
+    engine.add(place_layer(scene.particle, obstacles=np.empty((0, 3)), **layer))
+    engine.advance(round(settle / engine.time_step))
+    split_first = change in ("split-rest", "weld")
+    if split_first:
+        engine.articulate()
+        begun = engine.state().angles
+        for _ in drive(engine, scene, 0.1, lambda _: begun):
+            pass
+    before = kinetic_energy(engine), sphere_positions(engine), forces(engine)
+    if change == "split":
+        engine.articulate()
+    elif change == "weld":
+        engine.weld()
+    kept = forces(engine)
+    energy = kinetic_energy(engine)
+    moved = np.abs(sphere_positions(engine) - before[1]).max()
+    engine.advance(1)
+    after = forces(engine)
+    energies = []
+    for _ in range(50):
+        engine.advance(10)
+        energies.append(kinetic_energy(engine))
+    mass = scene.smarticle.boxes.mass
+    return {
+        "before": before[2],
+        "kept": kept,
+        "after": after,
+        "energy": (before[0], energy),
+        "later": np.array(energies),
+        "moved": moved,
+        "bonds": bonds(engine),
+        "stale": stale(engine),
+        "own": own_contacts(engine),
+        "scale": count * mass * 9.81 * scene.sphere_diameter,
+        "weight": mass * 9.81,
+    }
+
+
+def own_contacts(engine: Engine) -> int:
+    """Contacts with a force between spheres of one smarticle."""
+    owner = engine._assembly.smarticle_of
+    return sum(
+        owner.get(i.id1, -1) == owner.get(i.id2, -2) and i.phys.normalForce.norm() > 0
+        for i in engine._omega.interactions
+        if i.isReal
+    )

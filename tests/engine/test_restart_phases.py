@@ -1,0 +1,83 @@
+"""Runs killed inside a pull, a lift and a removal, and resumed: the same bits as the run that was never stopped."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from processes import TIMEOUT_S, complete, differing, finish, results, start
+
+HEAD = """\
+schema_version: 1
+name: restart
+seed: 3
+fidelity: draft
+count: 12
+container: {radius_m: 0.0145}
+recording: {checkpoint_interval_s: 0.04, frame_interval_s: 0.02, energy: true}
+"""
+SCENES = {
+    "pulled and lifted": """\
+hooks: {lower_height_m: 0.003, upper_height_m: 0.006}
+phases:
+  - {type: deposit, per_layer: 4}
+  - {type: shake, duration_s: 0.1}
+  - {type: pull-hook, speed_m_per_s: 0.06, duration_s: 0.45}
+  - {type: remove-container, speed_m_per_s: 0.05, duration_s: 0.4}
+  - {type: relax, duration_s: 0.1}
+""",
+    "removed at once": """\
+phases:
+  - {type: deposit, per_layer: 4}
+  - {type: remove-container, duration_s: 0.4}
+  - {type: relax, duration_s: 0.1}
+""",
+}
+pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]  # skipped where there is no YADE
+
+
+def age(path: Path) -> int:
+    # A checkpoint is out of the way for a moment while the next one takes its place.
+    return path.stat().st_mtime_ns if path.exists() else 0
+
+
+def kill_in(scene: Path, out: Path, phase: int) -> None:
+    """Run on, and kill after the first checkpoint that is taken in a phase."""
+    process = start(scene, out)
+    newest, log = out / "checkpoint.zip", out / "log.txt"
+    deadline = time.monotonic() + TIMEOUT_S
+    begun: int | None = None
+    while process.poll() is None and time.monotonic() < deadline:
+        if begun is None and log.exists() and f"phase {phase} " in log.read_text():
+            begun = age(newest)
+        if begun is not None and age(newest) > begun:
+            break
+        time.sleep(0.002)
+    process.kill()
+    status, said = finish(process)
+    assert status == -signal.SIGKILL, said
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_killed_in_each_phase_gives_the_same_bits(tmp_path: Path, name: str) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(HEAD + SCENES[name])
+    whole, out = tmp_path / "whole", tmp_path / "killed"
+    complete(scene, whole)
+    phases = json.loads((whole / "done.json").read_text())["phases"]
+    new = [entry for entry in phases if entry["type"] in ("pull-hook", "remove-container")]
+    for entry in new:
+        kill_in(scene, out, entry["index"])
+    complete(scene, out)
+    resumed = [
+        float(t) for t in re.findall(r"resumed from the checkpoint of t = ([\d.]+) s", (out / "log.txt").read_text())
+    ]
+    # Each kill was inside its phase, or this would prove nothing.
+    for at, entry in zip(resumed, new, strict=True):
+        assert entry["start_s"] < at <= entry["end_s"]
+    assert len(results(whole)) > 20
+    assert differing(results(whole), results(out)) == []
