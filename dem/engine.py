@@ -219,6 +219,8 @@ class Engine:
             step()
             if tracked:
                 self._container_work -= self._lift() * self._floor.vel[2] * self.time_step
+        if self._assembly.hinges is not None:
+            self._assembly.hinges.moved()
         if int(omega.iter) != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)

@@ -28,6 +28,7 @@ SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torqu
 # after a hard impact. A damper of a spring and a dashpot in a row takes it away and leaves slow motion alone.
 DAMPER_SHARE = 0.25  # of the pin's stiffness
 DAMPER_TIME = 5e-5  # s
+LOOKS_PER_TILT = 10  # looks of the motor control between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
 BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
@@ -84,6 +85,14 @@ def add_nodes(yade: Yade, count: int) -> list[int]:
     return ids
 
 
+@dataclass(frozen=True)
+class Shape:
+    """What YADE works out of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m]."""
+
+    twists: Array
+    gaps: Array
+
+
 class Hinges:
     """All hinges of N articulated smarticles.
 
@@ -101,6 +110,9 @@ class Hinges:
         self._angles = angles
         self._pins: list[Any] = []
         self._shafts: list[tuple[Any, Any]] = []
+        self._ends: list[tuple[Any, Any]] = []
+        self._loaded: Shape | None = None
+        self._looks = 0
 
     def make(self) -> None:
         """Make the bonds, between links that are where they belong."""
@@ -115,13 +127,15 @@ class Hinges:
         self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
         shafts = [interactions[end, middle] for _, end, middle in self._hinges()]
         self._shafts = [(bond.geom, bond.phys) for bond in shafts]
+        bodies = self._yade.omega.bodies
+        self._ends = [(bodies[end].state, bodies[middle].state) for _, end, middle in self._hinges()]
 
     def remove(self) -> None:
         """Remove bonds and nodes."""
         for links in self._nodes:
             for node in (node for link in links for node in link):
                 self._yade.omega.bodies.erase(node)
-        self._pins, self._shafts = [], []
+        self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
         """Nodes of each hinge: the barb's at the centre and at the end of the axis, the middle link's at the centre."""
@@ -152,22 +166,43 @@ class Hinges:
             phys.unp -= SHAFT_FORCE / SHAFT_STIFFNESS
             phys.maxTwistPl = law.torque_cap / SHAFT_FORCE
 
+    def moved(self) -> None:
+        """A step has been made: YADE knows the bonds' shape again."""
+        self._loaded = None
+
+    def _shape(self) -> Shape:
+        if self._loaded is not None:
+            return self._loaded
+        return Shape(
+            np.array([geom.twist for geom, _ in self._shafts]),
+            2 * NODE_RADIUS - np.array([geom.penetrationDepth for geom in self._pins]),
+        )
+
     def angles(self) -> Array:
         """(N, 2) angles of the barbs [rad], from the twist of the shafts."""
-        twists = np.array([geom.twist for geom, _ in self._shafts]).reshape(-1, 2)
-        result: Array = self._angles + SENSE * twists
+        known = self._loaded
+        twists = np.array([geom.twist for geom, _ in self._shafts]) if known is None else known.twists
+        result: Array = self._angles + SENSE * twists.reshape(-1, 2)
         return result
 
     def set_torques(self, torques: Array) -> None:
         """Twist the shafts such that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
 
-        YADE adds up twist and tilt step by step; set anew from the angles at every look, neither drifts.
+        YADE adds up twist and tilt step by step; set anew from the angles now and then, neither drifts.
         """
-        tilt = self._law.tilt_stiffness
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
             phys.moment_twist = geom.normal * moment
-            phys.moment_bending = geom.bending * tilt
+        if self._looks % LOOKS_PER_TILT == 0:
+            self._set_tilts()
+        self._looks += 1
+
+    def _set_tilts(self) -> None:
+        # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
+        # while the twist is small.
+        up, tilt = self._yade.vector(0, 0, 1), self._law.tilt_stiffness
+        for (_, phys), (barb, middle) in zip(self._shafts, self._ends, strict=True):
+            phys.moment_bending = (middle.ori * up).cross(barb.ori * up) * tilt
 
     def torques(self) -> Array:
         """(N, 2) torques on the barbs at present [N m], as YADE has them."""
@@ -177,23 +212,38 @@ class Hinges:
 
     def gaps(self) -> Array:
         """(N, 2) how far the two links of each hinge are apart [m]."""
-        depths = np.array([geom.penetrationDepth for geom in self._pins]).reshape(-1, 2)
-        return 2 * NODE_RADIUS - depths
+        return self._shape().gaps.reshape(-1, 2)
 
     def elastic_energy(self) -> float:
-        """Energy in pins, and in shafts that tilt [J]; not in their twist, which belongs to the motors."""
+        """Energy in pins, dampers and shafts that tilt [J]; not in their twist, which belongs to the motors."""
+        dampers = sum(phys.shearForce.squaredNorm() for _, phys in self._shafts) / self._law.damper_stiffness
         pins = self._law.pin_stiffness * (self.gaps() ** 2).sum()
-        tilts = self._law.tilt_stiffness * sum(geom.bending.squaredNorm() for geom, _ in self._shafts)
-        return float(0.5 * (pins + tilts))
+        tilts = sum(phys.moment_bending.squaredNorm() for _, phys in self._shafts) / self._law.tilt_stiffness
+        return float(0.5 * (pins + dampers + tilts))
+
+    def damper_power(self) -> float:
+        """Power that the dampers dissipate at present [W]."""
+        forces = sum(phys.shearForce.squaredNorm() for _, phys in self._shafts)
+        return float(forces / self._law.damper_viscosity)
 
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restored` needs."""
-        return {"nodes": self._nodes, "angles": self._angles.tolist()}
+        shape = self._shape()
+        return {
+            "nodes": self._nodes,
+            "angles": self._angles.tolist(),
+            # Not in YADE's own file.
+            "twists": shape.twists.tolist(),
+            "gaps": shape.gaps.tolist(),
+            "looks": self._looks,
+        }
 
     @classmethod
     def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Hinges:
         """The hinges of a simulation that was loaded."""
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
+        hinges._loaded = Shape(np.array(memory["twists"]), np.array(memory["gaps"]))
+        hinges._looks = memory["looks"]
         return hinges
