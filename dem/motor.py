@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 Law = Literal["halt", "slip"]
+_MEMORY = ("commands", "angles", "torques", "work", "begun", "halted")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,27 +58,32 @@ class Motors:
         """(N, 2) work done on the links since the start, ∫ τ dα [J]."""
         self.halted: NDArray[np.bool_] = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last look and did not."""
+        self._begun: Array = angles.copy()
 
     def engage(self, angles: Array) -> None:
         """Take hold of barbs at (N, 2) angles [rad], without torque."""
-        self.commands, self.angles = angles.copy(), angles.copy()
+        self.commands, self.angles, self._begun = angles.copy(), angles.copy(), angles.copy()
         self.torques = np.zeros_like(angles)
         self.halted = np.zeros(angles.shape, dtype=bool)
 
-    def look(self, angles: Array, targets: Array, interval: float) -> Array:
+    def look(self, angles: Array, targets: Array, interval: float, time_step: float) -> Array:
         """What the motors do in the control period that begins now.
 
         Args:
             angles: (N, 2) actual angles [rad].
             targets: (N, 2) angles at the end of the period according to the schedule [rad].
             interval: length of the period [s].
+            time_step: dt of the integration [s].
 
         Returns:
             (N, 2) torques on the barbs [N m].
         """
         before = self._torque(angles)
-        # Between two looks the torque is linear in the angle, so that the trapezium is exact.
-        self.work += (self.torques + before) / 2 * (angles - self.angles)
+        # A torque that is set now acts from the middle of the step on: the leapfrog scheme changes velocities there. In
+        # between the torque is linear in the angle, so that the trapezium is exact.
+        middle = angles + (angles - self.angles) * (time_step / interval / 2)
+        self.work += (self._torque(self._begun) + self._torque(middle)) / 2 * (middle - self._begun)
+        self._begun = middle
         most = self.law.speed_limit * interval
         advance = np.clip(targets - self.commands, -most, most)
         if self.law.law == "halt":
@@ -101,14 +107,13 @@ class Motors:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs."""
-        arrays = (self.commands, self.angles, self.torques, self.work, self.halted)
-        return dict(zip(("commands", "angles", "torques", "work", "halted"), (a.tolist() for a in arrays), strict=True))
+        arrays = (self.commands, self.angles, self.torques, self.work, self._begun, self.halted)
+        return dict(zip(_MEMORY, (array.tolist() for array in arrays), strict=True))
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken."""
         shape = self.commands.shape
-        self.commands, self.angles, self.torques, self.work = (
-            np.array(memory[name], dtype=np.float64).reshape(shape)
-            for name in ("commands", "angles", "torques", "work")
+        self.commands, self.angles, self.torques, self.work, self._begun = (
+            np.array(memory[name], dtype=np.float64).reshape(shape) for name in _MEMORY[:-1]
         )
         self.halted = np.array(memory["halted"], dtype=bool).reshape(shape)
