@@ -293,7 +293,8 @@ class Engine:
             interval: length of the period [s].
         """
         assert self.motors is not None  # only articulated smarticles are actuated
-        self._hinges.set_torques(self.motors.look(self._hinges.angles(), targets, interval, self.time_step))
+        torques = self.motors.look(self._hinges.angles(), targets, interval, self.time_step)
+        self._hinges.set_torques(torques, self.time_step)
 
     @property
     def _hinges(self) -> Any:

@@ -185,24 +185,31 @@ class Hinges:
         result: Array = self._angles + SENSE * twists.reshape(-1, 2)
         return result
 
-    def set_torques(self, torques: Array) -> None:
+    def set_torques(self, torques: Array, time_step: float) -> None:
         """Twist the shafts such that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
 
         YADE adds up twist and tilt step by step; set anew from the angles now and then, neither drifts.
+
+        Args:
+            torques: on the barbs.
+            time_step: dt [s].
         """
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
             phys.moment_twist = geom.normal * moment
         if self._looks % LOOKS_PER_TILT == 0:
-            self._set_tilts()
+            self._set_tilts(time_step)
         self._looks += 1
 
-    def _set_tilts(self) -> None:
+    def _set_tilts(self, time_step: float) -> None:
         # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
-        # while the twist is small.
+        # while the twist is small. The next step adds the turn of the step that was just made, which the axes already
+        # have, so it is taken off here; without that the pins' vibrations gain energy at every correction.
         up, tilt = self._yade.vector(0, 0, 1), self._law.tilt_stiffness
         for (_, phys), (barb, middle) in zip(self._shafts, self._ends, strict=True):
-            phys.moment_bending = (middle.ori * up).cross(barb.ori * up) * tilt
+            axis = barb.ori * up
+            turn = (middle.angVel - barb.angVel) * time_step
+            phys.moment_bending = ((middle.ori * up).cross(axis) + turn - axis * axis.dot(turn)) * tilt
 
     def torques(self) -> Array:
         """(N, 2) torques on the barbs at present [N m], as YADE has them."""
