@@ -8,9 +8,15 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cli.parsing import Commands, Parser, add_json
+from cli.parsing import Commands, Parser, add_json, positive_number
 from cli.stopping import TO_BE_CONTINUED
+from dem.errors import InputError
+
+if TYPE_CHECKING:
+    from dem.choice import Choice
+    from dem.scene import Scene
 
 
 def add(commands: Commands) -> None:
@@ -32,7 +38,7 @@ directory that holds something else is never touched.""",
   smarticles run scene.yaml --out runs/a --resume
 """,
     )
-    _add_scene(run)
+    add_scene(run)
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="new run directory")
     run.add_argument(
         "--resume",
@@ -45,14 +51,30 @@ directory that holds something else is never touched.""",
         plan_scene,
         summary="what a run would do and cost; simulates nothing",
         text="""
-Shows the phases, what acts in each and why, time step, spheres and the expected wall time.""",
+Shows the phases, what acts in each and why, time step, spheres and the expected wall time.
+
+With --max-error, --max-hours or both, the fidelity is chosen instead of the scene's own: the cheapest
+whose measured error of the packing fractions φ_0 and φ_f is within the one, or the finest within the
+other. What was measured stands in a table that `smarticles accuracy` writes.""",
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference
   smarticles plan scene.yaml --json | jq .time_step_s
+  smarticles plan scene.yaml --max-error 0.03 --table accuracy/results/work_precision.csv
+  smarticles plan scene.yaml --max-hours 4
 """,
     )
-    _add_scene(plan)
+    add_scene(plan)
+    plan.add_argument(
+        "--max-error",
+        type=positive_number,
+        metavar="E",
+        help="relative error of φ_0 and φ_f against the reference fidelity, e.g. 0.03",
+    )
+    plan.add_argument("--max-hours", type=positive_number, metavar="H", help="wall time of the run on one core [h]")
+    plan.add_argument(
+        "--table", type=Path, metavar="FILE.csv", help="measured errors; default: those that ship, if any do"
+    )
     add_json(plan)
 
     commands.add(
@@ -82,7 +104,8 @@ with the way out.""",
     add_json(doctor)
 
 
-def _add_scene(parser: Parser) -> None:
+def add_scene(parser: Parser) -> None:
+    """Add the scene and --set."""
     parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
     parser.add_argument(
         "--set",
@@ -147,12 +170,29 @@ def plan_scene(arguments: argparse.Namespace) -> int:
     from dem.plan import plan  # noqa: PLC0415
     from dem.scene import load_scene  # noqa: PLC0415
 
-    planned = plan(load_scene(arguments.scene, arguments.set))
+    scene = load_scene(arguments.scene, arguments.set)
+    choice = _chosen(scene, arguments)
+    planned = plan(scene if choice is None else choice.scene)
     if arguments.json:
-        print(json.dumps(planned.to_dict(), indent=2, ensure_ascii=False))
-    else:
-        print(planned.to_text())
+        content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return 0
+    if choice is not None:
+        print(f"{choice.to_text()}\n")
+    print(planned.to_text())
     return 0
+
+
+def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
+    """The fidelity that --max-error and --max-hours ask for; None without them."""
+    from dem.choice import choose, read_table  # noqa: PLC0415
+
+    if arguments.max_error is None and arguments.max_hours is None:
+        if arguments.table is not None:
+            msg = f"--table {arguments.table}: is for --max-error or --max-hours; give one of them"
+            raise InputError(msg)
+        return None
+    return choose(scene, read_table(arguments.table), max_error=arguments.max_error, max_hours=arguments.max_hours)
 
 
 def print_schema(_: argparse.Namespace) -> int:

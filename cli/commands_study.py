@@ -77,7 +77,7 @@ def _analyse_gravish(analysis: _Analysis) -> str:
         for row in report.deviations.to_dict("records")
     ]
     told = [f"{v.question} {v.answer.upper()}\n    {v.evidence}" for v in report.verdicts]
-    return _told(columns(header, rows), told, report.files, analysis.output)
+    return told_results(columns(header, rows), told, report.files, analysis.output)
 
 
 def _analyse_sensitivity(analysis: _Analysis, *, study: str) -> str:
@@ -98,7 +98,7 @@ def _analyse_sensitivity(analysis: _Analysis, *, study: str) -> str:
             cells.append(told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"]) + mark)
         rows.append(cells)
     told = [f"Changes are against {report.baseline}; * beyond the error at 95 %."]
-    return _told(columns(header, rows), told, report.files, analysis.output)
+    return told_results(columns(header, rows), told, report.files, analysis.output)
 
 
 def _analyse_procedures(analysis: _Analysis) -> str:
@@ -107,10 +107,11 @@ def _analyse_procedures(analysis: _Analysis) -> str:
     report = analyse_procedures(analysis.runs, analysis.output, note=analysis.note, command=analysis.command)
     told = ["Means over seeds ± standard error.", ""]
     told += [f"{found.verdict.upper()}: {found.paper}\n    {found.ours}" for found in report.findings]
-    return _told(columns(*told_points(report.points)), told, report.files, analysis.output)
+    return told_results(columns(*told_points(report.points)), told, report.files, analysis.output)
 
 
-def _told(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
+def told_results(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
+    """What an analysis says at the terminal: its table, its sentences, and where the rest is."""
     figures = [f"figure: {path}" for path in files.values() if path.suffix == ".png"]
     return "\n".join([table, "", *told, "", *figures, f"tables, and the origin of every number: {output}"])
 
@@ -177,6 +178,34 @@ def run_study(arguments: argparse.Namespace) -> int:
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
     note = _note(arguments.name, file, changed)
     print(note, flush=True)
+
+    def analyse(runs: Sequence[Path], output: Path) -> str:
+        return study.analyse(
+            _Analysis(runs=runs, output=output, note=note, command=arguments.command_line, quick=arguments.quick)
+        )
+
+    return compute_and_analyse(folder, arguments, analyse, study.pictured)
+
+
+def compute_and_analyse(
+    folder: Folder,
+    arguments: argparse.Namespace,
+    analyse: Callable[[Sequence[Path], Path], str],
+    pictured: Mapping[str, object],
+) -> int:
+    """Run what a sweep is missing unless --analyse says not to, then say what the finished runs say.
+
+    Args:
+        folder: the sweep's directory.
+        arguments: of the command.
+        analyse: measures the run directories given, finished or not, and writes to a folder; gives the text for the
+            terminal.
+        pictured: values of the run that a picture is drawn of.
+
+    Raises:
+        InputError: no run is finished and none is to be started.
+        RunError: a run failed.
+    """
     outcomes = [] if arguments.analyse else compute(folder, arguments)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished:
@@ -185,13 +214,9 @@ def run_study(arguments: argparse.Namespace) -> int:
     if finished:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
-        runs = [folder.run(entry) for entry in folder.entries]
-        analysis = _Analysis(
-            runs=runs, output=results, note=note, command=arguments.command_line, quick=arguments.quick
-        )
-        print(study.analyse(analysis))
+        print(analyse([folder.run(entry) for entry in folder.entries], results))
         sys.stdout.flush()
-        _draw(folder, finished, study.pictured, results / "run.png")
+        _draw(folder, finished, pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
     refuse_failures(folder, outcomes)
     return 0

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from templates.folder import Folder, RunStatus
     from templates.local import Outcome
     from templates.submission import Draft
+    from templates.sweep import Sweep
 
 _FILE_HELP = """
 A sweep file makes many scenes from one template:
@@ -198,17 +199,18 @@ def make_folder(
         InputError: the sweep is not valid, or the directory holds something else.
     """
     from templates.expand import MAX_POINTS, expand  # noqa: PLC0415
-    from templates.folder import create_folder  # noqa: PLC0415
     from templates.sweep import load_sweep, with_constants  # noqa: PLC0415
 
     sweep = with_constants(load_sweep(file), constants or {})
+    return folder_of(sweep, expand(sweep, max_points=max_points or MAX_POINTS), out, command)
+
+
+def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *, extend: bool = False) -> Folder:
+    """The directory of an expanded sweep; see `templates.folder.create_folder`."""
+    from templates.folder import create_folder  # noqa: PLC0415
+
     return create_folder(
-        out,
-        sweep,
-        expand(sweep, max_points=max_points or MAX_POINTS),
-        command=command,
-        versions=versions(),
-        expected_s=expected_wall_s,
+        out, sweep, points, command=command, versions=versions(), expected_s=expected_wall_s, extend=extend
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
@@ -90,6 +91,18 @@ def add_debug(parser: Parser, default: Any = False) -> None:
 def add_json(parser: Parser) -> None:
     """Add --json."""
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+
+
+def positive_number(text: str) -> float:
+    """A finite number above 0."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number < math.inf:
+        msg = f"must be a number above 0: got {text!r}"
+        raise argparse.ArgumentTypeError(msg)
+    return number
 
 
 def positive_int(text: str) -> int:

@@ -90,12 +90,13 @@ class Origin:
         """
         lacking = f", {len(self.missing)} missing" if self.missing else ""
         used, total = len(self.manifests), len(self.manifests) + len(self.missing)
+        fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
         versions = []
         for name in ("smarticles", "git", "yade"):
             found = sorted({run.versions.get(name, "unknown") for run in self.manifests})
             versions.append(f"{name} {', '.join(found)}")
         return (
-            f"Study {self.study}, fidelity {self.manifests[0].fidelity}: {used} of {total} runs{lacking}; {points}",
+            f"Study {self.study}, fidelity {fidelities}: {used} of {total} runs{lacking}; {points}",
             *statements,
             f"Reference: {self.reference.statement}.",
             f"Note: {self.note}",

@@ -20,7 +20,7 @@ from postprocess.measure import PASSIVE_PHASES, summarise_run
 from postprocess.scene_file import read_phases
 from postprocess.seeds import mean_over_seeds
 from postprocess.series import Series, read_series
-from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS
+from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, duration
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
 PROCEDURES: Mapping[str, str] = MappingProxyType(
@@ -94,7 +94,7 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
         SEED: run.seed,
         "smarticles [-]": run.count,
         "fidelity": run.fidelity,
-        ACTIVE: _duration(active),
+        ACTIVE: duration(active),
     }
     for name, rest in ((f"{STATIC} ", before), ("", after)):
         row[f"{name}{PHI}"] = rest[PHI]
@@ -153,7 +153,7 @@ def _of_series(run: RunManifest, active: PhaseRecord, straight_until: float | No
             last = (time > straight_until - _WINDOW) & (time <= straight_until)
             found[STRAIGHT] = float(height[last].mean()) if last.any() else math.nan
         elif active.type == "internal-oscillation":
-            found[HALF] = half_compaction(time, height, _duration(active))
+            found[HALF] = half_compaction(time, height, duration(active))
     return found
 
 
@@ -194,13 +194,6 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
     k = int(below[0])
     share = (smooth[k - 1] - level) / (smooth[k - 1] - smooth[k])
     return float((centres[k - 1] + share * (centres[k] - centres[k - 1])) / duration)
-
-
-def _duration(phase: PhaseRecord) -> float:
-    """How long a phase of a finished run took [s]."""
-    if phase.start is None or phase.end is None:
-        return math.nan
-    return phase.end - phase.start
 
 
 def samples(runs: pd.DataFrame) -> pd.DataFrame:

@@ -105,6 +105,13 @@ def difference(mean: SeedMean, baseline: SeedMean) -> Difference:
     return Difference(value=value, half_width=_quantile(freedom) * math.sqrt(total))
 
 
+def relative_difference(mean: SeedMean, baseline: SeedMean) -> Difference:
+    """`difference` in per cent of the baseline's mean, which is itself taken as exact; NaN where that is 0."""
+    change = difference(mean, baseline)
+    scale = 100 / baseline.value if baseline.value else math.nan
+    return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Slope:
     """A slope common to several blocks of points.

@@ -7,7 +7,6 @@ Each variant differs from the first one, the baseline, in one choice. Runs are n
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,30 +14,31 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from dem.errors import InputError
 from postprocess import sensitivity_figure
 from postprocess.gravish_reference import read_reference, reference_at
 from postprocess.manifest import RunManifest
 from postprocess.origin import Origin, make_folder
-from postprocess.seeds import Difference, SeedMean, difference, mean_over_seeds
+from postprocess.seeds import mean_over_seeds, relative_difference
 from postprocess.study_runs import (
     ASPECT,
     DEFINITION,
     SEED,
     SEEDS,
+    VARIANT,
     WHEN,
     MissingRun,
     collect_runs,
     measured_row,
+    named_variant,
     refuse_mixture,
     refuse_repeats,
     runs_table,
     told_bars,
     told_seeds,
     told_shaken,
+    variant_of,
+    variants_of,
 )
-
-VARIANT = "variant"
 
 COMPARED: Mapping[str, str] = MappingProxyType(
     {
@@ -48,8 +48,6 @@ COMPARED: Mapping[str, str] = MappingProxyType(
     }
 )
 """What is compared with the baseline: its name here, and its column in the table of runs less the unit."""
-
-_RUN_NAME = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,9 +98,9 @@ def analyse_sensitivity(
     manifests, rows, missing = collect_runs(study, run_dirs, _row)
     refuse_mixture(study, manifests, "l/w", lambda run: f"{run.aspect_ratio:g}")
     refuse_mixture(study, manifests, "count", lambda run: f"{run.count} smarticles")
-    refuse_repeats(study, manifests, VARIANT, lambda run: _named(run.directory)[0])
+    refuse_repeats(study, manifests, VARIANT, lambda run: named_variant(run.directory)[0])
     runs = runs_table(rows)
-    variants = _variants(run_dirs)
+    variants = variants_of(run_dirs)
     summary = summarise_variants(runs, variants)
     aspect = manifests[0].aspect_ratio
     reference = {stage: reference_at(read_reference(), aspect, stage) for stage in ("phi_0", "phi_f")}
@@ -152,7 +150,7 @@ def summarise_variants(runs: pd.DataFrame, variants: Sequence[str]) -> pd.DataFr
             mean, baseline = mean_over_seeds(group[column]), mean_over_seeds(groups[variants[0]][column])
             row[column] = mean.value
             row[f"{quantity} 95 % [-]"] = mean.half_width
-            change = None if variant == variants[0] else _relative(mean, baseline)
+            change = None if variant == variants[0] else relative_difference(mean, baseline)
             row[f"{name} change [%]"] = change.value if change else math.nan
             row[f"{name} change 95 % [%]"] = change.half_width if change else math.nan
             row[f"{name} clear"] = bool(change and change.clear)
@@ -160,37 +158,8 @@ def summarise_variants(runs: pd.DataFrame, variants: Sequence[str]) -> pd.DataFr
     return pd.DataFrame(rows)
 
 
-def _relative(mean: SeedMean, baseline: SeedMean) -> Difference:
-    """The change in per cent of the baseline's mean, which is itself taken as exact."""
-    change = difference(mean, baseline)
-    scale = 100 / baseline.value if baseline.value else math.nan
-    return Difference(value=scale * change.value, half_width=scale * change.half_width)
-
-
-def _named(directory: Path | str) -> tuple[str, int]:
-    """Variant and seed of a run, by the name of its directory.
-
-    Raises:
-        InputError: It is not named like a run of this study.
-    """
-    found = _RUN_NAME.fullmatch(Path(directory).name)
-    if found is None:
-        msg = f"{directory}: not a run of this study: its runs are named VARIANT_seedN, such as draft_seed1"
-        raise InputError(msg)
-    return found["variant"], int(found["seed"])
-
-
 def _row(run: RunManifest) -> dict[str, object]:
-    variant, seed = _named(run.directory)
-    if seed != run.seed:
-        msg = f"{run.directory}: its name says seed {seed}, run.json says {run.seed}; do not rename runs"
-        raise InputError(msg)
-    return {VARIANT: variant, **measured_row(run, [DEFINITION])}
-
-
-def _variants(run_dirs: Sequence[Path | str]) -> list[str]:
-    """All variants in the order given, those without a finished run among them."""
-    return list(dict.fromkeys(_named(path)[0] for path in run_dirs if _RUN_NAME.fullmatch(Path(path).name)))
+    return {VARIANT: variant_of(run), **measured_row(run, [DEFINITION])}
 
 
 def _footer(origin: Origin, runs: pd.DataFrame, *, baseline: str) -> tuple[str, ...]:

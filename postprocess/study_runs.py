@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,10 @@ STAGES: Mapping[str, str] = MappingProxyType(
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """How the stages are averaged, for footers."""
 
+VARIANT = "variant"
+
 _SHAKE = "shake"
+_VARIANT_RUN = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 # Runs without a relaxation at the end lack columns, and would put them behind these.
 _TAIL = ["escaped at the end [-]", "frames averaged [-]", "scene_sha256", "run"]
 
@@ -60,6 +64,8 @@ def collect_runs(
     study: str,
     run_dirs: Sequence[Path | str],
     row: Callable[[RunManifest], dict[str, object]],
+    *,
+    one_fidelity: bool = True,
 ) -> tuple[list[RunManifest], list[dict[str, object]], tuple[MissingRun, ...]]:
     """Manifests and rows of the finished runs, and the others.
 
@@ -67,9 +73,10 @@ def collect_runs(
         study: Its name, for messages.
         run_dirs: Run directories.
         row: One run's row of the table; an InputError makes the run unusable.
+        one_fidelity: Whether all must have the same.
 
     Raises:
-        InputError: No run is done, or the runs differ in fidelity.
+        InputError: No run is done, or the runs differ in fidelity and must not.
     """
     manifests: list[RunManifest] = []
     rows: list[dict[str, object]] = []
@@ -92,7 +99,8 @@ def collect_runs(
         why = f"; the first: {missing[0].directory}: {missing[0].cause}" if missing else ""
         msg = f"study {study}: none of {len(run_dirs)} runs is done{why}; finish a run first"
         raise InputError(msg)
-    refuse_mixture(study, manifests, "fidelity", lambda run: run.fidelity)
+    if one_fidelity:
+        refuse_mixture(study, manifests, "fidelity", lambda run: run.fidelity)
     return manifests, rows, tuple(missing)
 
 
@@ -140,6 +148,38 @@ def refuse_repeats(
         seen[key] = run
 
 
+def named_variant(directory: Path | str) -> tuple[str, int]:
+    """Variant and seed of a run of a study of variants, by the name of its directory.
+
+    Raises:
+        InputError: It is not named like one.
+    """
+    found = _VARIANT_RUN.fullmatch(Path(directory).name)
+    if found is None:
+        msg = f"{directory}: not a run of this study: its runs are named VARIANT_seedN, such as draft_seed1"
+        raise InputError(msg)
+    return found["variant"], int(found["seed"])
+
+
+def variant_of(run: RunManifest) -> str:
+    """Variant of a run, by the name of its directory.
+
+    Raises:
+        InputError: It is not named like a run of such a study, or after another seed.
+    """
+    variant, seed = named_variant(run.directory)
+    if seed != run.seed:
+        msg = f"{run.directory}: its name says seed {seed}, run.json says {run.seed}; do not rename runs"
+        raise InputError(msg)
+    return variant
+
+
+def variants_of(run_dirs: Sequence[Path | str]) -> list[str]:
+    """All variants in the order given, those without a finished run among them."""
+    known = [path for path in run_dirs if _VARIANT_RUN.fullmatch(Path(path).name)]
+    return list(dict.fromkeys(named_variant(path)[0] for path in known))
+
+
 def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, object]:
     """One run's row: φ by each definition and the crossings before and after shaking, and what the run was.
 
@@ -175,7 +215,7 @@ def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, obje
         SEED: run.seed,
         "smarticles [-]": run.count,
         "fidelity": run.fidelity,
-        SHAKEN: sum(map(_duration, shakes)),
+        SHAKEN: sum(map(duration, shakes)),
     }
     for definition in DEFINITIONS:
         if definition in cheap:
@@ -197,7 +237,7 @@ def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, obje
     return row
 
 
-def _duration(phase: PhaseRecord) -> float:
+def duration(phase: PhaseRecord) -> float:
     """How long a phase of a finished run took [s]."""
     if phase.start is None or phase.end is None:
         return math.nan

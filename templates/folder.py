@@ -229,6 +229,7 @@ def create_folder(
     command: str,
     versions: Mapping[str, str],
     expected_s: Callable[[Scene], float],
+    extend: bool = False,
 ) -> Folder:
     """Make a sweep's directory, or take up the one that holds the same sweep.
 
@@ -239,15 +240,21 @@ def create_folder(
         command: the command line, for the manifest.
         versions: versions of what made it, for the manifest.
         expected_s: expected wall time [s] of a scene.
+        extend: whether a directory that holds some of these runs, and no others, takes up the rest.
 
     Raises:
-        InputError: the directory holds something else.
+        InputError: the directory holds something else, or is to be extended while its runs are being computed.
     """
     if path.exists() and not path.is_dir():
         msg = f"{path}: is a file; give a directory that is new or holds this sweep"
         raise InputError(msg)
+    manifest = _manifest(sweep, points, command, versions, expected_s)
     if (path / MANIFEST).exists():
         folder = open_folder(path)
+        if extend and _is_part(folder, points):
+            with folder.lock():
+                write_json(path / MANIFEST, manifest)
+            folder = open_folder(path)
         _refuse_other_sweep(folder, sweep, points)
     else:
         if path.is_dir() and any(path.iterdir()):
@@ -258,7 +265,7 @@ def create_folder(
         except OSError as error:
             msg = f"--out {path}: cannot be made ({error.strerror}); choose another directory"
             raise InputError(msg) from error
-        write_json(path / MANIFEST, _manifest(sweep, points, command, versions, expected_s))
+        write_json(path / MANIFEST, manifest)
         folder = open_folder(path)
     (path / "scenes").mkdir(exist_ok=True)
     for point in points:
@@ -296,6 +303,12 @@ def _manifest(
             for point in points
         ],
     }
+
+
+def _is_part(folder: Folder, points: Sequence[Point]) -> bool:
+    """Whether the directory holds some of the runs wanted, and no others."""
+    wanted = {(point.name, point.scene_sha256) for point in points}
+    return {(entry.name, entry.scene_sha256) for entry in folder.entries} < wanted
 
 
 def _refuse_other_sweep(folder: Folder, sweep: Sweep, points: Sequence[Point]) -> None:

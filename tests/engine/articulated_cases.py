@@ -171,6 +171,7 @@ def weld_in_motion(data: dict[str, Any], *, targets_deg: Any, spin: Any, time: f
     rigid = before["p"] @ before["p"] / (2 * mass) + own @ np.linalg.solve(tensor, own) / 2
     loss = engine._assembly.weld()
     after = snapshot(engine)
+    spun = np.linalg.solve(tensor, own)
     exact = dataclasses.replace(scene.smarticle.boxes, angles=tuple(after["angles"][0]))
     engine.advance(200)
     return {
@@ -180,6 +181,7 @@ def weld_in_motion(data: dict[str, Any], *, targets_deg: Any, spin: Any, time: f
         "relative": before["e"] - rigid,
         "tensor": np.sort(np.linalg.eigvalsh(inertia_tensor(engine))),
         "exact": np.sort(exact.inertia),
+        "field": before["p"] / mass + np.cross(spun, after["spheres"] - centre),
         "mass": bodies(engine)[0].mass,
         "exact_mass": exact.mass,
         "gap": before["gap"],

@@ -17,7 +17,7 @@ from cli.stopping import orderly_stop
 from dem.errors import InputError, RunError
 
 COMMANDS = {
-    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study"
+    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy"
 }  # fmt: skip
 
 

@@ -195,6 +195,8 @@ def test_memory_through_json_keeps_every_bit(law: MotorLaw) -> None:
     assert not motors.halted.all()
     again = Motors(law, np.zeros((4, 2)))
     again.restore(json.loads(json.dumps(motors.memory)))
+    assert again.halted.tolist() == motors.halted.tolist()
+    assert again.memory == motors.memory
     for angles in way[30:]:
         for one in (motors, again):
             one.look(angles, way[-1], PERIOD, STEP)

@@ -25,7 +25,8 @@ class SyntheticRun:
     """What a made-up run is to look like; `packing` is φ at the end of each phase.
 
     `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
-    a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it.
+    a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
+    `wall_s` [s]; `more` are constant series: name, value, unit.
     """
 
     aspect_ratio: float = 0.7
@@ -43,6 +44,8 @@ class SyntheticRun:
     series: bool = True
     floor_z: float = 0.0
     name: str = "synthetic"
+    wall_s: float = 1.0
+    more: tuple[tuple[str, float, str], ...] = ()
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -150,14 +153,15 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
             active = kind not in ("deposit", "relax")
             done = part if active else float(any(row[4] > 0 for row in rows))
             rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
-        timed.append({"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": 1.0})
+        timed.append({"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": run.wall_s})
         start, previous = end, target
     sets = "".join(f'<DataSet timestep="{t!r}" file="{n}"/>' for t, n in map(_plain, entries))
     (directory / "frames.pvd").write_text(f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>')
     if run.series:
         _write_series(directory, run, np.array(rows))
     if run.status == "done":
-        done = {"status": "done", "time_s": start, "steps": 1000, "wall_s": 1.0, "phases": timed}
+        wall = run.wall_s * len(run.phases)
+        done = {"status": "done", "time_s": start, "steps": 1000, "wall_s": wall, "phases": timed}
         (directory / "done.json").write_text(json.dumps(done))
     elif run.status != "unfinished":
         failed = {"status": run.status, "cause": "a smarticle escaped", "time_s": start}
@@ -225,6 +229,7 @@ def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64])
             columns |= {"tracking_error_rad": (np.full(len(rows), math.nan), "rad")}
         if run.work is not None:
             columns["motor_work_J" if moved else "container_work_J"] = (run.work * rows[:, 4], "J")
+        columns |= {name: (np.full(len(rows), value), unit) for name, value, unit in run.more}
         for name, (values, unit) in columns.items():
             file[name] = values
             file[name].attrs.update({"unit": unit, "description": name})

@@ -1,0 +1,203 @@
+"""accuracy, and plan with limits: from the command line to the advice."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles, WriteRun
+
+from templates.folder import open_folder
+
+SCENE = """\
+schema_version: 1
+seed: 1
+count: 12
+fidelity: draft
+phases:
+  - {type: deposit}
+  - {type: relax, duration_s: 0.3}
+  - {type: shake, duration_s: 1}
+"""
+# φ_f of each setting; seeds lie 1 % to either side.
+LEVELS = {"base": 0.132, "standard": 0.1215, "reference": 0.120}
+
+
+@pytest.fixture
+def base(tmp_path: Path) -> Path:
+    file = tmp_path / "base.yaml"
+    file.write_text(SCENE, encoding="utf-8")
+    return file
+
+
+def finish(directory: Path, write_run: WriteRun) -> None:
+    """Make every run of a ladder of fidelities look finished."""
+    folder = open_folder(directory)
+    for entry in folder.entries:
+        setting, seed = str(entry.values["setting"]), int(entry.values["seed"])
+        level = LEVELS[setting] * (1 + 0.01 * (seed - 2))
+        run = write_run(
+            folder.run(entry),
+            seed=seed,
+            fidelity="draft" if setting == "base" else setting,
+            phases=("deposit", "relax", "shake"),
+            packing=(0.1, 0.1 * (1 + 0.01 * (seed - 2)), level),
+            frames_per_phase=2,
+            wall_s={"base": 1.0, "standard": 3.0, "reference": 30.0}[setting],
+        )
+        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        manifest["scene_sha256"] = entry.scene_sha256
+        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+
+
+def written(base: Path, out: Path, smarticles: Smarticles, *words: str) -> None:
+    """Write a ladder without starting a run: there is nothing to analyse yet."""
+    assert smarticles("accuracy", base, "--out", out, "--knobs", "fidelity", "--analyse", *words).status == 2
+
+
+def test_a_dry_run_shows_ladder_and_hours_and_writes_nothing(base: Path, smarticles: Smarticles) -> None:
+    before = sorted(base.parent.iterdir())
+    said = smarticles("accuracy", base, "--dry-run", "--jobs", "2")
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0].split()[:3] == ["knob", "value", "setting"]
+    assert lines[1].split()[:3] == ["time-step", "0.9", "base"]
+    assert lines[3].split()[:4] == ["time-step", "0.225", "time-step-0.225", "reference"]
+    assert sum("reference" in line.split()[2:] for line in lines) >= 5
+    assert lines[-1].startswith("13 settings × 3 seeds = 39 runs, about ")
+    assert lines[-1].endswith(" with 2 at once")
+    assert said.err == ""
+    assert sorted(base.parent.iterdir()) == before
+
+
+def test_what_takes_too_long_is_listed_as_left_out(base: Path, smarticles: Smarticles) -> None:
+    said = smarticles("accuracy", base, "--dry-run", "--knobs", "fidelity", "--max-run-hours", "0.003")
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[-2].startswith("left out: fidelity reference: a run is expected to take ")
+    assert lines[-1].startswith("2 settings × 3 seeds = 6 runs")
+
+
+def test_one_seed_is_warned_of(base: Path, smarticles: Smarticles) -> None:
+    said = smarticles("accuracy", base, "--dry-run", "--seeds", "4")
+    assert said.status == 0
+    assert said.err == (
+        "smarticles: warning: one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3\n"
+    )
+
+
+def test_a_ladder_is_an_ordinary_sweep(base: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "ladder"
+    written(base, out, smarticles)
+    manifest = json.loads((out / "sweep.json").read_text(encoding="utf-8"))
+    assert manifest["name"] == "accuracy"
+    assert set(manifest["files"]) == {"accuracy.yaml", "accuracy.yaml.j2"}
+    assert "restitution: {{ restitution }}" in manifest["files"]["accuracy.yaml.j2"]
+    said = smarticles("status", out)
+    assert said.out.splitlines()[-1] == "accuracy: 9 runs, 9 missing"
+    assert len(list((out / "scenes").iterdir())) == 9
+
+
+def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
+    base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    out = tmp_path / "ladder"
+    written(base, out, smarticles)
+    finish(out, write_run)
+    # Nothing is missing, so nothing is started.
+    said = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity")
+    assert said.status == 0
+    assert "base_seed1 finished before" in said.err
+    assert "Use fidelity standard (3.5 %): each is the cheapest whose errors against the reference are" in said.out
+    table = out / "results" / "work_precision.csv"
+    assert table.is_file()
+    assert (out / "results" / "accuracy.png").is_file()
+
+    limited = smarticles("plan", base, "--max-error", "0.05", "--table", table)
+    assert limited.status == 0
+    assert limited.out.startswith("fidelity standard: the cheapest within --max-error 0.05\n")
+    assert "smarticles of 25 spheres" in limited.out
+    answer = json.loads(smarticles("plan", base, "--max-hours", "1000", "--table", table, "--json").out)
+    assert answer["choice"]["fidelity"] == "reference"
+    assert answer["spheres_per_smarticle"] > 100
+    refused = smarticles("plan", base, "--max-error", "0.001", "--max-hours", "0.01", "--table", table)
+    assert refused.status == 2
+    assert "contradict each other: reference, the cheapest within the error" in refused.err
+    assert "the hours give way" in refused.err
+
+
+def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
+    base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    monkeypatch.setattr("postprocess.accuracy_figure.draw", lambda *_, **__: [])
+    out = tmp_path / "ladder"
+    written(base, out, smarticles, "--seeds", "1,2")
+    finish(out, write_run)
+    said = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity", "--seeds", "1,2,3", "--analyse")
+    assert said.status == 0
+    assert smarticles("status", out).out.splitlines()[-1] == "accuracy: 9 runs, 6 done, 3 missing"
+    assert len(list((out / "scenes").iterdir())) == 9
+    # Fewer than there are is another sweep.
+    fewer = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity", "--seeds", "1", "--analyse")
+    assert fewer.status == 2
+    assert "only in the directory: " in fewer.err
+    # So is another scene.
+    base.write_text(SCENE.replace("count: 12", "count: 13"), encoding="utf-8")
+    other = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity", "--seeds", "1,2,3,4", "--analyse")
+    assert other.status == 2
+    assert "of another scene: " in other.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--knobs", "timestep"], "--knobs: 'timestep' is no knob; did you mean 'time-step'?"),
+        (["--knobs", "control"], "--knobs: control turns nothing: no phase of "),
+        (["--seeds", "1,1"], "--seeds 1,1: 1 is given twice"),
+        (["--seeds", ","], "--seeds ',': must be whole numbers from 0, such as 1,2,3"),
+        (["--max-run-hours", "-1"], "argument --max-run-hours: must be a number above 0: got '-1'"),
+        (
+            ["--set", "phases.2={type: relax}"],
+            "no activity whose result accuracy could be told by; add a phase of type",
+        ),
+        ([], "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(words: list[str], message: str, base: Path, smarticles: Smarticles) -> None:
+    said = smarticles("accuracy", base, *words)
+    assert said.status == 2
+    (line,) = said.err.splitlines()
+    assert line.startswith("smarticles: error: ")
+    assert message in line
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--max-error", "0"], "argument --max-error: must be a number above 0: got '0'"),
+        (["--max-hours", "inf"], "argument --max-hours: must be a number above 0: got 'inf'"),
+        (["--table", "x.csv"], "--table x.csv: is for --max-error or --max-hours; give one of them"),
+        (["--max-error", "0.03", "--table", "{base}"], "has no column 'knob', so it is no table of work and precision"),
+        (["--max-error", "0.03", "--table", "absent.csv"], "absent.csv: cannot be read (No such file or directory)"),
+    ],
+)
+def test_limits_of_a_plan_that_make_no_sense_are_status_2(
+    words: list[str], message: str, base: Path, smarticles: Smarticles
+) -> None:
+    said = smarticles("plan", base, *(word.replace("{base}", str(base)) for word in words))
+    assert said.status == 2
+    (line,) = said.err.splitlines()
+    assert line.startswith("smarticles: error: ")
+    assert message in line
+
+
+def test_without_a_table_the_planner_says_how_to_make_one(
+    base: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dem.choice.SHIPPED", tmp_path / "none.csv")
+    said = smarticles("plan", base, "--max-hours", "4")
+    assert said.status == 2
+    assert "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv" in said.err
