@@ -153,7 +153,21 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
         stiffness = pins + contacts * law.normal_stiffness * shape
         damped = contacts * damping * shape
         steps.append(_stable_step(mass, stiffness, damped))
+    # Links that roll about themselves all alike in a flat pile: surfaces rub against those above and below, and a link
+    # has little inertia about itself. In series, the wall's dashpot is at most twice the other.
+    roll = _roll_shape(particle)
+    damping = max(law.normal_damping, law.wall_damping / 2) * law.tangential_damping
+    steps.append(_stable_step(mass, pins + 4 * law.tangential_stiffness * roll, 4 * damping * roll))
     return min(steps)
+
+
+def _roll_shape(particle: Particle) -> Array:
+    """(18, 18): the stiffness matrix of springs of 1 N/m across the highest point of every sphere, against rolling."""
+    shape = np.zeros((6 * LINKS, 6 * LINKS))
+    for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
+        about = slice(6 * int(link) + 3, 6 * int(link) + 5)
+        shape[about, about] += np.eye(2) * height**2
+    return shape
 
 
 def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:

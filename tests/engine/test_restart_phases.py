@@ -1,4 +1,4 @@
-"""Runs killed inside a gait, a pull, a lift and a removal, and resumed: the same bits as the run that was never stopped."""
+"""Runs killed inside a gait, a pull, a lift and a removal, and resumed: the same bits as one that was never stopped."""
 
 from __future__ import annotations
 

@@ -1,0 +1,363 @@
+"""Hinges and motors at work: small simulations whose answer is known, in the worker process; SI throughout."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import cases
+import numpy as np
+from articulated_cases import (
+    Targets,
+    angular_momentum,
+    bodies,
+    build,
+    drive,
+    floating,
+    kinetic_energy,
+    momentum,
+    own_contacts,
+    vec,
+)
+from scipy.spatial.transform import Rotation
+
+from dem.engine import Engine
+from dem.scene import Scene
+from dem.timestep import contact_law, hinge_law, hinged_stable_time_step
+
+
+def hold(engine: Engine, links: Iterable[int], *, still: bool = True) -> None:
+    """Hold links of smarticle 0 where they are, or let go of them."""
+    for link in links:
+        body, zero = bodies(engine)[link], engine._yade.vector(0, 0, 0)
+        body.blockedDOFs = "xyzXYZ" if still else ""
+        body.vel, body.angVel, body.angMom = zero, zero, zero
+
+
+def upright(data: dict[str, Any], *, gravity: float, height: float = 0.05) -> tuple[Scene, Engine]:
+    """One articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
+    scene = cases.load(data)
+    engine = build(scene, gravity=gravity)
+    middle = Rotation.from_matrix(scene.smarticle.boxes.link_rotations[1].T)
+    turned = Rotation.from_euler("x", -90, degrees=True) * middle
+    cases.add(engine, np.array([0, 0, height]) - turned.apply(scene.smarticle.boxes.link_centres[1]), turned)
+    engine.articulate()
+    hold(engine, [1])
+    return scene, engine
+
+
+def gait(
+    data: dict[str, Any],
+    *,
+    straight_in: float,
+    velocity: Any = (0, 0, 0),
+    spin: Any = (0, 0, 0),
+    every_step: bool = False,
+) -> dict[str, Any]:
+    """A free smarticle straightens and bends back; conserved sums, and the work of the motors step by step."""
+    scene, engine = floating(data, velocity=velocity, spin=spin)
+    engine.advance(1)
+    engine.articulate()
+    begun = engine.state().angles
+    rows: list[tuple[Any, ...]] = []
+    torques, angles = [engine._hinges.torques()[0]], [engine._hinges.angles()[0]]
+    start = momentum(engine), angular_momentum(engine), kinetic_energy(engine)
+
+    def targets(time: float) -> np.ndarray:
+        return begun * abs(1 - time / straight_in)
+
+    for time in drive(engine, scene, 2 * straight_in, targets, log=(torques, angles) if every_step else None):
+        if not every_step and round(time / scene.fidelity.control_interval_s) % 5:
+            continue  # 1 ms
+        links = bodies(engine)
+        centre = sum(b.mass * vec(b.pos) for b in links) / sum(b.mass for b in links)
+        own = [np.cross(vec(b.pos) - centre, b.mass * vec(b.vel)) + vec(b.angMom) for b in links]
+        rows.append(
+            (
+                np.abs(momentum(engine) - start[0]).max(),
+                sum(b.mass * np.linalg.norm(vec(b.vel)) for b in links),
+                np.abs(angular_momentum(engine) - start[1]).max(),
+                sum(np.linalg.norm(part) for part in own),
+                engine.joint_gaps().max() / scene.sphere_diameter,
+                np.abs(engine.state().angles - targets(time)).max(),
+                kinetic_energy(engine),
+            )
+        )
+    keys = ("momentum", "links_momentum", "angular", "links_angular", "gap", "error", "energy")
+    tau, alpha = np.array(torques), np.array(angles)
+    return {
+        **{key: np.array(column) for key, column in zip(keys, zip(*rows, strict=True), strict=True)},
+        "energy_before": start[2],
+        "elastic": engine._hinges.elastic_energy(),
+        "work": ((tau[1:] + tau[:-1]) / 2 * np.diff(alpha, axis=0)).sum(axis=1).cumsum(),
+        "told": float(engine.motors.work.sum()),
+        "twisted": float((tau[-1] ** 2).sum() / (2 * scene.motor.stiffness_N_m_per_rad)),
+        "angles": engine.state().angles - begun,
+    }
+
+
+def pull(data: dict[str, Any], *, weights: float, duration: float) -> dict[str, Any]:
+    """A straight smarticle is pulled at both ends, along itself, by a force that grows and then stays."""
+    scene, engine = floating(data)
+    engine.articulate()
+    straight = engine.state().angles
+    along = engine.state().link_rotations[0, 1, :, 0]
+    force = weights * scene.smarticle.boxes.mass * 9.81
+    gaps = []
+    for time in drive(engine, scene, duration, lambda _: straight):
+        grown = min(1.0, 2 * time / duration) * force * along
+        for link, sign in ((0, -1), (2, 1)):
+            engine._omega.forces.setPermF(engine._assembly.bodies[link], engine._yade.vector(*(sign * grown)))
+        gaps.append(engine.joint_gaps().max())
+    return {
+        "force": force,
+        "gaps": np.array(gaps),
+        "stiffness": hinge_law(scene).pin_stiffness,
+        "diameter": scene.sphere_diameter,
+    }
+
+
+def droop(data: dict[str, Any], *, duration: float) -> dict[str, Any]:
+    """Straight barbs under gravity, the middle link held: torques and how far the hinges give way, averaged."""
+    scene, engine = upright(data, gravity=9.81)
+    begun = engine.state().angles
+    rows = [
+        (*engine._hinges.torques()[0], *engine.joint_gaps()[0], *(engine.state().angles - begun)[0])
+        for _ in drive(engine, scene, duration, lambda _: begun)
+    ]
+    # The shaft has no damping: barbs vibrate about where they hang. Hann's window takes the vibration out.
+    means = np.average(rows, axis=0, weights=np.hanning(len(rows)))
+    boxes = scene.smarticle.boxes
+    return {
+        "torques": means[:2],
+        "gaps": means[2:4],
+        "sag": means[4:],
+        "expected": boxes.link_masses[0] * 9.81 * boxes.barb_length / 2,
+        "weight": boxes.link_masses[0] * 9.81,
+        "pin": hinge_law(scene).pin_stiffness,
+        "shaft": scene.motor.stiffness_N_m_per_rad,
+    }
+
+
+def sideways(data: dict[str, Any], *, to_deg: float, sweeps: int, rest: float) -> dict[str, Any]:
+    """Lying in the air, the middle link held, barbs sweep to an angle, and back and there again; then hang still."""
+    scene = cases.load(data)
+    engine = build(scene, gravity=9.81)
+    cases.add(engine, (0, 0, 0.05))
+    engine.articulate()
+    hold(engine, [1])
+    begun, goal, each = engine.state().angles[0], math.radians(to_deg), 0.35
+    for _ in drive(engine, scene, each * sweeps, lambda t: begun + (goal - begun) * (1 - abs(t / each % 2 - 1))):
+        pass
+    begun, tilts = engine.motors.commands[0].copy(), []
+    for _ in drive(engine, scene, rest, lambda _: begun):
+        normals = engine.state().link_rotations[0, :, :, 2]
+        tilts.append(np.cross(normals[1], normals[[0, 2]]))
+    boxes, along = scene.smarticle.boxes, engine.state().link_rotations[0, [0, 2], :, 0]
+    moments = np.cross(along * boxes.barb_length / 2, [0, 0, -boxes.link_masses[0] * 9.81])
+    return {
+        "tilts": np.average(tilts, axis=0, weights=np.hanning(len(tilts))),
+        "expected": moments / hinge_law(scene).tilt_stiffness,
+        "angles": np.degrees(engine.state().angles[0]),
+    }
+
+
+def pendulum(data: dict[str, Any], *, duration: float) -> dict[str, Any]:
+    """Barbs that hang from a held middle link by a shaft without stiffness to speak of, let go at a small angle."""
+    scene, engine = upright(data, gravity=9.81)
+    begun = engine.state().angles
+    times, angles = [], []
+    for time in drive(engine, scene, duration, lambda _: begun):
+        times.append(time)
+        angles.append(engine.state().angles[0])
+    boxes = scene.smarticle.boxes
+    return {
+        "time": np.array(times),
+        "angles": np.array(angles),
+        "inertia": boxes.link_inertias[0, 2] + boxes.link_masses[0] * (boxes.barb_length / 2) ** 2,
+        "moment": boxes.link_masses[0] * 9.81 * boxes.barb_length / 2,
+    }
+
+
+def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: float) -> dict[str, Any]:
+    """Both barbs turned from corner to corner [deg] of their range, at a constant speed [rad/s]."""
+    scene, engine = floating(data)
+    engine.articulate()
+    touching, reached, gap = 0, [engine.state().angles[0]], 0.0
+    for corner in np.radians(corners):
+        begun = engine.motors.commands[0].copy()
+        duration = max(np.abs(corner - begun).max() / speed, 1e-3)
+        for _ in drive(engine, scene, duration, lambda t, a=begun, b=corner, d=duration: a + (b - a) * min(t / d, 1)):
+            touching += own_contacts(engine)
+            gap = max(gap, engine.joint_gaps().max())
+            reached.append(engine.state().angles[0])
+    return {
+        "touching": touching,
+        "angles": np.degrees(reached),
+        "gap": gap / scene.sphere_diameter,
+        "potential": sum(1 for i in engine._omega.interactions if i.isReal),
+    }
+
+
+def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
+    """The command jumps to an angle [rad]; the motor follows at its speed limit."""
+    scene, engine = floating(data)
+    engine.articulate()
+    rows = [
+        (kinetic_energy(engine), engine.joint_gaps().max(), *engine.state().angles[0], *engine.motors.commands[0])
+        for _ in drive(engine, scene, duration, lambda _: [to, to])
+    ]
+    table = np.array(rows)
+    boxes = scene.smarticle.boxes
+    inertia = boxes.link_inertias[0, 2] + boxes.link_masses[0] * (boxes.barb_length / 2) ** 2
+    return {
+        "energy": table[:, 0],
+        "gap": table[:, 1] / scene.sphere_diameter,
+        "angles": table[:, 2:4],
+        "commands": table[:, 4:],
+        "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
+        "halted": engine.motors.halted,
+        "interval": scene.fidelity.control_interval_s,
+    }
+
+
+def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
+    """An articulated smarticle hits the floor; its energy from the impact on."""
+    scene = cases.load(data)
+    engine = build(scene)
+    cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
+    cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
+    engine.advance(1)
+    engine.articulate()
+    begun = engine.state().angles
+    mass, energies, gaps = scene.smarticle.boxes.mass, [], []
+    for _ in drive(engine, scene, duration, lambda _: begun):
+        gaps.append(engine.joint_gaps().max())
+        if not gaps[-1] < scene.sphere_diameter:  # burst, NaN included
+            energies.append(math.inf)
+            break
+        height, twist = float(engine.state().positions[0, 2]), engine.motors.commands - engine._hinges.angles()
+        springs = engine._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
+        energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
+    return {
+        "energy": np.array(energies),
+        "gap": np.array(gaps) / scene.sphere_diameter,
+        "thrown": mass * speed**2 / 2,
+        "interval": scene.fidelity.control_interval_s,
+    }
+
+
+def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
+    """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
+    scene = cases.load(data)
+    law, particle = contact_law(scene), scene.particle
+    dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
+    interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
+    engine = build(scene, dt=dt)
+    thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
+    for k in range(layers):
+        cases.add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
+    engine.articulate()
+    begun, fastest, gap = engine.state().angles, 0.0, 0.0
+    for time in drive(engine, scene, settle + watch, lambda _: begun, interval=interval):
+        gap = max(gap, engine.joint_gaps().max())
+        if not gap < thick:
+            return {"fastest": math.inf, "gap": math.inf, "z": np.full(layers, math.nan), "thick": thick, "dt": dt}
+        if time > settle:
+            fastest = max(fastest, float(np.linalg.norm(engine.state().link_velocities, axis=2).max()))
+    return {
+        "fastest": fastest,
+        "gap": gap / scene.sphere_diameter,
+        "z": engine.state().positions[:, 2],
+        "thick": thick,
+        "dt": dt,
+    }
+
+
+def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]:
+    """All links held while the motors are told to straighten; then freed, or told to go back by an angle."""
+    scene, engine = floating(data)
+    engine.articulate()
+    hold(engine, range(3))
+    begun = engine.state().angles[0]
+    commands, torques, halted = [], [], []
+
+    def follow(duration: float, targets: Targets) -> None:
+        for _ in drive(engine, scene, duration, targets):
+            commands.append(engine.motors.commands[0])
+            torques.append(engine._hinges.torques()[0])
+            halted.append(engine.motors.halted[0])
+
+    follow(0.02, lambda t: begun - 5 * t)
+    marks = [len(commands)]
+    if freed:
+        hold(engine, range(3), still=False)
+    goal = begun - 0.1 if freed else engine.motors.commands[0] + back
+    follow(0.1, lambda _: goal)
+    return {
+        "begun": begun,
+        "goal": goal,
+        "mark": marks[0],
+        "commands": np.array(commands),
+        "torques": np.array(torques),
+        "halted": np.array(halted),
+        "angles": engine.state().angles[0],
+        "limit": scene.torque_limit,
+        "advance": scene.motor.stiffness_N_m_per_rad
+        * scene.motor.speed_limit_rad_per_s
+        * scene.fidelity.control_interval_s,
+    }
+
+
+def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any]:
+    """Barb 1 is turned about its hinge by hand while the motor holds; torque on it at every step."""
+    scene, engine = floating(data)
+    engine.articulate()
+    hold(engine, range(3))
+    begun = engine.state().angles
+    state = engine.state()
+    normal, hinge = state.link_rotations[0, 1, :, 2], state.vertices[0, 1]
+    barb, torques = bodies(engine)[0], []
+    spin = -normal * speed  # inwards for barb 1 is about the negative normal
+    barb.angVel = engine._yade.vector(*spin)
+    interval = scene.fidelity.control_interval_s
+    for step in range(round(angle / speed / engine.time_step)):
+        if step % round(interval / engine.time_step) == 0:
+            engine.actuate(begun, interval)
+        barb.vel = engine._yade.vector(*np.cross(spin, vec(barb.pos) - hinge))
+        engine.advance(1)
+        torques.append(engine._hinges.torques()[0, 0])
+    return {
+        "torques": np.array(torques),
+        "angles": engine.state().angles[0] - begun[0],
+        "command": engine.motors.commands[0] - begun[0],
+        "gap": engine.joint_gaps().max(),
+        "limit": scene.torque_limit,
+    }
+
+
+def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
+    """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
+    scene = cases.load(data)
+    reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
+    height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
+    scene, engine = upright(data, gravity=0.0, height=height)
+    begun = engine.state().angles[0]
+    rows = []
+    for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
+        motors = engine.motors
+        rows.append(
+            (time, *motors.commands[0], *engine._hinges.torques()[0], *motors.halted[0], engine.joint_gaps().max())
+        )
+    table = np.array(rows)
+    return {
+        "time": table[:, 0],
+        "commands": table[:, 1:3],
+        "torques": table[:, 3:5],
+        "halted": table[:, 5:7],
+        "gap": table[:, 7] / scene.sphere_diameter,
+        "begun": begun,
+        "angles": engine.state().angles[0],
+        "limit": scene.torque_limit,
+    }
