@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-Law = Literal["halt", "slip"]
+Law = Literal["halt", "stall", "slip"]
 _MEMORY = ("commands", "angles", "torques", "work", "begun", "halted")
 
 
@@ -24,7 +24,8 @@ class MotorLaw:
         speed_limit: ω, the greatest speed of a command [rad/s].
         stiffness: twist stiffness of the shaft between motor and barb [N m/rad].
         law: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever
-            torque it takes; "slip": a servo that gives way at τ_max.
+            torque it takes; "stall": it does not move at all until its torque has fallen, the paper's rule to the
+            letter; "slip": a servo that gives way at τ_max.
     """
 
     torque_limit: float
@@ -37,9 +38,9 @@ class Motors:
     """Two motors on each of N smarticles.
 
     A motor turns one end of its shaft to the command; the barb is at the other end, at the actual angle, and feels the
-    torque k (command - actual). A smarticle's motor may always give way: only a command that would load the shaft
-    further is halted. Taken to the letter, a motor that halts in both directions would never come free in an elastic
-    contact, whose load stays when the motor stops.
+    torque k (command - actual). A motor that halts may always give way: only a command that would load the shaft
+    further is refused. One that stalls, in both directions, comes free only when its neighbours move, since the load
+    of an elastic contact stays when the motor stops.
 
     Args:
         law: what all motors have in common.
@@ -86,12 +87,11 @@ class Motors:
         self._begun = middle
         most = self.law.speed_limit * interval
         advance = np.clip(targets - self.commands, -most, most)
+        self.halted = np.abs(before) >= self.law.torque_limit
         if self.law.law == "halt":
-            loaded = np.abs(before) >= self.law.torque_limit
-            self.halted = loaded & (advance * before > 0)
+            self.halted &= advance * before > 0
+        if self.law.law != "slip":
             advance = np.where(self.halted, 0.0, advance)
-        else:
-            self.halted = np.abs(before) >= self.law.torque_limit
         self.commands = self.commands + advance
         self.angles = angles
         self.torques = self._torque(angles)

@@ -184,10 +184,10 @@ class Motor(Part):
         "at the lever w",
     )
     speed_limit_rad_per_s: float = Field(6.0, gt=0, description="ω, greatest speed of a motor [rad/s]")
-    law: Literal["halt", "slip"] = Field(
+    law: Literal["halt", "stall", "slip"] = Field(
         "halt",
-        description="at τ_max or above: halt: the motor stops advancing towards the load and holds; slip: it gives "
-        "way, a servo whose torque is capped at τ_max",
+        description="at τ_max or above: halt: the motor stops advancing towards the load and holds; stall: it does not "
+        "move in either direction, the paper's rule to the letter; slip: it gives way, a servo capped at τ_max",
     )
     stiffness_N_m_per_rad: float = Field(
         3e-3, gt=0, description="twist stiffness of the shaft between motor and barb [N m/rad]"

@@ -108,6 +108,21 @@ def test_one_barb_halts_alone() -> None:
     assert motors.halted.tolist() == [[True, False], [True, True]]
 
 
+def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> None:
+    stall = replace(HALT, law="stall")
+    motors = held(stall, 0.5, 1.0, 40)
+    stopped = motors.commands.copy()
+    assert motors.halted.all()
+    # Told to go back, where a halting motor would: it stays, as the load stays.
+    held(stall, 0.5, 0.0, 40, motors)
+    assert (motors.commands == stopped).all()
+    assert motors.halted.all()
+    # The barb yields a little: now it goes.
+    held(stall, 0.501, 0.0, 1, motors)
+    assert (motors.commands == stopped - 6 * PERIOD).all()
+    assert not motors.halted.any()
+
+
 # -- the slipping law --------------------------------------------------------------------------------------------------
 
 
