@@ -17,6 +17,8 @@ from dem.timestep import stable_step, time_step
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
+# A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
+ARTICULATED_SHARE = 1.7
 # A pour costs about half of the same time in the full pile, since the pile grows from nothing; 0.1 s per layer.
 POUR_SHARE = 0.5
 LAYER_SECONDS = 0.1
@@ -105,7 +107,8 @@ def plan(scene: Scene) -> Plan:
             phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
         else:
             estimate = phase.duration_s
-            phases.append(PlannedPhase(index, phase.type, estimate, estimate, rate * estimate))
+            wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
+            phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = _effects(scene)
     return Plan(
