@@ -59,7 +59,8 @@ class RunManifest:
         thickness_in_plane: Thickness t2 in the smarticle's plane [m].
         smarticle_mass: Mass of one smarticle [kg].
         solid_volume: Volume of one smarticle, t1 t2 (w + 2l) [m³].
-        container_radius: [m].
+        container_radius: [m]; of the widest tier.
+        container_tiers: Cylinders of different radii that stand on each other.
         sphere_diameter: Diameter of the spheres that stand for a smarticle [m].
         spheres_per_smarticle: Number of those spheres.
         time_step: [s].
@@ -94,10 +95,19 @@ class RunManifest:
     time_step: float
     phases: tuple[PhaseRecord, ...]
     status: str
+    container_tiers: int = 1
     cause: str | None = None
     end_time: float | None = None
     steps: int | None = None
     wall_time: float | None = None
+
+    def walled(self, phase: int) -> bool:
+        """Whether the container's wall is there in the phase of an index."""
+        return all(record.type != "remove-container" for record in self.phases[: phase + 1])
+
+    def fills_cylinder(self, phase: int) -> bool:
+        """Whether the pile fills one cylinder then, so that packing fractions have a meaning."""
+        return self.container_tiers == 1 and self.walled(phase)
 
 
 @dataclass(frozen=True)
@@ -205,6 +215,8 @@ def read_run(directory: Path | str) -> RunManifest:
         smarticle_mass=run.number("smarticle_mass_kg", positive=True),
         solid_volume=run.number("solid_volume_m3", positive=True),
         container_radius=run.number("container_radius_m", positive=True),
+        # Runs of before there were tiers do not say.
+        container_tiers=run.integer("container_tiers", least=1) if "container_tiers" in run.data else 1,
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),

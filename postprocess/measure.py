@@ -312,6 +312,8 @@ def _escaped(frame: Frame, radius: float) -> int:
 
 
 def _phi(frame: Frame, manifest: RunManifest, definition: str) -> float:
+    if not manifest.fills_cylinder(frame.phase):
+        return float("nan")
     try:
         return packing_fraction(
             frame.vertices,

@@ -28,6 +28,7 @@ from postprocess.procedures_runs import (
     HEIGHT,
     INTERNAL,
     PHI,
+    PHI_ACTIVE,
     PROCEDURE,
     QUANTITIES,
     THETA,
@@ -149,11 +150,12 @@ def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[st
     return origin.footer(
         f"l/w {ratios}, {origin.manifests[0].count} smarticles, {told_seeds(runs, counts, 'point')}; "
         f"active for: {times}.",
-        f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}), ⟨N⟩ the links of others through a smarticle's plane: φ_f and "
-        "⟨N⟩ are means over the frames of the relaxation after the activity, static ones over those of the "
-        f"relaxation before it (runs of one l/w and seed agree there within {static_spread(runs):.2g} in φ). "
-        "h0 is the mean height of the centre of mass in that relaxation. Energy: work of the motors, or of the "
-        f"shaken container without its own weight. Procedures are compared at θ = {AMPLITUDE:g}°. "
+        f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}), ⟨N⟩ the links of others through a smarticle's plane: φ_f is "
+        "the mean over the last 20 frames of the activity, as in the paper, ⟨N⟩ that over the frames of the relaxation "
+        "after it; static ones are means over the frames of the relaxation before it (runs of one l/w and seed agree there "
+        f"within {static_spread(runs):.2g} in φ). h0 is the mean height of the centre of mass in that relaxation. "
+        "Energy: work of the motors, or of the shaken container without its own weight. Procedures are compared at "
+        f"θ = {AMPLITUDE:g}°. "
         f"{told_bars(counts, 'point')}.",
         f"{CRITERION}.",
     )
@@ -174,7 +176,13 @@ def _markdown(found: Sequence[Finding], means: pd.DataFrame) -> list[str]:
 
 def told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of points for a person to read."""
-    columns = {PHI: ("φ_f", ".4f"), CROSSINGS: ("⟨N⟩", ".2f"), ENERGY: ("energy [J]", ".2e"), HEIGHT: ("h/h0", ".3f")}
+    columns = {
+        PHI_ACTIVE: ("φ_f", ".4f"),
+        PHI: ("φ at rest again", ".4f"),
+        CROSSINGS: ("⟨N⟩", ".2f"),
+        ENERGY: ("energy [J]", ".2e"),
+        HEIGHT: ("h/h0", ".3f"),
+    }
     rows = []
     for _, point in means.iterrows():
         theta = "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°"

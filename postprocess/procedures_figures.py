@@ -18,7 +18,7 @@ from postprocess.procedures_runs import (
     ENERGY,
     EXTERNAL,
     INTERNAL,
-    PHI,
+    PHI_ACTIVE,
     PROCEDURE,
     SHAPE,
     STATIC,
@@ -46,7 +46,7 @@ _SHOWN_ASPECT = 0.7
 """Aspect ratio whose heights are drawn against time, as in the paper [-]."""
 
 _ASPECT_LABEL, _THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
-_PHI_LABEL = r"packing fraction $\phi_\mathrm{f}$ at rest again [-]"
+_PHI_LABEL = r"packing fraction $\phi_\mathrm{f}$ at the end of the activity [-]"
 _CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
 _ENERGY_LABEL = "energy per smarticle [J]"
 _INTERNAL_LABEL = rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°"
@@ -88,10 +88,10 @@ def draw(
         The files written.
     """
     panels = [
-        _Panel(name="phi_aspect", quantity=PHI, label=_PHI_LABEL, lines=_of_procedures),
+        _Panel(name="phi_aspect", quantity=PHI_ACTIVE, label=_PHI_LABEL, lines=_of_procedures),
         _Panel(name="crossings_aspect", quantity=CROSSINGS, label=_CROSSINGS_LABEL, lines=_of_procedures),
         _Panel(name="energy_aspect", quantity=ENERGY, label=_ENERGY_LABEL, lines=_of_energies, log=True),
-        _Panel(name="phi_theta", quantity=PHI, label=_PHI_LABEL, x=THETA, lines=_of_aspects),
+        _Panel(name="phi_theta", quantity=PHI_ACTIVE, label=_PHI_LABEL, x=THETA, lines=_of_aspects),
         _Panel(name="crossings_theta", quantity=CROSSINGS, label=_CROSSINGS_LABEL, x=THETA, lines=_of_aspects),
         _Panel(name="energy_theta", quantity=ENERGY, label=_ENERGY_LABEL, x=THETA, lines=_of_aspects, log=True),
     ]

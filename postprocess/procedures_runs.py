@@ -2,6 +2,8 @@
 
 A run is poured, rests, goes through one activity, and rests again. Both rests are averaged over their
 frames: the first one is the static state of its aspect ratio and seed, the last one what the activity left.
+φ_f is taken at the end of the activity, as the paper's own code does, and at rest again beside it: a shaken pile
+bounces, and is looser while it does.
 """
 
 from __future__ import annotations
@@ -32,10 +34,12 @@ AMPLITUDE = 10.0
 """θ of the internal oscillation where procedures are compared, as in the paper [deg]."""
 
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
+PHI_ACTIVE = f"phi {DEFINITION} at the end of the activity [-]"
 PHI, CROSSINGS, ENERGY = f"phi {DEFINITION} [-]", "crossings [-]", "energy per smarticle [J]"
 HEIGHT, STRAIGHT, HALF = "com height over h0 [-]", "com height straight over h0 [-]", "half of compaction at [-]"
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
+        PHI_ACTIVE: "packing fraction over the last frames of the activity, as the paper's φ_f; static: at rest",
         PHI: "packing fraction at rest: after the activity, or of the static state",
         CROSSINGS: "⟨N⟩ at rest: links of others through a smarticle's plane",
         ENERGY: "work of the motors, or of the shaken container, on the smarticles; static: none",
@@ -81,12 +85,12 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
         msg = f"{run.directory}: phase {active.index} is {active.type} in run.json, {settings.type} in scene.yaml"
         raise InputError(msg)
     procedure = PROCEDURES[active.type]
-    rests = {"before": active.index - 1, "after": active.index + 1}
-    table = summarise_run(run.directory, definitions=[DEFINITION], phases=set(rests.values()))
-    if len(table) != len(rests):
-        msg = f"{run.directory}: no frame of the rest before or after its activity; run it again"
+    wanted = range(active.index - 1, active.index + 2)
+    table = summarise_run(run.directory, definitions=[DEFINITION], phases=set(wanted))
+    if len(table) != len(wanted):
+        msg = f"{run.directory}: no frame of its activity or of the rest before or after it; run it again"
         raise InputError(msg)
-    before, after = (table.set_index("phase").loc[phase] for phase in rests.values())
+    before, during, after = (table.set_index("phase").loc[phase] for phase in wanted)
     row: dict[str, object] = {
         PROCEDURE: procedure,
         THETA: settings.number("theta_deg") if procedure == INTERNAL else math.nan,
@@ -99,6 +103,8 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
     for name, rest in ((f"{STATIC} ", before), ("", after)):
         row[f"{name}{PHI}"] = rest[PHI]
         row[f"{name}{CROSSINGS}"] = rest["crossings mean [-]"]
+    row[f"{STATIC} {PHI_ACTIVE}"] = before[PHI]
+    row[PHI_ACTIVE] = during[PHI]
     row[f"phi {DEFINITION} SE in run [-]"] = after[f"phi {DEFINITION} SE [-]"]
     row["h0 [m]"] = before["com height [m]"]
     row[HEIGHT] = after["com height [m]"] / before["com height [m]"]
@@ -208,7 +214,7 @@ def samples(runs: pd.DataFrame) -> pd.DataFrame:
     Returns:
         The table; what a procedure does not have is NaN. "runs [-]" says how many a row stands for.
     """
-    columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI, CROSSINGS)}
+    columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
     static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)
     static["runs [-]"] = runs.groupby([ASPECT, SEED]).size().to_numpy()
     static = static.assign(**{PROCEDURE: STATIC, THETA: math.nan})

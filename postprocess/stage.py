@@ -12,7 +12,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -101,6 +101,7 @@ class Stage:
         self._run = run
         self._look = look
         self._scale = ColourScale.of(look.colouring, *span)
+        self._wall: list[Any] = []  # what goes away with the container
         _check_graphics()
         with _quiet_vtk():
             width, height = look.panel
@@ -148,6 +149,8 @@ class Stage:
                 reset_camera=False,
                 render=False,
             )
+            for part in self._wall:
+                part.visibility = self._run.walled(frame.phase)
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
         panel = Image.fromarray(pixels).resize(self._look.panel, Image.Resampling.LANCZOS)
@@ -163,9 +166,11 @@ class Stage:
         arc = _back_arc(radius, axes[2])
         if arc is not None:
             wall = pv.MultipleLines(arc).extrude((0.0, 0.0, top), capping=False)
-            plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False)
             upper = arc + np.array([0.0, 0.0, top])
-            self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]]))
+            self._wall = [
+                plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False),
+                self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]])),
+            ]
         self._add_outline(circle(radius, 0.0 if arc is not None else top))
         width, height = self._look.panel
         position, focus = fitted_camera(extent, axes, width / height)
@@ -185,8 +190,8 @@ class Stage:
             blur=True,
         )
 
-    def _add_outline(self, points: NDArray[np.float64]) -> None:
-        self._plotter.add_mesh(
+    def _add_outline(self, points: NDArray[np.float64]) -> Any:
+        return self._plotter.add_mesh(
             pv.MultipleLines(points),
             color="#7d8f9f",
             line_width=1.8 * _OVERSAMPLING,
@@ -212,16 +217,16 @@ class Stage:
         run = self._run
         count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
         phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
-        try:
-            phi = packing_fraction(
-                frame.vertices,
-                radius=run.container_radius,
-                solid_volume=run.solid_volume,
-                floor_z=frame.floor_z,
-            )
-            packing = f"φ = {phi.value:.3f} (definition {phi.definition})"
-        except UndefinedMeasureError:
-            packing = "φ undefined"
+        packing = "φ undefined"
+        with suppress(UndefinedMeasureError):
+            if run.fills_cylinder(frame.phase):
+                phi = packing_fraction(
+                    frame.vertices,
+                    radius=run.container_radius,
+                    solid_volume=run.solid_volume,
+                    floor_z=frame.floor_z,
+                )
+                packing = f"φ = {phi.value:.3f} (definition {phi.definition})"
         mean = entanglement(frame.vertices).mean
         crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "⟨N⟩ undefined"
         return (

@@ -1,3 +1,5 @@
+import json
+
 import h5py
 import numpy as np
 import pandas as pd
@@ -20,6 +22,22 @@ from postprocess.packing import COSTLY_DEFINITIONS
 
 CHEAP = [name for name in postprocess.DEFINITIONS if name not in COSTLY_DEFINITIONS]
 PHI = "phi second-highest-com [-]"
+
+
+def test_no_packing_fraction_where_no_one_cylinder_is_filled(make_run):
+    """After the wall is gone, and in a mould of tiers, the radius says nothing of the pile's volume."""
+    run = make_run([(0, 0.0), (0, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
+    manifest = json.loads((run / "run.json").read_text())
+    assert measure_run(run, costly="never")[PHI][1:].notna().all()
+    manifest["phases"][1]["type"] = "remove-container"
+    (run / "run.json").write_text(json.dumps(manifest))
+    table = measure_run(run, costly="never")
+    assert table["phase"].tolist() == [0, 0, 1, 2, 2]
+    assert table[PHI].notna().tolist() == [False, True, False, False, False]  # the first has one smarticle
+    manifest |= {"container_tiers": 2}
+    manifest["phases"][1]["type"] = "relax"
+    (run / "run.json").write_text(json.dumps(manifest))
+    assert measure_run(run, costly="never")[PHI].isna().all()
 
 
 def test_mean_of_independent_samples():

@@ -199,7 +199,7 @@ def test_tables_on_disk_are_those_of_the_report(study):
     text = report.files["findings.md"].read_text()
     assert text.count("| **found** |") == [finding.verdict for finding in report.findings].count("found")
     header, rows = told_points(report.points)
-    assert header == ["procedure", "θ", "l/w", "seeds", "φ_f", "⟨N⟩", "energy [J]", "h/h0"]
+    assert header == ["procedure", "θ", "l/w", "seeds", "φ_f", "φ at rest again", "⟨N⟩", "energy [J]", "h/h0"]
     assert ["static", "", "0.7", "2", "0.1000 ± 0.0010"] in [row[:5] for row in rows]
     assert ["internal", "30°", "0.7", "2"] in [row[:4] for row in rows]
     assert all(" | ".join(row) in text for row in rows)

@@ -15,6 +15,7 @@ from postprocess.procedures_runs import (
     HEIGHT,
     INTERNAL,
     PHI,
+    PHI_ACTIVE,
     PROCEDURE,
     QUANTITIES,
     SHAPE,
@@ -32,7 +33,7 @@ LEVELS = {  # φ and ⟨N⟩ of each procedure at l/w = 0.7, and how ⟨N⟩ goe
     SHAPE: (0.11, 2.0, 1.0),
     INTERNAL: (0.16, 1.5, 0.5),
 }
-SCATTER = {PHI: 0.0005, CROSSINGS: 0.03, ENERGY: 1e-7, HEIGHT: 0.002, STRAIGHT: 0.002, HALF: 0.01}
+SCATTER = {PHI: 0.0005, PHI_ACTIVE: 0.0005, CROSSINGS: 0.03, ENERGY: 1e-7, HEIGHT: 0.002, STRAIGHT: 0.002, HALF: 0.01}
 
 
 def blank(seeds=(1, 2, 3)):
@@ -70,6 +71,7 @@ def as_in_the_paper(seeds=(1, 2, 3), *, scatter=1.0, random=0):
         elif procedure == EXTERNAL:
             table.loc[index, ENERGY] = 3e-6
             table.loc[index, HEIGHT] = 0.9
+    table[PHI_ACTIVE] = table[PHI]
     for quantity, size in SCATTER.items():
         table[quantity] += scatter * size * generator.standard_normal(len(table))
     return table
@@ -79,11 +81,11 @@ def nothing(random, *, seeds=(1, 2, 3)):
     """Samples of procedures that do nothing at all: scatter about the same state; piles differ by seed and l/w."""
     table = blank(seeds)
     generator = np.random.default_rng(random)
-    level = {PHI: 0.12, CROSSINGS: 1.0, ENERGY: 1e-5, HEIGHT: 1.0, STRAIGHT: 1.0, HALF: 0.5}
+    level = {PHI: 0.12, PHI_ACTIVE: 0.12, CROSSINGS: 1.0, ENERGY: 1e-5, HEIGHT: 1.0, STRAIGHT: 1.0, HALF: 0.5}
     piles = {key: generator.standard_normal() for key, _ in table.groupby([ASPECT, SEED])}
     for quantity, size in SCATTER.items():
         pile = [3 * piles[key] for key in zip(table[ASPECT], table[SEED], strict=True)]
-        shared = np.array(pile) if quantity in (PHI, CROSSINGS) else 0.0
+        shared = np.array(pile) if quantity in (PHI, PHI_ACTIVE, CROSSINGS) else 0.0
         table[quantity] = level[quantity] + size * (shared + generator.standard_normal(len(table)))
     table.loc[table[PROCEDURE] == STATIC, [ENERGY, HEIGHT]] = math.nan
     table.loc[table[PROCEDURE] != SHAPE, STRAIGHT] = math.nan
@@ -170,10 +172,10 @@ def put(quantity, procedure, value):
 OPPOSITES = {
     "Shape change: the centre of mass rises": put(STRAIGHT, SHAPE, 0.9),
     "Shape change: the centre of mass does not": put(HEIGHT, SHAPE, 0.9),
-    "Internal oscillation packs densest": put(PHI, EXTERNAL, 0.2),
-    "Of the three activities": put(PHI, SHAPE, 0.15),
+    "Internal oscillation packs densest": put(PHI_ACTIVE, EXTERNAL, 0.2),
+    "Of the three activities": put(PHI_ACTIVE, SHAPE, 0.15),
     "Internal oscillation: half": put(HALF, INTERNAL, 0.5),
-    "Internal oscillation: lower θ": put(PHI, INTERNAL, lambda part: 0.15 + 0.001 * part[THETA]),
+    "Internal oscillation: lower θ": put(PHI_ACTIVE, INTERNAL, lambda part: 0.15 + 0.001 * part[THETA]),
     "Shape change costs": put(ENERGY, SHAPE, 5e-6),
     "Internal oscillation: energy grows with θ": put(ENERGY, INTERNAL, lambda part: 5e-6 - 1e-7 * part[THETA]),
     "Internal oscillation: energy grows with l/w": put(ENERGY, INTERNAL, lambda part: 5e-6 - 3e-6 * part[ASPECT]),
@@ -198,10 +200,10 @@ def test_the_opposite_is_not_found(start):
 INDIFFERENT = {
     "Shape change: the centre of mass rises": put(STRAIGHT, SHAPE, 1.0),
     "Shape change: the centre of mass does not": put(HEIGHT, SHAPE, 1.0),
-    "Internal oscillation packs densest": put(PHI, EXTERNAL, lambda part: 0.16 - 0.05 * (part[ASPECT] - 0.7)),
-    "Of the three activities": put(PHI, SHAPE, lambda part: 0.14 - 0.05 * (part[ASPECT] - 0.7)),
+    "Internal oscillation packs densest": put(PHI_ACTIVE, EXTERNAL, lambda part: 0.16 - 0.05 * (part[ASPECT] - 0.7)),
+    "Of the three activities": put(PHI_ACTIVE, SHAPE, lambda part: 0.14 - 0.05 * (part[ASPECT] - 0.7)),
     "Internal oscillation: half": put(HEIGHT, INTERNAL, 1.0),
-    "Internal oscillation: lower θ": put(PHI, INTERNAL, 0.15),
+    "Internal oscillation: lower θ": put(PHI_ACTIVE, INTERNAL, 0.15),
     "Shape change costs": put(ENERGY, SHAPE, lambda part: 1e-5 * (0.5 + part[ASPECT])),
     "Internal oscillation: energy grows with θ": put(ENERGY, INTERNAL, 1e-6),
     "Internal oscillation: energy grows with l/w": put(ENERGY, INTERNAL, 1e-6),

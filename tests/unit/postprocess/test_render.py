@@ -162,6 +162,17 @@ def test_pictures_of_other_times_differ(run, tmp_path):
     assert (panel(first) != panel(last)).any(axis=2).mean() > 0.02
 
 
+def test_wall_is_drawn_as_long_as_it_is_there(tmp_path):
+    run = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=1))
+    before = panel(pixels(render_run(run, output=tmp_path / "before.png", size=SIZE)))
+    for file in ("run.json", "done.json"):
+        (run / file).write_text((run / file).read_text().replace('"shake"', '"remove-container"'))
+    after = panel(pixels(render_run(run, output=tmp_path / "after.png", size=SIZE)))
+    # Glass is darker than the white behind it, over a good part of the picture.
+    assert (after.sum(axis=2) > before.sum(axis=2) + 20).mean() > 0.1
+    assert (after == 255).all(axis=2).mean() > 0.1
+
+
 def test_drawing_twice_gives_the_same_picture(run, tmp_path):
     first = render_run(run, output=tmp_path / "a.png", size=SIZE)
     second = render_run(run, output=tmp_path / "b.png", size=SIZE)
