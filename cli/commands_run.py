@@ -141,9 +141,7 @@ def compute(
         RunError: the run failed.
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
-    from dem.scene import load_scene  # noqa: PLC0415
-
-    scene = load_scene(scene_file, settings)
+    scene = _load(scene_file, settings)
     # These lead to YADE: not before the scene is known to be good.
     from dem import run  # noqa: PLC0415
     from dem.simulation import StopRequestedError  # noqa: PLC0415
@@ -165,12 +163,25 @@ def compute(
     return 0
 
 
+def _load(scene_file: Path, settings: Sequence[str]) -> Scene:
+    """A scene whose time step is known to be good as well; errors name the file."""
+    from dem.scene import load_scene  # noqa: PLC0415
+    from dem.timestep import time_step  # noqa: PLC0415
+
+    scene = load_scene(scene_file, settings)
+    try:
+        time_step(scene)
+    except InputError as error:
+        msg = f"{scene_file}: {error}"
+        raise InputError(msg) from None
+    return scene
+
+
 def plan_scene(arguments: argparse.Namespace) -> int:
     """`smarticles plan`."""
     from dem.plan import plan  # noqa: PLC0415
-    from dem.scene import load_scene  # noqa: PLC0415
 
-    scene = load_scene(arguments.scene, arguments.set)
+    scene = _load(arguments.scene, arguments.set)
     choice = _chosen(scene, arguments)
     planned = plan(scene if choice is None else choice.scene)
     if arguments.json:

@@ -243,12 +243,13 @@ def _listing(points: Sequence[Point]) -> str:
 
 def show_status(arguments: argparse.Namespace) -> int:
     """`smarticles status`."""
+    from dem.rundir import in_use  # noqa: PLC0415
     from templates.folder import MANIFEST, count_states, open_folder, run_status  # noqa: PLC0415
 
     directory: Path = arguments.directory
     queue: dict[str, object] | None = None
     if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
-        runs = [run_status(directory)]
+        runs = [run_status(directory, active=in_use(directory))]
         name = directory.name
     else:
         folder = open_folder(directory)

@@ -31,9 +31,11 @@ class Part(BaseModel):
     @classmethod
     def _nearest(cls, key: str) -> str:
         """The way out for an unknown key: a key of this part that is spelt alike, or of the part it belongs in."""
-        here = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
+        # Most often the unit, or the second half of a name, was left out.
+        here = [field for field in cls.model_fields if field.startswith(f"{key}_")]
+        here = here or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
         if here:
-            return f"did you mean {here[0]!r}?"
+            return f"did you mean {' or '.join(map(repr, here))}?"
         for part in Part.__subclasses__():
             if "type" in part.model_fields and ("type" in cls.model_fields or part.__subclasses__()):
                 continue  # phases share keys, but one's keys do not belong in another; a base is no part of a file

@@ -54,22 +54,22 @@ class Smarticle(Part):
         return (in_hinge_range(value[0]), in_hinge_range(value[1]))
 
     @model_validator(mode="after")
-    def _barbs_apart(self) -> Self:
-        if self.tip_clearance(self.angles_deg) < 0:
-            msg = (
-                f"angles_deg: at {self.angles_deg[0]:g}° and {self.angles_deg[1]:g}° the barbs of l/w = "
-                f"{self.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
-            )
-            raise ValueError(msg)
-        return self
-
-    @model_validator(mode="after")
     def _thinner_than_long(self) -> Self:
         thickest = max(self.thickness_normal_m, self.thickness_in_plane_m)
         if thickest > self.middle_length_m / 2:
             msg = (
                 f"thickness {thickest:g} m is more than half of middle_length_m = {self.middle_length_m:g} m; "
                 "a smarticle is a chain of thin links"
+            )
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _barbs_apart(self) -> Self:
+        if self.tip_clearance(self.angles_deg) < 0:
+            msg = (
+                f"angles_deg: at {self.angles_deg[0]:g}° and {self.angles_deg[1]:g}° the barbs of l/w = "
+                f"{self.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
             )
             raise ValueError(msg)
         return self

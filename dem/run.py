@@ -194,6 +194,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
         "smarticle_mass_kg": boxes.mass,
         "solid_volume_m3": boxes.volume,
         "container_radius_m": scene.container.radius_m,
+        "container_tiers": 1 + len(scene.cylinder.upper),
         "sphere_diameter_m": particle.chain.diameter,
         "spheres_per_smarticle": len(particle.centres),
         "time_step_s": dt,

@@ -37,8 +37,9 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
         msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
         raise InputError(msg) from None
     if held and not resume:
-        what = "another run" if MANIFEST in held else f"files ({held[0]}, …)"
-        msg = f"--out {out}: holds {what} and is left as it is; choose another directory"
+        run = MANIFEST in held
+        what, way_out = ("a run", "go on with it by --resume, or ") if run else (f"files ({held[0]}, …)", "")
+        msg = f"--out {out}: holds {what} and is left as it is; {way_out}choose another directory"
         raise InputError(msg)
     if resume and MANIFEST not in held:
         msg = f"--out {out}: holds no run to resume; leave --resume out to start one"
@@ -54,6 +55,18 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
         lock.write(f"{os.getpid()}\n")
         lock.flush()
         yield
+
+
+def in_use(out: Path) -> bool:
+    """Whether a process runs in a run directory at present."""
+    try:
+        with (out / LOCK).open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False  # nobody ever did, or it is not ours to look at
+    return False
 
 
 def _is_partial(name: str) -> bool:

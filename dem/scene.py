@@ -146,6 +146,13 @@ class Scene(Part):
                     f"use e.g. {max(1, round(interval / series)) * series:g} s"
                 )
                 raise ValueError(msg)
+        sampled = self.recording.dissipation_interval_s
+        if sampled is not None and sampled > series:
+            msg = (
+                f"recording.dissipation_interval_s: {sampled:g} s is longer than series_interval_s = {series:g} s, so "
+                "that the account of energies would not close; 2e-4 s is dense enough"
+            )
+            raise ValueError(msg)
         for number, phase in enumerate(self.phases):
             if not isinstance(phase, Deposit) and phase.duration_s < series:
                 # A shape change has no key for its length; it is the sum of three.
@@ -342,12 +349,23 @@ def _child(here: Any, part: str, override: str) -> Any:
 def _first_line(error: ValidationError, data: Any) -> str:
     """The first of pydantic's errors as `key: what, value; way out`, and how many more there are."""
     # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
-    errors = [found for found in error.errors() if found["type"] != "default_factory_not_called"]
+    # Nor is a list too short whose items are there, but wrong.
+    errors = [
+        found
+        for found in error.errors()
+        if found["type"] != "default_factory_not_called" and not (found["type"] == "too_short" and found["input"])
+    ]
     first = errors[0]
     place = _key(first["loc"], data)
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "missing":
         text = "missing; it has no default"
+    elif first["type"] == "union_tag_invalid":
+        text = f"type: {first['ctx']['tag']!r} is not known; known: {first['ctx']['expected_tags']}"
+    elif first["type"] == "union_tag_not_found":
+        text = f"type: missing, got {first['input']!r}; write which one it is, see `smarticles schema`"
+    elif first["type"] == "model_attributes_type":
+        text = f"expected keys and values, {{type: …}}, got {first['input']!r}"
     elif first["type"] != "value_error":
         text = f"{text[0].lower()}{text[1:]}, got {first['input']!r}"
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
@@ -367,5 +385,5 @@ def _key(steps: Sequence[int | str], data: Any) -> str:
         if isinstance(here, Mapping):
             here = here.get(step)
         elif isinstance(here, list) and isinstance(step, int):
-            here = here[step]
+            here = here[step] if step < len(here) else None  # one that is missing
     return ".".join(keys)

@@ -252,9 +252,10 @@ def time_step(scene: Scene) -> float:
     stable = stable_step(scene)
     given = scene.fidelity.time_step_s
     if given is not None and given > stable:
+        # Half a percent less, so that the three digits are not above it.
         msg = (
-            f"fidelity.time_step_s: {given:.3g} s is above the stable step {stable:.3g} s of this smarticle at "
-            f"{scene.fidelity.stiffness_N_per_m:g} N/m; use a smaller step or leave it out"
+            f"fidelity.time_step_s: {given:g} s is above the stable step {stable:.4g} s of this smarticle at "
+            f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
         )
         raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable

@@ -152,8 +152,8 @@ def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[st
         f"active for: {times}.",
         f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}), ⟨N⟩ the links of others through a smarticle's plane: φ_f is "
         "the mean over the last 20 frames of the activity, as in the paper, ⟨N⟩ that over the frames of the relaxation "
-        "after it; static ones are means over the frames of the relaxation before it (runs of one l/w and seed agree there "
-        f"within {static_spread(runs):.2g} in φ). h0 is the mean height of the centre of mass in that relaxation. "
+        "after it; static ones are means over the frames of the relaxation before it (runs of one l/w and seed agree "
+        f"there within {static_spread(runs):.2g} in φ). h0 is the mean height of the centre of mass there. "
         "Energy: work of the motors, or of the shaken container without its own weight. Procedures are compared at "
         f"θ = {AMPLITUDE:g}°. "
         f"{told_bars(counts, 'point')}.",

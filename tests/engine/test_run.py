@@ -235,7 +235,10 @@ def test_impossible_settle_criterion_fails_with_the_residuals(
 
 @pytest.mark.parametrize(
     ("held", "what"),
-    [({"run.json": "{}", "frames.pvd": "x"}, "another run"), ({"notes.txt": "mine"}, "files (notes.txt, …)")],
+    [
+        ({"run.json": "{}", "frames.pvd": "x"}, "a run and is left as it is; go on with it by --resume, or choose"),
+        ({"notes.txt": "mine"}, "files (notes.txt, …) and is left as it is; choose"),
+    ],
 )
 def test_directory_that_holds_something_is_left_as_it_is(
     simulate: Simulate, scene_data: SceneData, tmp_path: Path, held: dict[str, str], what: str
@@ -245,7 +248,7 @@ def test_directory_that_holds_something_is_left_as_it_is(
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     answer = simulate(cases.run, scene_data(), str(tmp_path))
     assert answer["error"] == "InputError"
-    assert answer["text"] == f"--out {tmp_path}: holds {what} and is left as it is; choose another directory"
+    assert answer["text"] == f"--out {tmp_path}: holds {what} another directory"
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
 

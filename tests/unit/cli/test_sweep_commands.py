@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
 
+from dem.errors import InputError
+from dem.rundir import claimed
 from templates.expand import expand
 from templates.folder import create_folder, open_folder
 from templates.study import study_file
@@ -51,6 +53,27 @@ def test_a_sweep_needs_a_place(sweep_file: Path, smarticles: Smarticles) -> None
     said = smarticles("sweep", sweep_file)
     assert said.status == 2
     assert said.err.startswith("smarticles: error: sweep: --out DIR is missing; give a directory")
+
+
+def test_status_of_one_run_tells_whether_a_process_works_in_it(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", status="unfinished")
+
+    def state() -> str:
+        return str(json.loads(smarticles("status", run, "--json").out)["runs"][0]["state"])
+
+    assert state() == "stopped"
+    with claimed(run, resume=True):
+        assert state() == "running"
+    assert state() == "stopped"
+
+
+def test_a_run_is_not_started_over_another_one(tmp_path: Path, write_run: WriteRun) -> None:
+    run = write_run(tmp_path / "a", status="unfinished")
+    message = "holds a run and is left as it is; go on with it by --resume, or choose another directory"
+    with pytest.raises(InputError, match=message), claimed(run, resume=False):
+        pass
 
 
 def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> None:
@@ -243,7 +266,7 @@ def test_the_study_of_procedures_is_analysed(
     assert said.status == 0
     lines = said.out.splitlines()
     assert lines[0].startswith("not the full study: 11 runs instead of 87; ")
-    assert lines[1].split()[:6] == ["procedure", "θ", "l/w", "seeds", "φ_f", "⟨N⟩"]
+    assert lines[1].split()[:10] == ["procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again", "⟨N⟩"]
     assert [line.split()[0] for line in lines[2:14]] == (
         ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3
     )

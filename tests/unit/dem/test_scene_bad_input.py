@@ -132,9 +132,30 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"phases.1.type": "rest"},
-        "phases.1: input tag 'rest' found using 'type' does not match any of the expected tags: "
-        "'deposit', 'relax', 'shake', 'actuate', 'shape-change', 'internal-oscillation', "
-        "'remove-container', 'pull-hook', got {'type': 'rest', 'duration_s': 0.1}",
+        "phases.1: type: 'rest' is not known; known: 'deposit', 'relax', 'shake', 'actuate', 'shape-change', "
+        "'internal-oscillation', 'remove-container', 'pull-hook'",
+    ),
+    (
+        {"phases.1": {"duration_s": 1}},
+        "phases.1: type: missing, got {'duration_s': 1}; write which one it is, see `smarticles schema`",
+    ),
+    ({"phases.1": "relax"}, "phases.1: expected keys and values, {type: …}, got 'relax'"),
+    ({"smarticle.angles_deg": [90]}, "smarticle.angles_deg.1: missing; it has no default"),
+    ({"container": {"tiers": [{"radius_m": 0.03}]}}, "container.tiers.0.height_m: missing; it has no default"),
+    (
+        {"smarticle.thickness_in_plane_m": 0.5},
+        "smarticle: thickness 0.5 m is more than half of middle_length_m = 0.0117 m; "
+        "a smarticle is a chain of thin links",
+    ),
+    (
+        {"recording.dissipation_interval_s": 10},
+        "recording.dissipation_interval_s: 10 s is longer than series_interval_s = 0.004 s, so that the account of "
+        "energies would not close; 2e-4 s is dense enough",
+    ),
+    ({"motor": {"speed": 6}}, "motor: unknown key 'speed'; did you mean 'speed_limit_rad_per_s'?"),
+    (
+        {"contact.friction": 0.4},
+        "contact: unknown key 'friction'; did you mean 'friction_smarticle' or 'friction_wall'?",
     ),
     (
         {"recording.frame_interval_s": 0.05},

@@ -205,6 +205,8 @@ def test_given_time_step_above_the_stable_one_is_refused_with_both(make_scene: M
     with pytest.raises(InputError) as caught:
         time_step(scene)
     assert str(caught.value) == (
-        f"fidelity.time_step_s: 0.001 s is above the stable step {stable:.3g} s of this smarticle at "
-        f"{scene.fidelity.stiffness_N_per_m:g} N/m; use a smaller step or leave it out"
+        f"fidelity.time_step_s: 0.001 s is above the stable step {stable:.4g} s of this smarticle at "
+        f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
     )
+    least = float(str(caught.value).split("use at most ")[1].split(" s")[0])
+    assert 0.98 * stable < time_step(make_scene({"fidelity": {"time_step_s": least}})) <= stable
