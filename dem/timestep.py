@@ -209,7 +209,9 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
         tilt[:, 6 * barb + 3 : 6 * barb + 6], tilt[:, 9:12] = plane, -plane
         stiffness += law.pin_stiffness * apart.T @ apart
         stiffness += law.damper_stiffness * damped.T @ damped
-        stiffness += law.tilt_stiffness * tilt.T @ tilt
+        twist = np.zeros((1, 6 * LINKS))
+        twist[0, 6 * barb + 5], twist[0, 11] = 1, -1
+        stiffness += law.tilt_stiffness * tilt.T @ tilt + law.shaft_stiffness * twist.T @ twist
     return stiffness
 
 

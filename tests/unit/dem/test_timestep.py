@@ -210,3 +210,19 @@ def test_given_time_step_above_the_stable_one_is_refused_with_both(make_scene: M
     )
     least = float(str(caught.value).split("use at most ")[1].split(" s")[0])
     assert 0.98 * stable < time_step(make_scene({"fidelity": {"time_step_s": least}})) <= stable
+
+
+@pytest.mark.parametrize(("key", "value"), [("hinge_stiffness_N_per_m", 1e6), ("stiffness", 10.0)])
+def test_stiff_hinges_and_shafts_shorten_the_step(make_scene: MakeScene, key: str, value: float) -> None:
+    phases = [{"type": "deposit"}, {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}]
+    usual = make_scene({"phases": phases})
+    changed = {"fidelity": {key: value}} if key.startswith("hinge") else {"motor": {"stiffness_N_m_per_rad": value}}
+    stiff = make_scene({"phases": phases, **changed})
+    # A shaft of 3e-3 N m/rad is far from ruling the step, one of 10 blew up before it was counted.
+    assert time_step(stiff) < 0.5 * time_step(usual)
+    barb = stiff.smarticle.boxes
+    if key == "stiffness":
+        # A barb on its shaft against a middle link that is heavier: between a free and a fixed end.
+        about_hinge = barb.link_inertias[0, 2] + barb.link_masses[0] * (barb.barb_length / 2) ** 2
+        fixed = 2 / math.sqrt(value / about_hinge)
+        assert 0.2 * fixed < time_step(stiff) < fixed
