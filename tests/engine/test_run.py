@@ -42,7 +42,14 @@ def start(data: dict[str, Any], folder: Path, out: Path) -> subprocess.Popen[str
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", RUN, str(scene), str(out)]
     return subprocess.Popen(
-        command, cwd=ROOT, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        command,
+        cwd=ROOT,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        # Tests that were started in the background of a shell ignore Ctrl-C, and what they start would as well.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads in the child
     )
 
 
