@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -61,3 +62,9 @@ def make_scene(scene_data: Callable[..., dict[str, Any]]) -> Callable[..., Scene
         return parse_scene(scene_data(changes), source="scene.yaml")
 
     return make
+
+
+def pytest_configure() -> None:
+    """Let Ctrl-C through: a shell that starts tests in the background ignores it for them and all that they start."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -48,8 +48,6 @@ def start(data: dict[str, Any], folder: Path, out: Path) -> subprocess.Popen[str
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        # Tests that were started in the background of a shell ignore Ctrl-C, and what they start would as well.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads in the child
     )
 
 
