@@ -7,10 +7,6 @@ from `done.json`. Machines are noisy: quote the exponent and the ratios, and rep
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dem.scene import dump_scene, parse_scene
+from benchmarks.child import last_phase_cost, run_child
 from postprocess import link_crossings
 
 REPEATS = 3
@@ -41,39 +37,24 @@ class Cost:
 def shake_cost(folder: Path, *, count: int, fidelity: str, seed: int) -> Cost:
     """Pour and shake `count` smarticles, l/w = 0.7, and time the shaking."""
     widening = (count / PAPER_COUNT) ** 0.5
-    scene = parse_scene(
-        {
-            "schema_version": 1,
-            "name": f"bench N = {count}",
-            "seed": seed,
-            "count": count,
-            "container": {"radius_m": PAPER_RADIUS * widening},
-            "fidelity": fidelity,
-            "phases": [
-                {
-                    "type": "deposit",
-                    "per_layer": max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2)),
-                },
-                {"type": "shake", "duration_s": 0.4},
-            ],
-        },
-        source="benchmarks",
-    )
+    data = {
+        "schema_version": 1,
+        "name": f"bench N = {count}",
+        "seed": seed,
+        "count": count,
+        "container": {"radius_m": PAPER_RADIUS * widening},
+        "fidelity": fidelity,
+        "phases": [
+            {
+                "type": "deposit",
+                "per_layer": max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2)),
+            },
+            {"type": "shake", "duration_s": 0.4},
+        ],
+    }
     name = f"{fidelity}-{count}-{seed}"
-    path = folder / f"{name}.yaml"
-    path.write_text(dump_scene(scene))
-    command = [sys.executable, "-m", "cli", "run", str(path), "--out", str(folder / name)]
-    child = subprocess.Popen(command, env={**os.environ, "OMP_NUM_THREADS": "1"})
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
-        sys.exit(f"benchmark run {name} failed with status {os.waitstatus_to_exitcode(status)}")
-    phase = json.loads((folder / name / "done.json").read_text())["phases"][-1]
-    return Cost(
-        count,
-        fidelity,
-        phase["wall_s"] / (phase["end_s"] - phase["start_s"]),
-        usage.ru_maxrss / 1024,
-    )
+    usage = run_child(folder, name, data)
+    return Cost(count, fidelity, last_phase_cost(folder / name), usage.ru_maxrss / 1024)
 
 
 def crossings_cost(count: int) -> float:

@@ -7,10 +7,6 @@ ratios: they are taken in one go on one machine.
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +14,7 @@ from typing import Any
 
 import pandas as pd
 
-from dem.scene import dump_scene, parse_scene
+from benchmarks.child import last_phase_cost, run_child
 
 ACTIVITIES: Mapping[str, Mapping[str, Any]] = {
     "shaken": {"type": "shake"},
@@ -29,28 +25,20 @@ ACTIVITIES: Mapping[str, Mapping[str, Any]] = {
 
 def phase_cost(folder: Path, *, activity: str, count: int, fidelity: str, seconds: float, seed: int) -> float:
     """Wall seconds per simulated second of one activity of `count` smarticles, l/w = 0.7."""
-    scene = parse_scene(
-        {
-            "schema_version": 1,
-            "name": f"{activity}, N = {count}",
-            "seed": seed,
-            "count": count,
-            "fidelity": fidelity,
-            "phases": [
-                {"type": "deposit", "per_layer": 10},
-                {**ACTIVITIES[activity], "duration_s": seconds},
-            ],
-        },
-        source="benchmarks",
-    )
+    data = {
+        "schema_version": 1,
+        "name": f"{activity}, N = {count}",
+        "seed": seed,
+        "count": count,
+        "fidelity": fidelity,
+        "phases": [
+            {"type": "deposit", "per_layer": 10},
+            {**ACTIVITIES[activity], "duration_s": seconds},
+        ],
+    }
     name = f"{activity.replace(' ', '-')}-{fidelity}-{count}-{seed}"
-    path = folder / f"{name}.yaml"
-    path.write_text(dump_scene(scene))
-    command = [sys.executable, "-m", "cli", "run", str(path), "--out", str(folder / name)]
-    subprocess.run(command, env={**os.environ, "OMP_NUM_THREADS": "1"}, check=True)
-    phase = json.loads((folder / name / "done.json").read_text())["phases"][-1]
-    cost: float = phase["wall_s"] / (phase["end_s"] - phase["start_s"])
-    return cost
+    run_child(folder, name, data)
+    return last_phase_cost(folder / name)
 
 
 def main() -> None:

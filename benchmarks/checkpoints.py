@@ -7,21 +7,19 @@ on a shared machine tells of the neighbours; waiting for the disk (3.5 MB per ch
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
-from dem.scene import dump_scene, parse_scene
+from benchmarks.child import run_child
 
 INTERVAL_S = 0.4  # the default of `recording.checkpoint_interval_s`
 
 
-def scene_text(*, interval_s: float | None, count: int, shake_s: float) -> str:
+def scene_data(*, interval_s: float | None, count: int, shake_s: float) -> dict[str, Any]:
     """The paper's pile at l/w = 0.7, draft; shaken long enough for several checkpoints of the full pile."""
-    data = {
+    return {
         "schema_version": 1,
         "name": "checkpoints",
         "seed": 1,
@@ -31,18 +29,11 @@ def scene_text(*, interval_s: float | None, count: int, shake_s: float) -> str:
         "recording": {"checkpoint_interval_s": interval_s},
         "phases": [{"type": "deposit"}, {"type": "shake", "duration_s": shake_s}],
     }
-    return dump_scene(parse_scene(data, source="benchmarks"))
 
 
-def processor_s(folder: Path, name: str, text: str) -> float:
+def processor_s(folder: Path, name: str, data: dict[str, Any]) -> float:
     """Processor time of one run [s], loading of YADE included."""
-    scene = folder / f"{name}.yaml"
-    scene.write_text(text, encoding="utf-8")
-    command = [sys.executable, "-m", "cli", "run", str(scene), "--out", str(folder / name)]
-    child = subprocess.Popen(command, env={**os.environ, "OMP_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
-        sys.exit(f"benchmark run {name} failed with status {os.waitstatus_to_exitcode(status)}")
+    usage = run_child(folder, name, data)
     return usage.ru_utime + usage.ru_stime
 
 
@@ -60,7 +51,7 @@ def main() -> None:
                 interval_s: processor_s(
                     Path(scratch),
                     f"{pair}-{interval_s}",
-                    scene_text(interval_s=interval_s, count=arguments.count, shake_s=arguments.shake),
+                    scene_data(interval_s=interval_s, count=arguments.count, shake_s=arguments.shake),
                 )
                 # Turn about: what comes second finds the caches warm.
                 for interval_s in ((INTERVAL_S, None) if pair % 2 else (None, INTERVAL_S))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeGuard
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BARBS = 2
+
+ActiveFraction = Annotated[
+    float, Field(gt=0, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]")
+]
+Offsets = Annotated[
+    Literal["none", "random"],
+    Field(
+        description="none: all smarticles move together; random: each begins at another point of the period, drawn "
+        "from the scene's seed"
+    ),
+]
 
 
 def _length_of_motions(data: dict[str, Any]) -> float:
@@ -42,14 +53,8 @@ class Actuate(Part):
     duration_s: Duration = Field(
         default_factory=_length_of_motions, description="length of the phase [s]; default: that of the motion"
     )
-    active_fraction: float = Field(
-        1.0, gt=0, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]"
-    )
-    offsets: Literal["none", "random"] = Field(
-        "none",
-        description="none: all smarticles move together; random: each begins at another point of the period, drawn "
-        "from the scene's seed",
-    )
+    active_fraction: ActiveFraction = 1.0
+    offsets: Offsets = "none"
 
     @model_validator(mode="after")
     def _one_motion_each(self) -> Self:
@@ -156,14 +161,8 @@ class InternalOscillation(Part):
         description="swing by θ · 0.7/(l/w) instead, so that the arc of a barb's tip is the same for every l/w",
     )
     duration_s: Duration = Field(5.0, description="length of the phase [s]")
-    active_fraction: float = Field(
-        1.0, gt=0, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]"
-    )
-    offsets: Literal["none", "random"] = Field(
-        "none",
-        description="none: all smarticles move together; random: each begins at another point of the period, drawn "
-        "from the scene's seed",
-    )
+    active_fraction: ActiveFraction = 1.0
+    offsets: Offsets = "none"
 
     def spelled_out(self, smarticle: Smarticle, motor: Motor) -> Actuate:
         """The phase as the motion that it is short for."""

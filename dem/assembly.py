@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.clump import Body, clump
-from dem.errors import RunError
+from dem.errors import refuse
 from dem.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.library import Yade
 from dem.particle import LINKS, Particle
@@ -124,27 +124,16 @@ class Assembly:
                 velocities.reshape(shape),
                 spins.reshape(shape),
             )
-        arms = np.einsum("nij,nkj->nki", rotations, self._arms)
-        shared = np.repeat(spins[:, None], LINKS, axis=1)
-        return State(
-            boxes,
-            positions[:, None] + arms,
-            np.einsum("nij,nkjm->nkim", rotations, self._turns),
-            velocities[:, None] + np.cross(shared, arms),
-            shared,
-        )
+        return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
 
     def _check(self, table: Array) -> None:
         broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
-        if broken.any():
-            per = len(table) // self.count
-            ids = np.unique(np.flatnonzero(broken) // per)
-            shown = ", ".join(map(str, ids[:5])) + (", …" if len(ids) > 5 else "")
-            msg = (
-                f"at t = {self._yade.omega.time:.4f} s: {len(ids)} smarticle(s) ({shown}): positions or velocities are "
-                "no numbers, the simulation has blown up; lower fidelity.time_step_fraction"
-            )
-            raise RunError(msg)
+        refuse(
+            broken.reshape(self.count, 1 if self.hinges is None else LINKS).any(axis=1),
+            self._yade.omega.time,
+            "positions or velocities are no numbers, the simulation has blown up",
+            "lower fidelity.time_step_fraction",
+        )
 
     # -- welding -----------------------------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """The fidelity that a scene needs, from what was measured: a limit of the error, of the hours, or of both.
 
 The table is the one that `smarticles accuracy` writes: what each named fidelity errs by on some scene, and how its
-wall times compare with the planned ones. The hours are those planned for this scene, times that ratio.
+processor times compare with the planned wall times. The hours are those planned for this scene, times that ratio.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SHIPPED = Path(__file__).resolve().parent.parent / "results" / "accuracy" / "wor
 """The table that is used unless another one is given; there only if it was measured."""
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
-_KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "wall over expected [-]"
+_KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
 _ASPECT, _COUNT, _ACTIVITY, _REFERENCE = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
 _ERRORS = {"φ_0": "phi_0 error", "φ_f": "phi_f error"}
 _COLUMNS = (
@@ -58,7 +58,7 @@ class Measured:
         fidelity: its name.
         errors: of φ_0 and φ_f.
         seeds: how many runs it was measured with.
-        ratio: measured wall time over the planned one [1].
+        ratio: measured processor time over the planned wall time [1].
         is_reference: whether the errors of the others are against it.
     """
 

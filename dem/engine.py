@@ -19,7 +19,7 @@ from dem.assembly import SMARTICLE_MATERIAL, Assembly
 from dem.container import WALL_MATERIAL, Cylinder
 from dem.errors import RunError
 from dem.fixtures import Fixtures
-from dem.hinges import HINGE_MATERIAL, HingeLaw
+from dem.hinges import HINGE_MATERIAL, HingeLaw, Hinges
 from dem.hooks import Cross
 from dem.library import load_yade
 from dem.motor import MotorLaw, Motors
@@ -164,7 +164,6 @@ class Engine:
         """Take hold of YADE's objects; loading replaces them all."""
         engines, classes = self._omega.engines, self._yade.classes
         self.fixtures.bind()
-        self._floor = self.fixtures.floor
         self._shaker = next((e for e in engines if isinstance(e, classes.HarmonicMotionEngine)), None)
         self._collider = next(e for e in engines if isinstance(e, classes.InsertionSortCollider))
         self._assembly.bind()
@@ -296,7 +295,8 @@ class Engine:
         angles = self._hinges.angles()
         if self.motors is None:
             self.motors = Motors(self._motor_law, angles)
-        self.motors.engage(angles)
+        else:
+            self.motors.engage(angles)
 
     def weld(self) -> None:
         """Make each smarticle one rigid body of the shape that it has: motors that hold, at a third of the cost."""
@@ -314,7 +314,7 @@ class Engine:
         self._hinges.set_torques(torques, self.time_step)
 
     @property
-    def _hinges(self) -> Any:
+    def _hinges(self) -> Hinges:
         assert self._assembly.hinges is not None
         return self._assembly.hinges
 
@@ -338,12 +338,12 @@ class Engine:
     @property
     def floor(self) -> float:
         """Height of the container's floor [m]."""
-        return float(self._floor.pos[2])
+        return float(self.fixtures.floor.pos[2])
 
     @property
     def container_velocity(self) -> float:
         """Vertical velocity of the container [m/s]."""
-        return float(self._floor.vel[2])
+        return float(self.fixtures.floor.vel[2])
 
     def state(self) -> State:
         """Poses and velocities of all smarticles."""

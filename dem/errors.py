@@ -1,5 +1,7 @@
 """The two ways in which the project says no."""
 
+from typing import Any
+
 
 class InputError(ValueError):
     """The input is wrong: a scene, a file, a command line. Exit status 2."""
@@ -7,3 +9,22 @@ class InputError(ValueError):
 
 class RunError(RuntimeError):
     """A run failed: unstable, not settled, out of disk. Exit status 1."""
+
+
+def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
+    """Stop a run where some smarticles are not as they must be.
+
+    Args:
+        concerned: (N,) bool array, true for those.
+        time: simulated time [s].
+        cause: what is wrong with them.
+        way_out: what to do about it.
+
+    Raises:
+        RunError: cause, smarticles concerned, time and the way out.
+    """
+    if concerned.any():
+        ids = concerned.nonzero()[0]
+        shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
+        msg = f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}"
+        raise RunError(msg)

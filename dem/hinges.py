@@ -86,14 +86,6 @@ def add_nodes(yade: Yade, count: int) -> list[int]:
     return ids
 
 
-@dataclass(frozen=True)
-class Shape:
-    """What YADE works out of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m]."""
-
-    twists: Array
-    gaps: Array
-
-
 class Hinges:
     """All hinges of N articulated smarticles.
 
@@ -112,7 +104,8 @@ class Hinges:
         self._pins: list[Any] = []
         self._shafts: list[tuple[Any, Any]] = []
         self._ends: list[tuple[Any, Any]] = []
-        self._loaded: Shape | None = None
+        # What YADE works out of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
+        self._loaded: tuple[Array, Array] | None = None
         self._looks = 0
 
     def make(self) -> None:
@@ -171,19 +164,17 @@ class Hinges:
         """A step has been made: YADE knows the bonds' shape again."""
         self._loaded = None
 
-    def _shape(self) -> Shape:
+    def _twists(self) -> Array:
+        return np.array([geom.twist for geom, _ in self._shafts]) if self._loaded is None else self._loaded[0]
+
+    def _gaps(self) -> Array:
         if self._loaded is not None:
-            return self._loaded
-        return Shape(
-            np.array([geom.twist for geom, _ in self._shafts]),
-            2 * NODE_RADIUS - np.array([geom.penetrationDepth for geom in self._pins]),
-        )
+            return self._loaded[1]
+        return 2 * NODE_RADIUS - np.array([geom.penetrationDepth for geom in self._pins])
 
     def angles(self) -> Array:
         """(N, 2) angles of the barbs [rad], from the twist of the shafts."""
-        known = self._loaded
-        twists = np.array([geom.twist for geom, _ in self._shafts]) if known is None else known.twists
-        result: Array = self._angles + SENSE * twists.reshape(-1, 2)
+        result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
         return result
 
     def set_torques(self, torques: Array, time_step: float) -> None:
@@ -220,11 +211,11 @@ class Hinges:
 
     def gaps(self) -> Array:
         """(N, 2) how far the two links of each hinge are apart [m]."""
-        return self._shape().gaps.reshape(-1, 2)
+        return self._gaps().reshape(-1, 2)
 
     def elastic_energy(self) -> float:
         """Energy in pins, dampers and shafts that tilt [J]; not in their twist, which belongs to the motors."""
-        dampers = sum(phys.shearForce.squaredNorm() for _, phys in self._shafts) / self._law.damper_stiffness
+        dampers = self._damper_forces() / self._law.damper_stiffness
         pins = self._law.pin_stiffness * (self.gaps() ** 2).sum()
         tilts = sum(phys.moment_bending.squaredNorm() for _, phys in self._shafts) / self._law.tilt_stiffness
         return float(0.5 * (pins + dampers + tilts))
@@ -237,19 +228,21 @@ class Hinges:
         """
         # YADE relaxes a damper's force by this share in each step.
         share = time_step * self._law.damper_stiffness / self._law.damper_viscosity
-        forces = sum(phys.shearForce.squaredNorm() for _, phys in self._shafts)
-        return float(forces * (2 * share - share**2) / (2 * self._law.damper_stiffness))
+        return self._damper_forces() * (2 * share - share**2) / (2 * self._law.damper_stiffness)
+
+    def _damper_forces(self) -> float:
+        """Sum of the squares of all dampers' forces [N²]."""
+        return float(sum(phys.shearForce.squaredNorm() for _, phys in self._shafts))
 
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restored` needs."""
-        shape = self._shape()
         return {
             "nodes": self._nodes,
             "angles": self._angles.tolist(),
             # Not in YADE's own file.
-            "twists": shape.twists.tolist(),
-            "gaps": shape.gaps.tolist(),
+            "twists": self._twists().tolist(),
+            "gaps": self._gaps().tolist(),
             "looks": self._looks,
         }
 
@@ -258,6 +251,6 @@ class Hinges:
         """The hinges of a simulation that was loaded."""
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
-        hinges._loaded = Shape(np.array(memory["twists"]), np.array(memory["gaps"]))
+        hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])
         hinges._looks = memory["looks"]
         return hinges

@@ -340,3 +340,8 @@ class Recording(Part):
         description="simulated time between checkpoints [s]; null: none. At a checkpoint the run reloads itself, so "
         "that a resumed run has the same bits; runs with other intervals differ in their last bits",
     )
+
+    @property
+    def energies(self) -> bool:
+        """Whether energies are recorded: asked for, or needed by the account."""
+        return self.energy or self.dissipation_interval_s is not None

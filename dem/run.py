@@ -16,7 +16,6 @@ import h5py
 import meshio
 import numpy as np
 
-from dem.actuation import actuated
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
@@ -124,7 +123,16 @@ def _run(
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()
-        mark_done(out, {"time_s": engine.time, "steps": engine.steps, "wall_s": simulation.wall, "phases": phases})
+        mark_done(
+            out,
+            {
+                "time_s": engine.time,
+                "steps": engine.steps,
+                "wall_s": simulation.wall,
+                "cpu_s": simulation.cpu,
+                "phases": phases,
+            },
+        )
     except (RunError, KeyboardInterrupt, StopRequestedError) as error:
         status = "failed" if isinstance(error, RunError) else "interrupted"
         cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -210,8 +218,8 @@ def _build_engine(scene: Scene, dt: float) -> Engine:
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
         shaken=any(isinstance(phase, Shake) for phase in scene.phases),
-        hinges=(hinge_law(scene), motor_law(scene)) if any(actuated(phase) for phase in scene.phases) else None,
-        track_work=scene.recording.energy or scene.recording.dissipation_interval_s is not None,
+        hinges=(hinge_law(scene), motor_law(scene)) if scene.actuates else None,
+        track_work=scene.recording.energies,
         dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
         hooks=None if scene.hooks is None else scene.hooks.crosses,
     )
@@ -248,7 +256,7 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
             radius,
             {"scene_sha256": scene_hash(scene), "seed": scene.seed},
             motors=engine.hinged,
-            energy=scene.recording.energy or scene.recording.dissipation_interval_s is not None,
+            energy=scene.recording.energies,
             ledger=scene.recording.dissipation_interval_s is not None,
             hooks=scene.hooks is not None,
             release=any(isinstance(phase, RemoveContainer) for phase in scene.phases),

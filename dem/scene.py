@@ -17,6 +17,7 @@ from typing import Any, Literal, Self
 import yaml
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from dem.actuation import actuated
 from dem.actuation_checks import check_actuation
 from dem.container import Cylinder
 from dem.errors import InputError
@@ -215,6 +216,11 @@ class Scene(Part):
             return self.motor.torque_limit_N_m
         paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
         return paper.mass * self.gravity_m_per_s2 * paper.middle_length
+
+    @property
+    def actuates(self) -> bool:
+        """Whether a phase moves the barbs, so that there are hinges and motors."""
+        return any(actuated(phase) for phase in self.phases)
 
     @cached_property
     def particle(self) -> Particle:

@@ -53,6 +53,8 @@ class Simulation:
     _performed: list[dict[str, Any]] = field(default_factory=list)
     _spent: float = 0.0
     _began: float = field(default_factory=time.monotonic)
+    _cpu_spent: float = 0.0
+    _cpu_began: float = field(default_factory=time.process_time)
     _stop_requested: bool = False
 
     def run(self) -> list[dict[str, Any]]:
@@ -81,7 +83,13 @@ class Simulation:
         if self._stage is None:
             self._stage = begin(self.scene, self._phase)
             self._performed.append(
-                {"index": self._phase, "type": phase.type, "start_s": self.engine.time, "wall_s": -self.wall}
+                {
+                    "index": self._phase,
+                    "type": phase.type,
+                    "start_s": self.engine.time,
+                    "wall_s": -self.wall,
+                    "cpu_s": -self.cpu,
+                }
             )
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
@@ -99,6 +107,7 @@ class Simulation:
             self._advance()
         entry["end_s"] = self.engine.time
         entry["wall_s"] += self.wall
+        entry["cpu_s"] += self.cpu
         self.log.info(
             "phase %d %s ended at t = %.4f s after %.1f s of wall time",
             self._phase,
@@ -141,6 +150,7 @@ class Simulation:
             "target": self._target,
             "performed": self._performed,
             "wall_s": self.wall,
+            "cpu_s": self.cpu,
         }
         write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
         if self._stop_requested:
@@ -174,11 +184,17 @@ class Simulation:
         self._stage.memory = dict(state["stage"])
         self._performed = [dict(entry) for entry in state["performed"]]
         self._spent, self._began = state["wall_s"], time.monotonic()
+        self._cpu_spent, self._cpu_began = state["cpu_s"], time.process_time()
 
     @property
     def wall(self) -> float:
         """Wall time spent [s], in the processes before this one too."""
         return self._spent + time.monotonic() - self._began
+
+    @property
+    def cpu(self) -> float:
+        """Processor time spent [s], in the processes before this one too."""
+        return self._cpu_spent + time.process_time() - self._cpu_began
 
     def _request_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True

@@ -34,8 +34,17 @@ class State:
     link_spins: Array
 
     @classmethod
-    def rigid(cls, boxes: Boxes, positions: Array, rotations: Array, velocities: Array, spins: Array) -> State:
-        """Smarticles that are rigid bodies of the boxes' own shape.
+    def rigid(
+        cls,
+        boxes: Boxes,
+        positions: Array,
+        rotations: Array,
+        velocities: Array,
+        spins: Array,
+        *,
+        shapes: tuple[Array, Array] | None = None,
+    ) -> State:
+        """Smarticles that are rigid bodies.
 
         Args:
             boxes: one smarticle.
@@ -43,9 +52,12 @@ class State:
             rotations: (N, 3, 3) body frame to laboratory frame [1].
             velocities: (N, 3) of the centres of mass [m/s].
             spins: (N, 3) angular velocities [rad/s].
+            shapes: (N, 3, 3) centres [m] and (N, 3, 3, 3) frames of the links in the body frame, each smarticle
+                its own; by default all have the boxes' shape.
         """
-        arms = np.einsum("nij,kj->nki", rotations, boxes.link_centres)
-        turned = np.einsum("nij,kjm->nkim", rotations, boxes.link_rotations)
+        centres, frames = shapes or (boxes.link_centres[None], boxes.link_rotations[None])
+        arms = np.einsum("nij,nkj->nki", rotations, centres)
+        turned = np.einsum("nij,nkjm->nkim", rotations, frames)
         shared = np.repeat(spins[:, None], LINKS, axis=1)
         return cls(boxes, positions[:, None] + arms, turned, velocities[:, None] + np.cross(shared, arms), shared)
 

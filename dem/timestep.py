@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
-from dem.actuation import actuated
 from dem.errors import InputError
 from dem.hinges import HingeLaw
 from dem.particle import LINKS, Boxes, Particle
@@ -240,7 +239,7 @@ def stable_step(scene: Scene) -> float:
     """Largest stable time step [s] of a scene, articulated where a phase actuates."""
     law = contact_law(scene)
     stable = stable_time_step(scene.particle, law)
-    if any(actuated(phase) for phase in scene.phases):
+    if scene.actuates:
         stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
     return stable
 
@@ -261,6 +260,5 @@ def time_step(scene: Scene) -> float:
         )
         raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
-    driven = any(actuated(phase) for phase in scene.phases)
-    whole = scene.fidelity.control_interval_s if driven else scene.recording.series_interval_s
+    whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
     return whole / max(1, math.ceil(whole / wanted * (1 - 1e-12)))

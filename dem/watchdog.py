@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.container import Cylinder
-from dem.errors import RunError
+from dem.errors import refuse
 from dem.state import State
 
 Array = NDArray[np.float64]
@@ -49,13 +48,13 @@ class Watchdog:
         speeds = np.linalg.norm(state.velocities, axis=1)
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
-        self._refuse(
+        refuse(
             broken,
             time,
             "a position or velocity that is no number",
             "lower fidelity.time_step_fraction",
         )
-        self._refuse(
+        refuse(
             speeds > self.speed,
             time,
             f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
@@ -64,7 +63,7 @@ class Watchdog:
         )
         if gaps is not None:
             # A gap that is no number is not below the limit either.
-            self._refuse(
+            refuse(
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
@@ -74,18 +73,10 @@ class Watchdog:
         if raised is not None:
             radii, height = self.cylinder.radii(heights - raised), self.cylinder.height + raised
         outside = (np.hypot(positions[:, 0], positions[:, 1]) > radii) | (heights < 0)
-        self._refuse(outside, time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
-        self._refuse(
+        refuse(outside, time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
+        refuse(
             heights > height,
             time,
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
             "raise container.height_m or shake less",
         )
-
-    @staticmethod
-    def _refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
-        if concerned.any():
-            ids = np.flatnonzero(concerned)
-            shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
-            msg = f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}"
-            raise RunError(msg)

@@ -148,7 +148,7 @@ def _named(table: pd.DataFrame) -> Reference:
 
 def told_rungs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of work and precision for a person to read."""
-    header = ["knob", "value", "seeds", "wall s per s", "± SE"]
+    header = ["knob", "value", "seeds", "cpu s per s", "± SE"]
     for symbol in SYMBOLS.values():
         header += [symbol, "error %"]
     more = {RESIDUAL: "energy residual", GAP: "joint gap [m]"}

@@ -86,5 +86,5 @@ def _draw_panel(axes: Axes, name: str, table: pd.DataFrame) -> None:
             axes.errorbar(part[COST] * shift, part[errors], xerr=wide, linestyle="none", color=colour, elinewidth=0.5)
             draw_means(axes, part[COST] * shift, part[errors], high, look=look, label=label)
     axes.set_xscale("log")
-    axes.set_xlabel("wall time per simulated time [s/s]")
+    axes.set_xlabel("processor time per simulated time [s/s]")
     axes.set_ylabel(f"error of {_SYMBOLS[name]} [%]")

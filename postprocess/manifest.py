@@ -28,6 +28,7 @@ class PhaseRecord:
         start: Simulated time at which it began [s]; None unless the run is done.
         end: Simulated time at which it ended [s]; None unless the run is done.
         wall_time: Wall time it took [s]; None unless the run is done.
+        cpu_time: Processor time it took [s]; None unless the run is done and says so.
     """
 
     index: int
@@ -35,6 +36,7 @@ class PhaseRecord:
     start: float | None = None
     end: float | None = None
     wall_time: float | None = None
+    cpu_time: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,6 +257,8 @@ def _timed(phases: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseRecor
             start=phase.number("start_s"),
             end=phase.number("end_s"),
             wall_time=phase.number("wall_s"),
+            # Runs of before it was measured do not say.
+            cpu_time=phase.number("cpu_s") if "cpu_s" in phase.data else None,
         )
         for phase in done.phases()
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import cases
@@ -264,3 +265,17 @@ def own_contacts(engine: Engine) -> int:
         for i in engine._omega.interactions
         if i.isReal
     )
+
+
+def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> dict[str, Any]:
+    """A smarticle whose barbs are at an angle [rad] saves itself and loads what it saved, and its motors look again."""
+    scene, engine = floating(data, spin=spin)
+    engine.articulate()
+    for _ in drive(engine, scene, 0.25, lambda _: [angle, angle]):
+        pass
+    path = Path(folder) / "saved.yade"
+    saved = (engine._hinges.angles(), engine._hinges.gaps(), engine._hinges.torques())
+    engine.load(path, engine.save(path))
+    loaded = (engine._hinges.angles(), engine._hinges.gaps(), engine._hinges.torques())
+    engine.actuate(np.full((1, 2), angle), scene.fidelity.control_interval_s)
+    return {"saved": saved, "loaded": loaded, "looked": engine._hinges.torques(), "state": engine.state().angles}

@@ -230,14 +230,17 @@ def slide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, A
     }
 
 
-def _pour(engine: Engine, scene: Scene, count: int) -> None:
+def pour(
+    engine: Engine, scene: Scene, count: int, obstacles: np.ndarray | None = None, radius: float | None = None
+) -> None:
+    """A layer just above the floor, clear of the centres of spheres (n, 3) that are there."""
     poses = place_layer(
         scene.particle,
         count=count,
-        radius=scene.container.radius_m,
+        radius=scene.container.radius_m if radius is None else radius,
         bottom=1e-4,
         height=2e-2,
-        obstacles=np.empty((0, 3)),
+        obstacles=np.empty((0, 3)) if obstacles is None else obstacles,
         rng=np.random.default_rng(scene.seed),
     )
     engine.add(poses)
@@ -246,7 +249,7 @@ def _pour(engine: Engine, scene: Scene, count: int) -> None:
 def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict[str, Any]:
     scene = load(data)
     engine = build(scene)
-    _pour(engine, scene, count)
+    pour(engine, scene, count)
     engine.advance(round(settle / engine.time_step))
     writer = SeriesWriter(Path(), scene.container.radius_m, {})
     writer.sample(engine, engine.state(), 0)
@@ -307,7 +310,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     """The momentum balance against the contact force of every step, in a pile that is thrown about."""
     scene = load(data)
     engine = build(scene, shaken=True)
-    _pour(engine, scene, count)
+    pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
     phase = next(p for p in scene.phases if p.type == "shake")
     engine.shake(amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz)

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import FLAT, add, advance_watched, load
+from cases import FLAT, add, advance_watched, load, pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine import Engine
 from dem.phases import begin
-from dem.placement import place_layer
 from dem.scene import Scene
 from dem.series import SeriesWriter
 from dem.timestep import contact_law, time_step
@@ -132,16 +131,7 @@ def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, An
 def _pour(engine: Engine, scene: Scene, count: int, settle: float) -> None:
     """A small pile, damped to rest."""
     hooks = [cross.obstacles(2 * scene.particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
-    poses = place_layer(
-        scene.particle,
-        count=count,
-        radius=engine.cylinder.inner_radius,
-        bottom=1e-4,
-        height=2e-2,
-        obstacles=np.concatenate([np.empty((0, 3)), *hooks]),
-        rng=np.random.default_rng(scene.seed),
-    )
-    engine.add(poses)
+    pour(engine, scene, count, np.concatenate([np.empty((0, 3)), *hooks]), engine.cylinder.inner_radius)
     damped(engine, 0.3)
     engine.advance(round(settle / engine.time_step))
     damped(engine, 0.0)

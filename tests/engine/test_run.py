@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -321,19 +321,9 @@ def test_ctrl_c_leaves_a_usable_run_directory(worker: Any, scene_data: SceneData
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 192 KiB: room for the start of a run. Needs root."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=192k", "none", str(folder)]
-    try:
-        mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
-    except OSError:
-        mounted = False
-    if not mounted:
-        pytest.skip("a small tmpfs cannot be mounted here (needs root)")
-    yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+def small_disk(mount_disk: Callable[[str], Path]) -> Path:
+    """A file system of 192 KiB: room for the start of a run."""
+    return mount_disk("192k")
 
 
 def test_disk_that_fills_up_ends_the_run_with_one_line(

@@ -14,7 +14,8 @@ from dem.plan import plan
 from dem.scene import Scene, parse_scene
 
 HEADER = (
-    "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,wall over expected [-],"
+    "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,"
+    "processor time over expected wall time [-],"
     "phi_0 error [%],phi_0 error 95 % [%],phi_f error [%],phi_f error 95 % [%],verdict"
 )
 TABLE = f"""\

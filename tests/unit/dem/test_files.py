@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -94,19 +94,9 @@ def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def tiny_disk(tmp_path: Path) -> Iterator[Path]:
-    """A real file system of 64 KiB, on its own. Needs root; the tests above do not."""
-    folder = tmp_path / "tiny"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)]
-    try:
-        mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
-    except OSError:
-        mounted = False
-    if not mounted:
-        pytest.skip("a small tmpfs cannot be mounted here (needs root)")
-    yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+def tiny_disk(mount_disk: Callable[[str], Path]) -> Path:
+    """A file system of 64 KiB. Needs root; the tests above do not."""
+    return mount_disk("64k")
 
 
 def test_text_on_a_really_full_disk(tiny_disk: Path) -> None:

@@ -153,7 +153,9 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
             active = kind not in ("deposit", "relax")
             done = part if active else float(any(row[4] > 0 for row in rows))
             rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
-        timed.append({"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": run.wall_s})
+        timed.append(
+            {"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": run.wall_s, "cpu_s": run.wall_s}
+        )
         start, previous = end, target
     sets = "".join(f'<DataSet timestep="{t!r}" file="{n}"/>' for t, n in map(_plain, entries))
     (directory / "frames.pvd").write_text(f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>')

@@ -260,7 +260,7 @@ def test_the_figure_has_a_marker_per_knob_and_a_band(ladder):
         "time-step",
         "restitution (sensitivity)",
         "seed-to-seed band, 95 %",
-        "wall time per simulated time [s/s]",
+        "processor time per simulated time [s/s]",
     ):
         assert word in svg
     with Image.open(report.files["accuracy.png"]) as image:
