@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.commands_run import add_scene
-from cli.commands_study import compute_and_analyse, told_results
+from cli.commands_study import compute_and_analyse
 from cli.commands_sweep import add_slots, expected_wall_s, folder_of
 from cli.layout import columns
 from cli.parsing import Commands, positive_number
+from cli.studies import told_results
 from dem.errors import InputError
 
 if TYPE_CHECKING:

@@ -5,125 +5,19 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.commands_sweep import add_slots, compute, make_folder, refuse_failures
-from cli.layout import columns
 from cli.parsing import Commands
+from cli.studies import STUDIES, Analysis
 from dem.errors import InputError
 
 if TYPE_CHECKING:
     from templates.folder import Entry, Folder
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Analysis:
-    """What is to be analysed.
-
-    Args:
-        runs: run directories, finished or not.
-        output: directory for the results.
-        note: how the runs differ from the full study.
-        command: the command line.
-        quick: whether this is the quick variant, whose analysis takes seconds.
-    """
-
-    runs: Sequence[Path]
-    output: Path
-    note: str
-    command: str
-    quick: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Study:
-    """What is done with the runs of a study.
-
-    Args:
-        analyse: measures and writes; gives the text for the terminal.
-        pictured: values of the run that a picture is drawn of.
-    """
-
-    analyse: Callable[[_Analysis], str]
-    pictured: Mapping[str, object]
-
-
-def _analyse_gravish(analysis: _Analysis) -> str:
-    from postprocess.gravish import analyse_gravish  # noqa: PLC0415
-    from postprocess.packing import DEFINITIONS  # noqa: PLC0415
-    from postprocess.study_runs import QUICK_DEFINITIONS  # noqa: PLC0415
-
-    report = analyse_gravish(
-        analysis.runs,
-        analysis.output,
-        note=analysis.note,
-        command=analysis.command,
-        definitions=QUICK_DEFINITIONS if analysis.quick else tuple(DEFINITIONS),
-    )
-    header = ["φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"]
-    rows = [
-        [
-            row["stage"],
-            row["aspect ratio [-]"],
-            row["seeds [-]"],
-            f"{row['phi [-]']:.4f}",
-            f"{row['phi 95 % [-]']:.4f}",
-            f"{row['phi Gravish [-]']:.4f}",
-            f"{row['deviation [%]']:+.1f}",
-        ]
-        for row in report.deviations.to_dict("records")
-    ]
-    told = [f"{v.question} {v.answer.upper()}\n    {v.evidence}" for v in report.verdicts]
-    return told_results(columns(header, rows), told, report.files, analysis.output)
-
-
-def _analyse_sensitivity(analysis: _Analysis, *, study: str) -> str:
-    from postprocess.sensitivity import COMPARED, analyse_sensitivity, told_change, told_value  # noqa: PLC0415
-
-    report = analyse_sensitivity(
-        analysis.runs, analysis.output, study=study, note=analysis.note, command=analysis.command
-    )
-    header = ["variant", "seeds"]
-    for name in COMPARED:
-        header += [name, "change %"]
-    rows = []
-    for row in report.summary.to_dict("records"):
-        cells: list[object] = [row["variant"], row["seeds [-]"]]
-        for name, quantity in COMPARED.items():
-            cells.append(told_value(row[f"{quantity} [-]"], row[f"{quantity} 95 % [-]"], name))
-            mark = " *" if row[f"{name} clear"] else ""
-            cells.append(told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"]) + mark)
-        rows.append(cells)
-    told = [f"Changes are against {report.baseline}; * beyond the error at 95 %."]
-    return told_results(columns(header, rows), told, report.files, analysis.output)
-
-
-def _analyse_procedures(analysis: _Analysis) -> str:
-    from postprocess.procedures import analyse_procedures, told_points  # noqa: PLC0415
-
-    report = analyse_procedures(analysis.runs, analysis.output, note=analysis.note, command=analysis.command)
-    told = ["Means over seeds ± standard error.", ""]
-    told += [f"{found.verdict.upper()}: {found.paper}\n    {found.ours}" for found in report.findings]
-    return told_results(columns(*told_points(report.points)), told, report.files, analysis.output)
-
-
-def told_results(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
-    """What an analysis says at the terminal: its table, its sentences, and where the rest is."""
-    figures = [f"figure: {path}" for path in files.values() if path.suffix == ".png"]
-    return "\n".join([table, "", *told, "", *figures, f"tables, and the origin of every number: {output}"])
-
-
-_STUDIES = {
-    "gravish": _Study(analyse=_analyse_gravish, pictured={"l_over_w": 0.7}),
-    "procedures": _Study(analyse=_analyse_procedures, pictured={"procedure": "shape-change", "l_over_w": 0.7}),
-    **{
-        name: _Study(analyse=partial(_analyse_sensitivity, study=name), pictured={"variant": "draft"})
-        for name in ("sensitivity", "sensitivity-section")
-    },
-}
+_ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in STUDIES.items())
 
 
 def add(commands: Commands) -> None:
@@ -132,19 +26,8 @@ def add(commands: Commands) -> None:
         "study",
         run_study,
         summary="a shipped sweep: run, measure, compare with its reference",
-        text="""
-gravish: U-shapes of several aspect ratios l/w, poured into a cylinder and shaken at Γ = 2, 30 Hz,
-against the packing fractions that Gravish et al. measured (PRL 108, 208001). --quick takes minutes
-and prints how it differs from the full study, which takes hours.
-
-sensitivity: what the packing fraction before and after shaking owes to restitution, friction, damping,
-stiffness and sphere diameter, one at a time, at l/w = 0.7. sensitivity-section: the same for pitch and
-rows of spheres, up to the true section.
-
-procedures: shape change, external and internal oscillation of smarticles of several l/w, the latter with
-several amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): packing fraction,
-entanglement, energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that
-the hinge cannot reach at a small l/w are left out. --quick takes minutes.
+        text=_ABOUT
+        + """
 
 DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
 same command again goes on where it stopped. `smarticles status DIR` tells how far it is, and
@@ -158,8 +41,8 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
   smarticles study procedures --out procedures --analyse     what the finished runs say so far
 """,
     )
-    study.add_argument("name", choices=tuple(_STUDIES), metavar="NAME", help=", ".join(_STUDIES))
-    study.add_argument("--quick", action="store_true", help="the variant that takes minutes; gravish, procedures")
+    study.add_argument("name", choices=tuple(STUDIES), metavar="NAME", help=", ".join(STUDIES))
+    study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
     study.add_argument(
         "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
     )
@@ -172,7 +55,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     """`smarticles study`."""
     from templates.study import study_file  # noqa: PLC0415
 
-    study = _STUDIES[arguments.name]
+    study = STUDIES[arguments.name]
     file = study_file(arguments.name, quick=arguments.quick)
     changed = _changed(arguments.name, file, arguments.fidelity)
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
@@ -181,7 +64,7 @@ def run_study(arguments: argparse.Namespace) -> int:
 
     def analyse(runs: Sequence[Path], output: Path) -> str:
         return study.analyse(
-            _Analysis(runs=runs, output=output, note=note, command=arguments.command_line, quick=arguments.quick)
+            Analysis(runs=runs, output=output, note=note, command=arguments.command_line, quick=arguments.quick)
         )
 
     return compute_and_analyse(folder, arguments, analyse, study.pictured)

@@ -16,10 +16,11 @@ from types import MappingProxyType
 import pandas as pd
 
 from postprocess import procedures_figures
+from postprocess.findings import CRITERION, Finding, findings_table
 from postprocess.manifest import RunManifest
 from postprocess.origin import Origin, Reference, make_folder
 from postprocess.packing import DEFINITIONS
-from postprocess.procedures_findings import CRITERION, Finding, findings, findings_table
+from postprocess.procedures_findings import findings
 from postprocess.procedures_runs import (
     ACTIVE,
     AMPLITUDE,

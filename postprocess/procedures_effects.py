@@ -2,46 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 
+from postprocess.findings import Verdict, all_of, judge, negative, told
 from postprocess.procedures_runs import AMPLITUDE, INTERNAL, PROCEDURE, THETA
 from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import ASPECT, SEED
-
-Verdict = Literal["found", "not found", "not resolved", "no data"]
-Effect = SeedMean | Slope
-
-
-def judge(effect: Effect, *, threshold: float = 0.0) -> Verdict:
-    """Whether an effect is clearly above a threshold."""
-    if math.isnan(effect.value):
-        return "no data"
-    if effect.value - effect.half_width > threshold:
-        return "found"
-    return "not found" if effect.value + effect.half_width < threshold else "not resolved"
-
-
-def all_of(verdicts: Sequence[Verdict]) -> Verdict:
-    """Of a finding that says several things: one that is clearly wrong is enough to refuse it."""
-    for verdict in ("not found", "no data", "not resolved"):
-        if verdict in verdicts:
-            return verdict
-    return "found"
-
-
-def negative(effect: Effect) -> SeedMean:
-    """The same effect with the other sign."""
-    return SeedMean(
-        value=-effect.value,
-        standard_error=effect.standard_error,
-        half_width=effect.half_width,
-        count=effect.count,
-    )
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
@@ -72,14 +41,6 @@ def against_aspect(part: pd.DataFrame, quantity: str) -> Slope:
 def against_amplitude(part: pd.DataFrame, quantity: str) -> Slope:
     """Slope against θ within runs of the same aspect ratio and seed [per degree]."""
     return slope_within(part[THETA], part[quantity], list(zip(part[ASPECT], part[SEED], strict=True)))
-
-
-def told(effect: Effect, digits: int = 4, unit: str = "") -> str:
-    """`+0.0123 ± 0.0011 (n = 15)`: a signed number with its standard error."""
-    if math.isnan(effect.value):
-        return "no data"
-    error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"
-    return f"{effect.value:+.{digits}g}{error}{unit} (n = {effect.count})"
 
 
 def by_aspect(part: pd.DataFrame, quantity: str, form: str) -> str:

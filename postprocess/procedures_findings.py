@@ -9,24 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
+from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.procedures_effects import (
-    Verdict,
     against_amplitude,
     against_aspect,
-    all_of,
     by_aspect,
     compared,
-    judge,
-    negative,
     of_procedure,
     paired,
     pairs,
-    told,
 )
 from postprocess.procedures_runs import (
     AMPLITUDE,
@@ -56,30 +51,6 @@ EARLY = 0.24
 ENERGY_FACTOR = 10.0
 """How many times the energy of the internal oscillation the shape change costs at least [-]."""
 
-CRITERION = (
-    "A finding is found where it holds beyond the 95 % half-width (Student's t) of the scatter over pairs or runs, "
-    "not found where the opposite does, not resolved in between; where nothing holds at all, "
-    "one verdict in forty is still `found`"
-)
-"""How verdicts come about, for footers."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """A finding of the paper and what our runs say of it.
-
-    Attributes:
-        paper: What the paper found.
-        ours: Our numbers; errors are standard errors.
-        verdict: Ours.
-        criterion: What "found" requires.
-    """
-
-    paper: str
-    ours: str
-    verdict: Verdict
-    criterion: str
-
 
 def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
@@ -107,12 +78,6 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
         _peaks_with_amplitude,
     )
     return tuple(finding(table) for finding in judges)
-
-
-def findings_table(found: Sequence[Finding]) -> pd.DataFrame:
-    """One row per finding."""
-    columns = {"paper": "finding in the paper", "ours": "ours", "verdict": "verdict", "criterion": "criterion"}
-    return pd.DataFrame([[getattr(one, name) for name in columns] for one in found], columns=list(columns.values()))
 
 
 def _rises(table: pd.DataFrame) -> Finding:

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from postprocess.procedures_findings import findings, findings_table
+from postprocess.findings import findings_table
+from postprocess.procedures_findings import findings
 from postprocess.procedures_runs import (
     CROSSINGS,
     ENERGY,
