@@ -37,7 +37,7 @@ against wall time. Knobs:
 
   time-step    time step over the stable one: 0.9, 0.45, 0.225
   stiffness    of contacts: ×1, ×2, ×4; the time step follows
-  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows
+  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows
   restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
   control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate

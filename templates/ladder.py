@@ -54,6 +54,7 @@ _PITCHES = (1.3, 1.0, 0.5)
 _RESTITUTIONS = (0.2, 0.5, 0.7, 0.9)
 _CONTROL_INTERVALS = (4e-4, 2e-4, 1e-4)
 _ROWS = {2: "two", 3: "three", 4: "four"}
+_MOST_ROWS = max(_ROWS)
 _SWEEP, _TEMPLATE = Path("accuracy.yaml"), Path("accuracy.yaml.j2")
 
 
@@ -312,10 +313,16 @@ def _with(values: Sequence[float], own: float) -> list[float]:
 
 
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
-    """Rows of spheres by the scene's own rule of their diameter, the true section last."""
+    """Rows of spheres by the scene's own rule of their diameter, the true section last.
+
+    A scene of several rows is compared with what is finer yet: its pitch halved, its rows doubled.
+    """
     shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in _PITCHES]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
     own = {key: base[key] for key in shapes[0]}
+    if own["rows"] > 1:
+        finer = [{**own, "pitch": own["pitch"] / 2}, {**own, "rows": min(2 * own["rows"], _MOST_ROWS)}]
+        shapes += [shape for shape in finer if not _same(shape, own)]
     if not any(_same(own, shape) for shape in shapes):
         shapes.append(own)
     shapes.sort(key=lambda shape: (shape["rows"], -shape["pitch"]))

@@ -125,6 +125,18 @@ def test_a_diameter_by_hand_is_a_rung_of_its_own(tmp_path: Path) -> None:
     assert ladder.scenes["pitch-1.3"].fidelity.diameter_m is None
 
 
+def test_a_scene_of_two_rows_is_compared_with_what_is_finer_yet(tmp_path: Path) -> None:
+    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=reference"), source="scene.yaml", knobs=["section"])
+    assert labels(ladder, "section")[3:] == [
+        ("two rows", BASE),
+        ("two rows of pitch 0.5", "two-rows-of-pitch-0.5"),
+        ("four rows", "four-rows"),
+    ]
+    spheres = [len(ladder.scenes[name].particle.centres) for _, name in labels(ladder, "section")[3:]]
+    assert spheres[1] > 1.9 * spheres[0]
+    assert spheres[2] == 2 * spheres[0]
+
+
 def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
     ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
     assert ladder.knobs == tuple(KNOBS)
