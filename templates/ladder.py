@@ -184,7 +184,9 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     for knob in chosen:
         for value, unit, name, changes in _rungs(knob, base):
             values = {**base, **changes}
-            setting = next((known for known, there in settings.items() if _same(there, values)), name)
+            # The name of a fidelity decides nothing by itself.
+            knobs_only = {key: value for key, value in values.items() if key != "base"}
+            setting = next((known for known, there in settings.items() if _same(knobs_only, there)), name)
             if setting not in settings:
                 try:
                     scenes[setting] = _scene(template, scene, values, source)

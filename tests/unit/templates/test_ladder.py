@@ -137,6 +137,11 @@ def test_a_scene_of_two_rows_is_compared_with_what_is_finer_yet(tmp_path: Path) 
     assert spheres[2] == 2 * spheres[0]
 
 
+def test_settings_that_differ_in_nothing_but_their_name_run_once(tmp_path: Path) -> None:
+    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=standard"), source="scene.yaml")
+    assert labels(ladder, "fidelity") == [("draft", "draft"), ("standard", BASE), ("reference", "two-rows")]
+
+
 def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
     ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
     assert ladder.knobs == tuple(KNOBS)
