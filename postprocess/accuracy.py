@@ -53,7 +53,7 @@ TABLE = "work_precision"
 """Name of the table, without suffix."""
 
 _STUDY = "accuracy"
-_DIGITS = {"phi_0": 4, "phi_f": 4, "crossings": 2}
+_FORMS = {"phi_0": ".4f", "phi_f": ".4f", "height": ".2e", "crossings": ".2f"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -158,7 +158,7 @@ def told_rungs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         cells = [str(row[KNOB]), label(row), str(row[SEEDS])]
         cells += [_number(row[COST], ".3g"), _number(row[marked(COST, "SE")], ".2g")]
         for name, column in COMPARED.items():
-            value, error, form = row[column], row[marked(column, "SE")], f".{_DIGITS[name]}f"
+            value, error, form = row[column], row[marked(column, "SE")], _FORMS[name]
             cells.append(_number(value, form) + (f" ± {error:{form}}" if math.isfinite(error) else ""))
             cells.append("reference" if row[VERDICT] == IS_REFERENCE else told_error(row, name))
             if row[f"{name} resolved"]:
@@ -179,13 +179,15 @@ def _footer(origin: Origin, runs: pd.DataFrame, table: pd.DataFrame) -> tuple[st
     return origin.footer(
         f"l/w = {runs[ASPECT].iloc[0]:g}, {origin.manifests[0].count} smarticles, "
         f"{told_seeds(runs, counts, 'setting')}; activity: {runs[ACTIVITY].iloc[0]}.",
-        f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}); φ_0 before the first activity, φ_f and ⟨N⟩ at the end of the "
-        f"last one, means over the last {LAST_FRAMES} frames or fewer of the phase.",
-        "Errors are relative to the knob's reference, their bands 95 % over seeds by Welch; an error within its band "
+        f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}); φ_0 and h_0, the height of the centre of mass, before the "
+        "first activity, φ_f and ⟨N⟩ at the end of the last one, means over the last "
+        f"{LAST_FRAMES} frames or fewer of the phase.",
+        "Errors are relative to the knob's reference, their bands 95 % by Student's t, with the scatter from seed "
+        "to seed pooled over all settings; an error within its band "
         "is not resolved. Where a knob changes nothing at all, one error in twenty is still beyond its band; "
         f"{judged} were judged. ± without a name is a standard error over seeds.",
-        "Wall time: of the last activity over its simulated time, one thread per run, as it ran; runs side by side "
-        "slow each other.",
+        "Processor time: of the last activity over its simulated time, one thread per run; runs side by side slow "
+        "each other's memory.",
     )
 
 

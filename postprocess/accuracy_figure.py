@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 2.6
-_SYMBOLS = {"phi_0": r"$\phi_0$", "phi_f": r"$\phi_\mathrm{f}$", "crossings": r"$\langle N\rangle$"}
+_WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 4.6
+_COLUMNS = 2
+_SYMBOLS = {"phi_0": r"$\phi_0$", "phi_f": r"$\phi_\mathrm{f}$", "height": "$h_0$", "crossings": r"$\langle N\rangle$"}
 _LOOKS = (
     ("o", figures.BLUE),
     ("s", figures.ORANGE),
@@ -46,7 +47,7 @@ def draw(path: Path, *, table: pd.DataFrame, footer: Sequence[str]) -> list[Path
     """
     with figures.style():
         figure = figures.blank_figure(_WIDTH, _HEIGHT)
-        panels = figure.subplots(1, len(COMPARED), sharex=True)
+        panels = list(figure.subplots(math.ceil(len(COMPARED) / _COLUMNS), _COLUMNS, sharex=True).flat)
         for axes, name in zip(panels, COMPARED, strict=True):
             _draw_panel(axes, name, table)
         shown = {

@@ -18,7 +18,7 @@ from dem.errors import InputError
 from postprocess.manifest import RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import marked
-from postprocess.seeds import SeedMean, mean_over_seeds, relative_difference
+from postprocess.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
 from postprocess.series import read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, VARIANT, duration, variant_of
 
@@ -38,11 +38,20 @@ RESIDUAL, GAP = "energy residual over dissipated [-]", "largest joint gap [m]"
 TIME_STEP, SPHERES = "time step [s]", "spheres per smarticle [-]"
 
 COMPARED: Mapping[str, str] = MappingProxyType(
-    {"phi_0": f"phi_0 {DEFINITION} [-]", "phi_f": f"phi_f {DEFINITION} [-]", "crossings": "crossings [-]"}
+    {
+        "phi_0": f"phi_0 {DEFINITION} [-]",
+        "phi_f": f"phi_f {DEFINITION} [-]",
+        "height": "com height [m]",
+        "crossings": "crossings [-]",
+    }
 )
-"""What errors are told of: its name, and its column in the table of runs."""
+"""What errors are told of: its name, and its column in the table of runs.
 
-SYMBOLS: Mapping[str, str] = MappingProxyType({"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"})
+A packing fraction hangs on one smarticle near the top; the height of the centre of mass, before the first activity, is
+a mean over all of them and scatters half as much.
+"""
+
+SYMBOLS: Mapping[str, str] = MappingProxyType({"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩"})
 
 RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "reference", "unknown"
 """Verdicts: an error beyond its seed-to-seed band; none that is; the reference itself; no band, or no runs."""
@@ -110,6 +119,7 @@ def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str,
         COMPARED["phi_0"]: before[f"{phi} [-]"],
         COMPARED["phi_f"]: after[f"{phi} [-]"],
         f"phi_f {DEFINITION} SE in run [-]": after[f"{phi} SE [-]"],
+        COMPARED["height"]: before["com height [m]"],
         COMPARED["crossings"]: after["crossings mean [-]"],
         **_of_series(run),
         "escaped at the end [-]": after["escaped [-]"],
@@ -148,16 +158,17 @@ def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
 
     Returns:
         The table; `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `… error
-        95 % [%]` its seed-to-seed band, the half-width of the interval of confidence by Welch; of the reference itself
-        the error is 0 by definition and the band that of its own mean. `… resolved` says whether the error is beyond
-        the band, `verdict` whether any is.
+        95 % [%]` its seed-to-seed band: the half-width of the interval of confidence by Student's t, with the scatter
+        pooled over all settings. The error of the reference itself is 0 by definition, its band that of its own mean.
+        `… resolved` says whether the error is beyond the band, `verdict` whether any is.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
+    scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
     rows = []
     for knob in dict.fromkeys(rung.knob for rung in rungs):
         own = [rung for rung in rungs if rung.knob == knob]
         reference = _reference(own, {name: len(group) for name, group in groups.items()})
-        rows += [_rung_row(rung, groups, reference) for rung in own]
+        rows += [_rung_row(rung, groups, reference, scatters) for rung in own]
     return pd.DataFrame(rows)
 
 
@@ -171,7 +182,9 @@ def _reference(rungs: Sequence[Rung], seeds: Mapping[str, int]) -> Rung | None:
     return None
 
 
-def _rung_row(rung: Rung, groups: Mapping[str, pd.DataFrame], reference: Rung | None) -> dict[str, object]:
+def _rung_row(
+    rung: Rung, groups: Mapping[str, pd.DataFrame], reference: Rung | None, scatters: Mapping[str, Scatter]
+) -> dict[str, object]:
     group = groups[rung.setting]
     row: dict[str, object] = {
         KNOB: rung.knob,
@@ -192,7 +205,7 @@ def _rung_row(rung: Rung, groups: Mapping[str, pd.DataFrame], reference: Rung | 
     for name, column in COMPARED.items():
         mean = mean_over_seeds(group[column])
         base = mean_over_seeds([] if reference is None else groups[reference.setting][column])
-        error, band = _error(mean, base, own=own)
+        error, band = _error(mean, base, scatters[name], own=own)
         row[f"{name} error [%]"], row[f"{name} error 95 % [%]"] = error, band
         row[f"{name} resolved"] = not own and abs(error) > band
         clear.append(row[f"{name} resolved"])
@@ -201,10 +214,8 @@ def _rung_row(rung: Rung, groups: Mapping[str, pd.DataFrame], reference: Rung | 
     return row
 
 
-def _error(mean: SeedMean, reference: SeedMean, *, own: bool) -> tuple[float, float]:
+def _error(mean: SeedMean, reference: SeedMean, scatter: Scatter, *, own: bool) -> tuple[float, float]:
     """Error and its band [%]."""
-    if own:
-        scale = 100 / abs(reference.value) if reference.value else math.nan
-        return 0.0, scale * reference.half_width
-    found = relative_difference(mean, reference)
-    return found.value, found.half_width
+    found = relative_difference(mean, reference, scatter=scatter)
+    # The reference's own band is that of its mean alone: a difference of two such means has √2 of it.
+    return (0.0, found.half_width / math.sqrt(2)) if own else (found.value, found.half_width)

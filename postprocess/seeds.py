@@ -7,7 +7,7 @@ Runs that differ in their seed alone are independent, unlike successive frames o
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,39 @@ class Difference:
         return abs(self.value) > self.half_width
 
 
+@dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """Standard deviation from seed to seed that several settings share.
+
+    Attributes:
+        value: In the unit of what scatters; NaN where no setting has two seeds.
+        freedom: Degrees of freedom that it is known with.
+    """
+
+    value: float
+    freedom: int
+
+
+def pooled_scatter(groups: Iterable[Sequence[float]]) -> Scatter:
+    """The scatter within groups, taken as the same in all of them.
+
+    A few seeds of each of many settings know it far better than those of one setting alone.
+
+    Args:
+        groups: Values of each setting; NaN are left out.
+
+    Example:
+        >>> pooled_scatter([[1.0, 3.0], [10.0, 12.0], [5.0]])
+        Scatter(value=1.4142135623730951, freedom=2)
+    """
+    known = [array[~np.isnan(array)] for array in (np.asarray(group, dtype=np.float64) for group in groups)]
+    freedom = sum(len(group) - 1 for group in known if len(group))
+    if not freedom:
+        return Scatter(value=math.nan, freedom=0)
+    squares = sum(float(((group - group.mean()) ** 2).sum()) for group in known if len(group))
+    return Scatter(value=math.sqrt(squares / freedom), freedom=freedom)
+
+
 def mean_over_seeds(values: Sequence[float]) -> SeedMean:
     """Mean of independent values with its error.
 
@@ -81,12 +114,13 @@ def mean_over_seeds(values: Sequence[float]) -> SeedMean:
     )
 
 
-def difference(mean: SeedMean, baseline: SeedMean) -> Difference:
-    """A mean less another one, by Welch: their spreads need not be equal.
+def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
+    """A mean less another one.
 
     Args:
         mean: Over its seeds.
         baseline: Over its own; the two are taken as independent.
+        scatter: That of a single seed, common to both; None: each has its own, by Welch.
 
     Returns:
         The difference, in the means' unit.
@@ -95,6 +129,11 @@ def difference(mean: SeedMean, baseline: SeedMean) -> Difference:
         Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
     """
     value = mean.value - baseline.value
+    if scatter is not None:
+        if not (mean.count and baseline.count and scatter.freedom):
+            return Difference(value=value, half_width=math.nan)
+        error = scatter.value * math.sqrt(1 / mean.count + 1 / baseline.count)
+        return Difference(value=value, half_width=_quantile(scatter.freedom) * error)
     squares = mean.standard_error**2, baseline.standard_error**2
     if math.isnan(sum(squares)):
         return Difference(value=value, half_width=math.nan)
@@ -105,9 +144,9 @@ def difference(mean: SeedMean, baseline: SeedMean) -> Difference:
     return Difference(value=value, half_width=_quantile(freedom) * math.sqrt(total))
 
 
-def relative_difference(mean: SeedMean, baseline: SeedMean) -> Difference:
+def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
     """`difference` in per cent of the baseline's mean, which is itself taken as exact; NaN where that is 0."""
-    change = difference(mean, baseline)
+    change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress, ttest_ind
 
-from postprocess.seeds import Difference, difference, mean_over_seeds, slope_within
+from postprocess.seeds import Difference, Scatter, difference, mean_over_seeds, pooled_scatter, slope_within
 
 
 def test_half_width_is_student_t():
@@ -33,6 +33,38 @@ def test_one_seed_has_no_error_and_none_has_no_mean():
     assert math.isnan(alone.standard_error)
     assert math.isnan(alone.half_width)
     assert math.isnan(mean_over_seeds([]).value)
+
+
+def test_pooled_scatter_of_two_settings_is_that_of_students_test():
+    first, second = [4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 5.0]
+    scatter = pooled_scatter([first, second, [9.0], [math.nan]])
+    found = difference(mean_over_seeds(first), mean_over_seeds(second), scatter=scatter)
+    interval = ttest_ind(first, second).confidence_interval(0.95)
+    assert scatter.freedom == 5
+    assert found.value - found.half_width == pytest.approx(interval.low)
+    assert found.value + found.half_width == pytest.approx(interval.high)
+
+
+def test_pooled_scatter_covers_the_truth_with_a_single_seed_each():
+    random = np.random.default_rng(7)
+    covered = []
+    for _ in range(2000):
+        others = random.normal(1.0, 0.1, (5, 3))
+        pair = [mean_over_seeds([value]) for value in random.normal(1.0, 0.1, 2)]
+        change = difference(pair[0], pair[1], scatter=pooled_scatter(others))
+        covered.append(not change.clear)
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.015)
+
+
+def test_without_two_seeds_of_any_setting_there_is_no_scatter():
+    scatter = pooled_scatter([[1.0], [2.0]])
+    assert math.isnan(scatter.value)
+    assert scatter.freedom == 0
+    assert math.isnan(
+        difference(
+            mean_over_seeds([1.0]), mean_over_seeds([2.0]), scatter=Scatter(value=math.nan, freedom=0)
+        ).half_width
+    )
 
 
 def test_difference_is_welchs():
