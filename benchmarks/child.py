@@ -1,4 +1,4 @@
-"""A run in a process of its own, on one thread: what every benchmark of the simulator times."""
+"""A run in a process of its own, on one thread unless told: what every benchmark of the simulator times."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from typing import Any
 from dem.scene import dump_scene, parse_scene
 
 
-def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_rusage:
+def run_child(folder: Path, name: str, data: dict[str, Any], *, threads: int = 1) -> resource.struct_rusage:
     """Run a scene into `folder/name`; ends the benchmark if it fails.
 
     Args:
         folder: where the scene file and the run directory go.
         name: of both.
         data: the scene, as in a scene file.
+        threads: of the engine.
 
     Returns:
         What the process used, loading of YADE included.
@@ -27,7 +28,8 @@ def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_
     path = folder / f"{name}.yaml"
     path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")
     command = [sys.executable, "-m", "cli", "run", str(path), "--out", str(folder / name)]
-    child = subprocess.Popen(command, env={**os.environ, "OMP_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL)
+    command += ["--threads", str(threads)]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(child.pid, 0)
     if status:
         sys.exit(f"benchmark run {name} failed with status {os.waitstatus_to_exitcode(status)}")

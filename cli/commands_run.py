@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.parsing import Commands, Parser, add_json, positive_number
+from cli.parsing import Commands, Parser, add_json, positive_int, positive_number
 from cli.stopping import TO_BE_CONTINUED
 from dem.errors import InputError
 
@@ -44,6 +45,14 @@ directory that holds something else is never touched.""",
         "--resume",
         action="store_true",
         help="go on in DIR, which holds an unfinished run of this scene, from its last checkpoint",
+    )
+    run.add_argument(
+        "--threads",
+        type=positive_int,
+        default=1,
+        metavar="N",
+        help="threads of YADE; default 1, whatever OMP_NUM_THREADS says: with more, two runs differ in their last "
+        "bits, and threads that find no free core make a run many times slower",
     )
 
     plan = commands.add(
@@ -118,11 +127,24 @@ def add_scene(parser: Parser) -> None:
 
 def run_scene(arguments: argparse.Namespace) -> int:
     """`smarticles run`."""
-    return compute(arguments.scene, arguments.out, arguments, settings=arguments.set, resume=arguments.resume)
+    return compute(
+        arguments.scene,
+        arguments.out,
+        arguments,
+        settings=arguments.set,
+        resume=arguments.resume,
+        threads=arguments.threads,
+    )
 
 
 def compute(
-    scene_file: Path, out: Path, arguments: argparse.Namespace, *, settings: Sequence[str] = (), resume: bool
+    scene_file: Path,
+    out: Path,
+    arguments: argparse.Namespace,
+    *,
+    settings: Sequence[str] = (),
+    resume: bool,
+    threads: int = 1,
 ) -> int:
     """Run a scene in this process.
 
@@ -132,6 +154,7 @@ def compute(
         arguments: of the command, for the manifest.
         settings: keys that differ from the file, `KEY=VALUE`.
         resume: go on in a run directory that holds an unfinished run.
+        threads: of the engine; only one gives the same bits again.
 
     Returns:
         Exit status: 0, or 75 where SIGUSR1 stopped the run at a checkpoint.
@@ -142,6 +165,8 @@ def compute(
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
     scene = _load(scene_file, settings)
+    # YADE reads it when it is loaded, and a batch system may have set it to all cores of the node.
+    os.environ["OMP_NUM_THREADS"] = str(threads)
     # These lead to YADE: not before the scene is known to be good.
     from dem import run  # noqa: PLC0415
     from dem.simulation import StopRequestedError  # noqa: PLC0415

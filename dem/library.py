@@ -58,6 +58,15 @@ def yade_version() -> str:
     return str(importlib.import_module("yade.config").version)
 
 
+def yade_threads() -> int:
+    """Threads that YADE runs with here: OMP_NUM_THREADS, or 1 where nobody set it.
+
+    Raises:
+        RunError: YADE is not installed.
+    """
+    return int(load_yade().omega.numThreads)
+
+
 def import_yade() -> Any:
     """The distribution's YADE, imported into this process.
 

@@ -22,7 +22,7 @@ from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
 from dem.hooks import PullHook
-from dem.library import yade_version
+from dem.library import yade_threads, yade_version
 from dem.motor import MotorLaw
 from dem.parts import Shake
 from dem.phases import shake_amplitude
@@ -85,7 +85,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(out / MANIFEST, manifest(scene, dt=dt, command=command, yade=yade))
+            write_json(out / MANIFEST, manifest(scene, dt=dt, command=command, yade=yade, threads=yade_threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
@@ -172,7 +172,7 @@ def _keep_series(simulation: Simulation) -> None:
         return
 
 
-def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, Any]:
+def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) -> dict[str, Any]:
     """The content of `run.json`: what made the run, and the numbers that measures need."""
     particle, boxes = scene.particle, scene.smarticle.boxes
     return {
@@ -191,7 +191,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
             "h5py": h5py.__version__,
             "meshio": meshio.__version__,
         },
-        "threads": 1,
+        "threads": threads,
         "fidelity": scene.fidelity.base,
         "count": scene.count,
         "aspect_ratio": scene.smarticle.aspect_ratio,

@@ -15,7 +15,8 @@ def start(scene: Path, out: Path) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "cli", "run", str(scene), "--out", str(out)]
     if (out / "run.json").exists():
         command.append("--resume")
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    # A batch system may say so; a run has one thread all the same, and the same bits.
+    environment = {**os.environ, "OMP_NUM_THREADS": "2"}
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -52,3 +53,22 @@ def test_bad_scenes_are_status_2_before_anything_is_made(
     assert line.startswith("smarticles: error: ")
     assert message in line
     assert not out.exists()
+
+
+@pytest.mark.parametrize(("options", "threads"), [([], "1"), (["--threads", "3"], "3")])
+def test_threads_are_those_asked_for_whatever_the_batch_system_says(
+    scene_file: Path,
+    smarticles: Smarticles,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    threads: str,
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "64")
+    seen: list[str] = []
+
+    def run_scene(*_: object, **__: object) -> None:
+        seen.append(os.environ["OMP_NUM_THREADS"])
+
+    monkeypatch.setattr("dem.run.run_scene", run_scene)
+    assert smarticles("run", scene_file, "--out", scene_file.parent / "out", *options).status == 0
+    assert seen == [threads]
