@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from postprocess import figures
 from postprocess.accuracy_runs import COMPARED, COST, IS_REFERENCE, KNOB, VERDICT
@@ -87,5 +88,8 @@ def _draw_panel(axes: Axes, name: str, table: pd.DataFrame) -> None:
             axes.errorbar(part[COST] * shift, part[errors], xerr=wide, linestyle="none", color=colour, elinewidth=0.5)
             draw_means(axes, part[COST] * shift, part[errors], high, look=look, label=label)
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("processor time per simulated time [s/s]")
     axes.set_ylabel(f"error of {_SYMBOLS[name]} [%]")
