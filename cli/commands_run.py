@@ -63,8 +63,8 @@ directory that holds something else is never touched.""",
 Shows the phases, what acts in each and why, time step, spheres and the expected wall time.
 
 With --max-error, --max-hours or both, the fidelity is chosen instead of the scene's own: the cheapest
-whose measured error of the packing fractions φ_0 and φ_f is within the one, or the finest within the
-other. What was measured stands in a table that `smarticles accuracy` writes.""",
+whose measured error of the packing fractions φ_0 and φ_f (or of what --of says) is within the one, or
+the finest within the other. What was measured stands in a table that `smarticles accuracy` writes.""",
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference
@@ -78,7 +78,12 @@ other. What was measured stands in a table that `smarticles accuracy` writes."""
         "--max-error",
         type=positive_number,
         metavar="E",
-        help="relative error of φ_0 and φ_f against the reference fidelity, e.g. 0.03",
+        help="largest relative error against the reference fidelity, e.g. 0.03",
+    )
+    plan.add_argument(
+        "--of",
+        metavar="NAME,…",
+        help="what --max-error is of: phi_0, phi_f, crossings (⟨N⟩); default: phi_0,phi_f",
     )
     plan.add_argument("--max-hours", type=positive_number, metavar="H", help="wall time of the run on one core [h]")
     plan.add_argument(
@@ -221,14 +226,22 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     """The fidelity that --max-error and --max-hours ask for; None without them."""
-    from dem.choice import choose, read_table  # noqa: PLC0415
+    from dem.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
 
     if arguments.max_error is None and arguments.max_hours is None:
-        if arguments.table is not None:
-            msg = f"--table {arguments.table}: is for --max-error or --max-hours; give one of them"
-            raise InputError(msg)
+        for option, value in (("--table", arguments.table), ("--of", arguments.of)):
+            if value is not None:
+                msg = f"{option} {value}: is for --max-error or --max-hours; give one of them"
+                raise InputError(msg)
         return None
-    return choose(scene, read_table(arguments.table), max_error=arguments.max_error, max_hours=arguments.max_hours)
+    of = PACKING if arguments.of is None else tuple(word.strip() for word in arguments.of.split(","))
+    for word in of:
+        if word not in QUANTITIES:
+            msg = f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}"
+            raise InputError(msg)
+    return choose(
+        scene, read_table(arguments.table, of=of), max_error=arguments.max_error, max_hours=arguments.max_hours
+    )
 
 
 def print_schema(_: argparse.Namespace) -> int:

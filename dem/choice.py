@@ -24,19 +24,24 @@ SHIPPED = Path(__file__).resolve().parent.parent / "results" / "accuracy" / "wor
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
 _ASPECT, _COUNT, _ACTIVITY, _REFERENCE = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
-_ERRORS = {"φ_0": "phi_0 error", "φ_f": "phi_f error"}
+QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
+"""What a limit of the error can be of: names of columns and of `--of`, and symbols."""
+
+PACKING = ("phi_0", "phi_f")
+"""What it is of unless said otherwise."""
+
 _COLUMNS = (
     *(_KNOB, _VALUE, _SEEDS, _RATIO, _ASPECT, _COUNT, _ACTIVITY, _REFERENCE),
-    *(f"{name}{mark} [%]" for name in _ERRORS.values() for mark in ("", " 95 %")),
+    *(f"{name} error{mark} [%]" for name in QUANTITIES for mark in ("", " 95 %")),
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Error:
-    """A relative error of a packing fraction.
+    """A relative error.
 
     Args:
-        of: which one.
+        of: symbol of what.
         value: against the reference fidelity [1]; NaN if unknown.
         band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
     """
@@ -56,7 +61,8 @@ class Measured:
 
     Args:
         fidelity: its name.
-        errors: of φ_0 and φ_f.
+        errors: of what is asked for, such as φ_0 and φ_f.
+        others: of what is not, to be told.
         seeds: how many runs it was measured with.
         ratio: measured processor time over the planned wall time [1].
         is_reference: whether the errors of the others are against it.
@@ -64,6 +70,7 @@ class Measured:
 
     fidelity: str
     errors: tuple[Error, ...]
+    others: tuple[Error, ...] = ()
     seeds: int
     ratio: float
     is_reference: bool
@@ -155,11 +162,12 @@ class Choice:
         return "\n".join([*lines, f"use it: --set fidelity={self.fidelity}"])
 
 
-def read_table(path: Path | None) -> AccuracyTable:
+def read_table(path: Path | None, *, of: Sequence[str] = PACKING) -> AccuracyTable:
     """Read a table of `smarticles accuracy`.
 
     Args:
         path: the file; None: the one that ships.
+        of: what errors are asked for, keys of `QUANTITIES`.
 
     Raises:
         InputError: there is none, it is another table, or it does not tell of named fidelities.
@@ -181,7 +189,7 @@ def read_table(path: Path | None) -> AccuracyTable:
             raise InputError(msg)
     rows = {row[_VALUE]: row for row in reader if row[_KNOB] == "fidelity" and row[_VALUE] in FIDELITIES}
     try:
-        found = tuple(_measured(rows[name]) for name in FIDELITIES if name in rows and int(rows[name][_SEEDS]) > 0)
+        found = tuple(_measured(rows[name], of) for name in FIDELITIES if name in rows and int(rows[name][_SEEDS]) > 0)
         if not any(one.is_reference for one in found) or len(found) < 2:
             msg = f"--table {file}: tells of fewer than two named fidelities with runs; {_HOW}"
             raise InputError(msg)
@@ -200,15 +208,18 @@ def read_table(path: Path | None) -> AccuracyTable:
         raise InputError(msg) from None
 
 
-def _measured(row: dict[str, str]) -> Measured:
+def _measured(row: dict[str, str], of: Sequence[str]) -> Measured:
     ratio = _number(row[_RATIO])
-    errors = tuple(
-        Error(of=of, value=_number(row[f"{name} [%]"]) / 100, band=_number(row[f"{name} 95 % [%]"]) / 100)
-        for of, name in _ERRORS.items()
-    )
+    errors = {
+        name: Error(
+            of=symbol, value=_number(row[f"{name} error [%]"]) / 100, band=_number(row[f"{name} error 95 % [%]"]) / 100
+        )
+        for name, symbol in QUANTITIES.items()
+    }
     return Measured(
         fidelity=row[_VALUE],
-        errors=errors,
+        errors=tuple(error for name, error in errors.items() if name in of),
+        others=tuple(error for name, error in errors.items() if name not in of),
         seeds=int(row[_SEEDS]),
         ratio=ratio if ratio > 0 else 1.0,
         is_reference=row[_REFERENCE] == "reference",
@@ -231,7 +242,7 @@ def choose(
     Args:
         scene: the scene; its own fidelity does not matter.
         table: what was measured.
-        max_error: largest relative error of φ_0 and φ_f against the reference fidelity [1].
+        max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
         max_hours: longest wall time on one core [h].
 
     Raises:
@@ -314,6 +325,9 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
     notes = []
     reference = next(one.fidelity for one in table.fidelities if one.is_reference)
     if not measured.is_reference:
+        others = ", ".join(str(error) for error in measured.others if not math.isnan(error.value))
+        if others:
+            notes.append(f"not asked for (--of): {others}")
         bounds = [abs(error.value) + error.band for error in measured.errors]
         if any(math.isnan(bound) for bound in bounds):
             notes.append("the scatter between seeds is not known, so the error is not assured; measure with more seeds")

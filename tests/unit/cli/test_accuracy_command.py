@@ -110,7 +110,7 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
     said = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity")
     assert said.status == 0
     assert "base_seed1 finished before" in said.err
-    assert "Use fidelity standard (3.5 %): each is the cheapest whose errors against the reference are" in said.out
+    assert "Use fidelity standard (3.3 %): each is the cheapest whose errors against the reference are" in said.out
     table = out / "results" / "work_precision.csv"
     assert table.is_file()
     assert (out / "results" / "accuracy.png").is_file()

@@ -16,14 +16,15 @@ from dem.scene import Scene, parse_scene
 HEADER = (
     "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,"
     "processor time over expected wall time [-],"
-    "phi_0 error [%],phi_0 error 95 % [%],phi_f error [%],phi_f error 95 % [%],verdict"
+    "phi_0 error [%],phi_0 error 95 % [%],phi_f error [%],phi_f error 95 % [%],"
+    "crossings error [%],crossings error 95 % [%],verdict"
 )
 TABLE = f"""\
 {HEADER}
-time-step,0.9,,base,3,0.7,60,shake,1.5,0.1,1,0.1,1,not resolved
-fidelity,draft,,base,3,0.7,60,shake,1.5,-2,1.5,6,2,resolved
-fidelity,standard,,standard,3,0.7,60,shake,2,1,1.5,-2,2,not resolved
-fidelity,reference,,reference,3,0.7,60,shake,1,0,1,0,1.2,reference
+time-step,0.9,,base,3,0.7,60,shake,1.5,0.1,1,0.1,1,0.1,1,not resolved
+fidelity,draft,,base,3,0.7,60,shake,1.5,-2,1.5,6,2,-30,12,resolved
+fidelity,standard,,standard,3,0.7,60,shake,2,1,1.5,-2,2,-20,10,not resolved
+fidelity,reference,,reference,3,0.7,60,shake,1,0,1,0,1.2,0,5,reference
 # Study accuracy, …
 """
 
@@ -125,13 +126,22 @@ def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -
 
 def test_an_assured_error_needs_no_caution_and_another_scene_does(table_file: Path) -> None:
     table = read_table(table_file)
-    (note,) = choose(scene_of(), table, max_error=0.05).notes
-    assert note == f"table: {table_file}"
+    notes = choose(scene_of(), table, max_error=0.05).notes
+    assert notes == ("not asked for (--of): ⟨N⟩ -0.200 ± 0.100", f"table: {table_file}")
     notes = choose(scene_of(count=270, smarticle={"aspect_ratio": 0.5}), table, max_error=0.05).notes
-    assert notes[:2] == (
+    assert notes[1:3] == (
         "errors were measured at l/w 0.7, this scene has 0.5",
         "errors were measured at N 60, this scene has 270",
     )
+
+
+def test_a_limit_can_be_of_the_crossings(table_file: Path) -> None:
+    chosen = choose(scene_of(), read_table(table_file, of=["crossings"]), max_error=0.05)
+    assert chosen.fidelity == "reference"
+    chosen = choose(scene_of(), read_table(table_file, of=["phi_0", "crossings"]), max_error=0.25)
+    assert chosen.fidelity == "standard"
+    assert "φ_0 +0.010 ± 0.015, ⟨N⟩ -0.200 ± 0.100" in chosen.to_text()
+    assert "not asked for (--of): φ_f -0.020 ± 0.020" in chosen.to_text()
 
 
 def test_a_fidelity_that_the_scene_cannot_have_is_passed_over(table_file: Path) -> None:
