@@ -310,6 +310,11 @@ class Shake(Part):
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
 
 
+def shake_amplitude(phase: Shake, gravity: float) -> float:
+    """A = Γ g / (2πf)² [m]."""
+    return phase.peak_acceleration_g * gravity / (2 * math.pi * phase.frequency_hz) ** 2
+
+
 Phase = Annotated[
     Deposit | Relax | Shake | Actuate | ShapeChange | InternalOscillation | RemoveContainer | PullHook,
     Field(discriminator="type"),
