@@ -218,6 +218,10 @@ def _frames(scene: Scene) -> tuple[bool, str]:
     return _every(scene.recording.frame_interval_s, "frame_interval_s", "a frame")
 
 
+def _sphere_glyphs(scene: Scene) -> tuple[bool, str]:
+    return _every(scene.recording.sphere_interval_s, "sphere_interval_s", "all spheres")
+
+
 def _checkpoints(scene: Scene) -> tuple[bool, str]:
     on, why = _every(scene.recording.checkpoint_interval_s, "checkpoint_interval_s", "one")
     return on, f"{why}; a killed run goes on from the last one" if on else why
@@ -327,6 +331,11 @@ FRAMES = Effect(
         python="reads all contacts and writes one file per frame",
     ),
 )
+SPHERE_GLYPHS = Effect(
+    name="sphere glyphs",
+    rule=_sphere_glyphs,
+    adds=Adds(files=("spheres.pvd", "spheres"), python="writes one file per interval, a point per sphere"),
+)
 CHECKPOINTS = Effect(
     name="checkpoints",
     rule=_checkpoints,
@@ -351,5 +360,6 @@ EFFECTS = (
     ENERGY_ACCOUNT,
     SERIES,
     FRAMES,
+    SPHERE_GLYPHS,
     CHECKPOINTS,
 )

@@ -329,6 +329,12 @@ class Recording(Part):
         gt=0,
         description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
     )
+    sphere_interval_s: float | None = Field(
+        None,
+        gt=0,
+        description="time between VTK files of the spheres that stand for the smarticles, for ParaView's glyphs [s]; "
+        "null: none",
+    )
     series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
         False, description="whether to record energies and the work of the container as well as the motors'"

@@ -153,7 +153,7 @@ def _run(
 def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, yade: str) -> None:
     if not has_checkpoint(out):
         log.info("resumed from the start: no checkpoint was written")
-        simulation.recorder.frames.truncate([])
+        simulation.recorder.truncate({})
         return
     checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
     if warning:
@@ -269,6 +269,8 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         progress=progress,
         series_steps=round(scene.recording.series_interval_s / dt),
         frame_steps=round(scene.recording.frame_interval_s / dt),
+        spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
+        sphere_steps=round((scene.recording.sphere_interval_s or 0.0) / dt),
     )
 
 

@@ -40,6 +40,7 @@ CALLS: list[tuple[dict[str, Any], set[str], str]] = [
         {"energies", "energy account"},
         "recording.dissipation_interval_s is given, and the account needs them",
     ),
+    ({"recording.sphere_interval_s": 0.04}, {"sphere glyphs"}, "all spheres every 0.04 s"),
     (
         {"recording.checkpoint_interval_s": 0.4},
         {"checkpoints"},
