@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from itertools import chain
 
 from dem.actuation import actuated
+from dem.actuation_checks import overshoot
 from dem.assembly import SMARTICLE_MATERIAL
 from dem.columns import (
     COLUMNS,
@@ -170,7 +171,8 @@ def _motors(scene: Scene) -> tuple[bool, str]:
 def _torque_cap(scene: Scene) -> tuple[bool, str]:
     if not scene.actuates:
         return False, "no phase actuates"
-    return True, f"τ_max = {scene.torque_limit:.3g} N m, law {scene.motor.law}"
+    beyond = f", by one look gone beyond by up to {share:.2g} τ_max" if (share := overshoot(scene)) else ""
+    return True, f"τ_max = {scene.torque_limit:.3g} N m, law {scene.motor.law}{beyond}"
 
 
 def _hooks(scene: Scene) -> tuple[bool, str]:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
+from dem.actuation_checks import actuation_warnings
 from dem.construction import in_order
 from dem.effects import Adds, Decision, decide
 from dem.parts import Deposit
@@ -50,6 +51,7 @@ class Plan:
     engines: tuple[str, ...]
     frames: int
     wall_s: float
+    warnings: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -78,6 +80,7 @@ class Plan:
             lines.append(f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}")
             lines += [f"{'':<25}+ {added}"] if (added := effect.adds.to_text()) else []
         lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
+        lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
 
@@ -115,4 +118,5 @@ def plan(scene: Scene) -> Plan:
         engines=in_order(Adds.together(effect.adds for effect in effects).engines),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
+        warnings=actuation_warnings(scene),
     )

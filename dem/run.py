@@ -17,6 +17,7 @@ import meshio
 import numpy as np
 
 from dem import effects
+from dem.actuation_checks import actuation_warnings
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
@@ -119,6 +120,9 @@ def _run(
             yade=yade,
             checkpoint_steps=round((scene.recording.checkpoint_interval_s or 0.0) / dt),
         )
+        for warning in actuation_warnings(scene):
+            log.warning("%s", warning)
+            bar.warn(warning)
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()

@@ -32,6 +32,16 @@ CALLS: list[tuple[dict[str, Any], set[str], str]] = [
         {"articulation", "motors", "torque cap"},
         "phases 2, 3: three links and two hinges per smarticle, pins of 5000 N/m; welded in the others",
     ),
+    (
+        {"phases": ACTUATED, "motor": {"law": "slip"}},
+        {"articulation", "motors", "torque cap"},
+        "τ_max = 1.61e-05 N m, law slip",
+    ),
+    (
+        {"phases": ACTUATED},
+        {"articulation", "motors", "torque cap"},
+        "τ_max = 1.61e-05 N m, law halt, by one look gone beyond by up to 0.22 τ_max",
+    ),
     ({"hooks": {}}, {"hooks"}, "crosses at 5 and 10 mm, bars of 0.5 mm; no phase pulls one"),
     ({"phases": [DEPOSIT, {"type": "remove-container"}]}, {"wall removal"}, "phase 1: at once"),
     ({"recording.energy": True}, {"energies"}, "recording.energy is true"),
