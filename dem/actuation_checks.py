@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9  # relative; angles and speeds that meet their limit up to rounding are allowed
 BARB_LINKS = (0, 2)
+# Share of τ_max that one look of a motor may add before it notices and halts. The defaults add 0.22.
+MOST_OVERSHOOT = 0.5
 
 
 def check_actuation(scene: Scene) -> None:
@@ -41,6 +43,33 @@ def check_actuation(scene: Scene) -> None:
         highest = _check_motions(scene, index)
         _check_crossing(scene, index, highest)
         _check_first_spheres(scene, index, max(highest))
+
+
+def overshoot(scene: Scene) -> float:
+    """Torque over τ_max that one look of a motor can add before the motor notices and halts [1]; 0 for law slip."""
+    motor = scene.motor
+    added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
+    return 0.0 if motor.law == "slip" else added / scene.torque_limit
+
+
+def actuation_warnings(scene: Scene) -> tuple[str, ...]:
+    """What a scene that actuates had better change, one line each with key, value and the way out.
+
+    A motor that is quick and stiff for its torque limit goes beyond it. That is no reason to refuse a scene: it goes
+    no farther than by this much, then halts, and motors that are hardly able to do anything are a case worth running.
+    """
+    share = overshoot(scene) if scene.actuates else 0.0
+    if share <= MOST_OVERSHOOT:
+        return ()
+    motor, series, less = scene.motor, scene.recording.series_interval_s, MOST_OVERSHOOT / share
+    interval = _whole_fraction(series, math.ceil(series / (scene.fidelity.control_interval_s * less)))
+    return (
+        f"motor.torque_limit_N_m: τ_max = {scene.torque_limit:.3g} N m, but within one look of "
+        f"fidelity.control_interval_s = {scene.fidelity.control_interval_s:g} s at motor.speed_limit_rad_per_s = "
+        f"{motor.speed_limit_rad_per_s:g} rad/s a motor can go beyond it by {share:.3g} τ_max; use "
+        f"control_interval_s: {interval} or stiffness_N_m_per_rad: "
+        f"{_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
+    )
 
 
 def _check_barbs(scene: Scene, index: int) -> None:
@@ -76,7 +105,7 @@ def _first_station(scene: Scene) -> float:
 def _check_control(scene: Scene) -> None:
     interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
     looks = series / interval
-    way_out = f"use e.g. {series / max(1, math.ceil(looks * (1 - TOLERANCE))):.4g} s"
+    way_out = f"use e.g. {_whole_fraction(series, max(1, math.ceil(looks * (1 - TOLERANCE))))} s"
     if looks < 1 - 1e-6:
         msg = (
             f"fidelity.control_interval_s: {interval:g} s is longer than recording.series_interval_s = {series:g} s; "
@@ -89,6 +118,15 @@ def _check_control(scene: Scene) -> None:
             f"{series:g} s; {way_out}"
         )
         raise ValueError(msg)
+
+
+def _whole_fraction(whole: float, parts: int) -> str:
+    """A whole fraction of a time [s], in so many parts or a few more, such that it can be written in few digits."""
+    for more in range(parts, 10 * parts + 1):
+        text = f"{whole / more:.3g}"
+        if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
+            return text
+    return repr(whole / parts)
 
 
 def _check_active(scene: Scene, index: int) -> None:

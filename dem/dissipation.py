@@ -8,6 +8,7 @@ mostly where contacts begin in the middle of a step. Only every so many steps ar
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -130,7 +131,11 @@ class Meter:
             after = (v[0], v[1], v[2])
             earlier = before.get((contact.id1, contact.id2), after)
             law = (phys.Fv, phys.kn, phys.ks, phys.cn, phys.cs, phys.tangensOfFrictionAngle)
-            rows.append((n[0], n[1], n[2], *earlier, *after, s[0], s[1], s[2], geom.penetrationDepth, *law))
+            depth = geom.penetrationDepth
+            if math.isnan(depth):
+                # YADE does not save it; until the next step the spring's force tells.
+                depth = phys.Fn / phys.kn
+            rows.append((n[0], n[1], n[2], *earlier, *after, s[0], s[1], s[2], depth, *law))
         table = np.array(rows).reshape(-1, 19)
         normals, first, last, shear, rest = np.split(table, (3, 6, 9, 12), axis=1)
         # An overlap that is negative belongs to a contact that has just ended.

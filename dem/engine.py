@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem import effects
 from dem.account import Account
-from dem.assembly import SMARTICLE_MATERIAL, Assembly
-from dem.container import WALL_MATERIAL, Cylinder
+from dem.assembly import Assembly
+from dem.construction import add_engines, add_materials
+from dem.container import Cylinder
 from dem.errors import RunError
 from dem.fixtures import Fixtures
-from dem.hinges import HINGE_MATERIAL, HingeLaw, Hinges
+from dem.hinges import HingeLaw, Hinges
 from dem.hooks import Cross
 from dem.library import load_yade
 from dem.motor import MotorLaw, Motors
@@ -29,11 +31,6 @@ from dem.state import State
 from dem.timestep import ContactLaw
 
 Array = NDArray[np.float64]
-
-# How far a sphere may move before neighbours are looked for again, in radii: a larger distance means more pairs to look
-# at in every step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.2 costs
-# 17 % less than 0.4, 0.1 as much as 0.2.
-VERLET_DISTANCE = 0.15
 
 
 class Engine:
@@ -86,7 +83,14 @@ class Engine:
         self._smarticle_seconds = 0.0
         # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
         self._loaded: tuple[int, float] | None = None
-        self._add_materials(law, hinged=hinges is not None)
+        called_for = {
+            effects.CONTACT: True,
+            effects.CONTAINER_MOTION: shaken,
+            effects.ARTICULATION: hinges is not None,
+            effects.HOOKS: hooks is not None,
+        }
+        adds = effects.Adds.together(effect.adds for effect, on in called_for.items() if on)
+        add_materials(self._yade, adds, law)
         self.fixtures = Fixtures(self._yade, cylinder, hooks)
         """The container and the hooks."""
         self.account = Account(
@@ -98,66 +102,16 @@ class Engine:
             dissipation_steps=dissipation_steps,
         )
         """Work and dissipation since the start."""
-        self._assemble(law, shaken=shaken, hinged=hinge_law)
-
-    # -- construction ------------------------------------------------------------------------------------------
-
-    def _add_materials(self, law: ContactLaw, *, hinged: bool) -> None:
-        # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen
-        # such that the series with a smarticle's gives the wall's. Density zero: the spheres weigh nothing, the
-        # mass comes from a ballast that is taken away again (see `dem.clump`).
-        between = 2 * law.normal_damping
-        wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
-        classes, materials = self._yade.classes, self._omega.materials
-        for label, damping in ((SMARTICLE_MATERIAL, between), (WALL_MATERIAL, wall)):
-            materials.append(
-                classes.ViscElMat(
-                    density=0,
-                    kn=2 * law.normal_stiffness,
-                    ks=2 * law.tangential_stiffness,
-                    cn=damping,
-                    cs=damping * law.tangential_damping,
-                    label=label,
-                )
-            )
-        if hinged:
-            # Every bond is given its stiffness by hand; this only tells YADE which law it belongs to.
-            materials.append(classes.CohFrictMat(density=0, young=1, poisson=0, isCohesive=False, label=HINGE_MATERIAL))
-
-    def _assemble(self, law: ContactLaw, *, shaken: bool, hinged: HingeLaw | None) -> None:
-        yade = self._yade.classes
-        friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
-        shaker = [yade.HarmonicMotionEngine(ids=self.fixtures.bodies, dead=True)] if shaken else []
-        hooked = bool(self.fixtures.hooks)
-        bars = [yade.Bo1_Box_Aabb()] if hooked else []
-        collider = yade.InsertionSortCollider(
-            [yade.Bo1_Sphere_Aabb(), yade.Bo1_Facet_Aabb(), yade.Bo1_Wall_Aabb(), *bars],
-            verletDist=VERLET_DISTANCE * self.particle.radius,
+        add_engines(
+            self._yade,
+            adds,
+            law,
+            hinges=hinge_law,
+            gravity=gravity,
+            radius=particle.radius,
+            movable=self.fixtures.bodies,
         )
-        geometry = [yade.Ig2_Sphere_Sphere_ScGeom(), yade.Ig2_Facet_Sphere_ScGeom(), yade.Ig2_Wall_Sphere_ScGeom()]
-        geometry += [yade.Ig2_Box_Sphere_ScGeom()] if hooked else []
-        physics = [yade.Ip2_ViscElMat_ViscElMat_ViscElPhys(frictAngle=friction)]
-        laws = [yade.Law2_ScGeom_ViscElPhys_Basic()]
-        if hinged is not None:
-            # The correction for sliding spheres would falsify the motion of nodes that do not touch.
-            geometry.append(yade.Ig2_GridNode_GridNode_GridNodeGeom6D(avoidGranularRatcheting=False))
-            physics.append(yade.Ip2_CohFrictMat_CohFrictMat_CohFrictPhys())
-            laws.append(
-                yade.Law2_ScGeom6D_CohFrictPhys_CohesionMoment(
-                    useIncrementalForm=True,
-                    shear_creep=True,
-                    creep_viscosity=hinged.damper_viscosity,
-                )
-            )
-        gravity = self._yade.vector(0, 0, -self.gravity)
-        self._omega.engines = [
-            yade.ForceResetter(),
-            collider,
-            yade.InteractionLoop(geometry, physics, laws),
-            *shaker,
-            yade.NewtonIntegrator(damping=0, gravity=gravity, exactAsphericalRot=True),
-        ]
-        self._omega.dt = self.time_step
+        self._omega.dt = time_step
         self._bind()
 
     def _bind(self) -> None:

@@ -1,4 +1,4 @@
-"""Frames: one small VTK file per recorded time, and the ParaView collection that lists them.
+"""Frames: one small VTK file per recorded time, and the ParaView collection that lists them; spheres the same way.
 
 The format is the contract with `postprocess`; ARCHITECTURE.md describes it.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dem.files import write_text, write_whole
 from dem.motor import Motors
-from dem.particle import LINKS
+from dem.particle import LINKS, Particle
 from dem.state import State
 
 Array = NDArray[np.float64]
@@ -75,6 +75,24 @@ def frame_mesh(
     )
 
 
+def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
+    """The spheres of all smarticles as points, for ParaView's glyphs: what the engine sees of them.
+
+    Args:
+        state: all smarticles at this time.
+        particle: one smarticle, of S spheres.
+    """
+    count, spheres = state.count, len(particle.centres)
+    number = count * spheres
+    data = {
+        "radius_m": np.full(number, particle.radius),
+        "smarticle_id": np.repeat(np.arange(count), spheres),
+        "link": np.tile(particle.links, count).astype(np.int64),
+    }
+    points = state.spheres(particle).reshape(-1, 3)
+    return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
+
+
 def _per_link(barbs: NDArray[Any]) -> Array:
     """(3N,) values on the barbs, from (N, 2); NaN on the middle links."""
     links = np.full((len(barbs), LINKS), np.nan)
@@ -88,10 +106,12 @@ class FrameWriter:
 
     Args:
         folder: the run directory.
+        noun: what one file is called; "sphere": `spheres.pvd` and `spheres/sphere_000000.vtu` and so on.
         times: times [s] of the frames written so far.
     """
 
     folder: Path
+    noun: str = "frame"
     times: list[float] = field(default_factory=list)
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
@@ -100,27 +120,26 @@ class FrameWriter:
         Raises:
             RunError: it cannot be written.
         """
-        name = _name(len(self.times))
+        name = self._name(len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
-        write_text(self.folder / "frames.pvd", self._collection())
+        write_text(self.folder / f"{self.noun}s.pvd", self._collection())
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames only, of the given times [s]; later files are removed."""
         self.times = list(times)
-        kept = {self.folder / _name(k) for k in range(len(self.times))}
-        for path in set((self.folder / "frames").glob("*.vtu")) - kept:
+        kept = {self.folder / self._name(k) for k in range(len(self.times))}
+        for path in set((self.folder / f"{self.noun}s").glob("*.vtu")) - kept:
             path.unlink()
-        write_text(self.folder / "frames.pvd", self._collection())
+        write_text(self.folder / f"{self.noun}s.pvd", self._collection())
 
     def _collection(self) -> str:
         rows = [
-            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(_name(k))}/>'
+            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(self._name(k))}/>'
             for k, time in enumerate(self.times)
         ]
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
 
-
-def _name(number: int) -> str:
-    return f"frames/frame_{number:06d}.vtu"
+    def _name(self, number: int) -> str:
+        return f"{self.noun}s/{self.noun}_{number:06d}.vtu"

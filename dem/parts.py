@@ -310,6 +310,11 @@ class Shake(Part):
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
 
 
+def shake_amplitude(phase: Shake, gravity: float) -> float:
+    """A = Γ g / (2πf)² [m]."""
+    return phase.peak_acceleration_g * gravity / (2 * math.pi * phase.frequency_hz) ** 2
+
+
 Phase = Annotated[
     Deposit | Relax | Shake | Actuate | ShapeChange | InternalOscillation | RemoveContainer | PullHook,
     Field(discriminator="type"),
@@ -323,6 +328,12 @@ class Recording(Part):
         0.04,
         gt=0,
         description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
+    )
+    sphere_interval_s: float | None = Field(
+        None,
+        gt=0,
+        description="time between VTK files of the spheres that stand for the smarticles, for ParaView's glyphs [s]; "
+        "null: none",
     )
     series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(

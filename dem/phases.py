@@ -15,7 +15,7 @@ from dem.actuation import Drive, drive
 from dem.engine import Engine
 from dem.errors import RunError
 from dem.hooks import PullHook
-from dem.parts import Deposit, Relax, Settle, Shake
+from dem.parts import Deposit, Relax, Settle, Shake, shake_amplitude
 from dem.placement import place_layer
 from dem.release import RemoveContainer
 from dem.scene import Scene, derive_seed
@@ -238,11 +238,6 @@ class Pouring:
             )
             raise RunError(msg)
         return False
-
-
-def shake_amplitude(phase: Shake, gravity: float) -> float:
-    """A = Γ g / (2πf)² [m]."""
-    return phase.peak_acceleration_g * gravity / (2 * math.pi * phase.frequency_hz) ** 2
 
 
 def _pour_layer(phase: Deposit, scene: Scene, engine: Engine, size: int, rng: np.random.Generator) -> None:

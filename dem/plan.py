@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
-from dem.hooks import PullHook
-from dem.parts import Deposit, Shake
-from dem.phases import shake_amplitude
-from dem.release import RemoveContainer
+from dem.actuation_checks import actuation_warnings
+from dem.construction import in_order
+from dem.effects import Adds, Decision, decide
+from dem.parts import Deposit
 from dem.scene import Scene
 from dem.timestep import stable_step, time_step
 
@@ -22,16 +22,6 @@ ARTICULATED_SHARE = 1.7
 # A pour costs about half of the same time in the full pile, since the pile grows from nothing; 0.1 s per layer.
 POUR_SHARE = 0.5
 LAYER_SECONDS = 0.1
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One effect: whether the scene calls for it, and why."""
-
-    name: str
-    on: bool
-    why: str
-    costs: str
 
 
 @dataclass(frozen=True)
@@ -57,10 +47,11 @@ class Plan:
     stable_time_step_s: float
     container_height_m: float
     phases: tuple[PlannedPhase, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[Decision, ...]
     engines: tuple[str, ...]
     frames: int
     wall_s: float
+    warnings: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -83,10 +74,13 @@ class Plan:
             f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{f'{self.wall_s:.0f} s':>22}",
             "(one core; machines differ by a factor of two)",
             "",
-            f"{'effect':<20}{'':<5}why",
+            f"{'effect':<20}{'':<5}why, and what it adds",
         ]
-        lines += [f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}" for effect in self.effects]
+        for effect in self.effects:
+            lines.append(f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}")
+            lines += [f"{'':<25}+ {added}"] if (added := effect.adds.to_text()) else []
         lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
+        lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
 
@@ -110,7 +104,7 @@ def plan(scene: Scene) -> Plan:
             wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
             phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall))
     simulated = sum(phase.estimate_s for phase in phases)
-    effects = _effects(scene)
+    effects = decide(scene)
     return Plan(
         name=scene.name,
         count=scene.count,
@@ -121,119 +115,8 @@ def plan(scene: Scene) -> Plan:
         container_height_m=scene.cylinder.height,
         phases=tuple(phases),
         effects=effects,
-        engines=_engines(effects),
+        engines=in_order(Adds.together(effect.adds for effect in effects).engines),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
+        warnings=actuation_warnings(scene),
     )
-
-
-def _effects(scene: Scene) -> tuple[Effect, ...]:
-    contact, recording = scene.contact, scene.recording
-    shakes = [(k, phase) for k, phase in enumerate(scene.phases) if isinstance(phase, Shake)]
-    shaken = bool(shakes)
-    amplitudes = ", ".join(
-        f"phase {k}: Γ = {phase.peak_acceleration_g:g}, f = {phase.frequency_hz:g} Hz, "
-        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm"
-        for k, phase in shakes
-    )
-    return (
-        Effect("gravity", True, f"g = {scene.gravity_m_per_s2:g} m/s²", "part of the integrator"),
-        Effect(
-            "friction",
-            contact.friction_smarticle > 0 or contact.friction_wall > 0,
-            f"μ = {contact.friction_smarticle:g} between smarticles, {contact.friction_wall:g} at the container",
-            "part of the contact law",
-        ),
-        Effect(
-            "dissipation",
-            contact.restitution < 1,
-            f"restitution {contact.restitution:g} at a typical lever",
-            "part of the contact law",
-        ),
-        Effect(
-            "container motion",
-            shaken,
-            amplitudes if shaken else "no phase of type shake",
-            "one engine over the container's bodies",
-        ),
-        Effect(
-            "frames and series",
-            True,
-            f"a frame every {recording.frame_interval_s:g} s, a sample every {recording.series_interval_s:g} s",
-            "reading the state of all smarticles",
-        ),
-        Effect(
-            "checkpoints",
-            recording.checkpoint_interval_s is not None,
-            "recording.checkpoint_interval_s is null"
-            if recording.checkpoint_interval_s is None
-            else f"every {recording.checkpoint_interval_s:g} s; a killed run goes on from the last one",
-            "saving and reloading the simulation",
-        ),
-        *_actuation_effects(scene),
-        *_test_effects(scene),
-        Effect(
-            "energy",
-            recording.energy,
-            "recording.energy is true" if recording.energy else "recording.energy is false",
-            "one sum over the container's bodies per step while it is shaken",
-        ),
-    )
-
-
-def _test_effects(scene: Scene) -> tuple[Effect, Effect]:
-    hooks, why = scene.hooks, "no key hooks"
-    if hooks is not None:
-        pulls = [
-            f"phase {k} raises the upper one by {1e3 * phase.distance_m:.3g} mm at {1e3 * phase.speed_m_per_s:.3g} mm/s"
-            for k, phase in enumerate(scene.phases)
-            if isinstance(phase, PullHook)
-        ]
-        why = (
-            f"crosses at {1e3 * hooks.lower_height_m:.3g} and {1e3 * hooks.upper_height_m:.3g} mm, bars of "
-            f"{1e3 * hooks.side_m:.3g} mm; {', '.join(pulls) or 'no phase pulls one'}"
-        )
-    removals = [
-        f"phase {k}: "
-        + ("at once" if phase.speed_m_per_s is None else f"lifted at {1e3 * phase.speed_m_per_s:.3g} mm/s")
-        for k, phase in enumerate(scene.phases)
-        if isinstance(phase, RemoveContainer)
-    ]
-    return (
-        Effect(
-            "hooks", hooks is not None, why, "four bodies, and their forces summed in every step" if hooks else "none"
-        ),
-        Effect("wall removal", bool(removals), ", ".join(removals) or "no phase of type remove-container", "none"),
-    )
-
-
-def _actuation_effects(scene: Scene) -> tuple[Effect, Effect]:
-    driven = [k for k, phase in enumerate(scene.phases) if actuated(phase)]
-    if not driven:
-        none = "no phase actuates; each smarticle is one welded clump"
-        return Effect("articulation", False, none, "none"), Effect("motors", False, none, "none")
-    numbers = ", ".join(map(str, driven))
-    motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
-    return (
-        Effect(
-            "articulation",
-            True,
-            f"phases {numbers}: three links and two hinges per smarticle, pins of {pin:g} N/m; welded in the others",
-            "a shorter time step throughout; two bonds per hinge and three bodies per smarticle while articulated",
-        ),
-        Effect(
-            "motors",
-            True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, τ_max = {scene.torque_limit:.3g} N m ({motor.law}), "
-            f"a look every {scene.fidelity.control_interval_s:g} s",
-            "two readings per smarticle and look",
-        ),
-    )
-
-
-def _engines(effects: tuple[Effect, ...]) -> tuple[str, ...]:
-    on = {effect.name for effect in effects if effect.on}
-    engines = ["ForceResetter", "InsertionSortCollider", "InteractionLoop"]
-    if "container motion" in on:
-        engines.append("HarmonicMotionEngine")
-    return (*engines, "NewtonIntegrator")

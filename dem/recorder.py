@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from dem.engine import Engine
-from dem.frames import FrameWriter, frame_mesh
+from dem.frames import FrameWriter, frame_mesh, sphere_mesh
 from dem.progress import Progress
 from dem.series import SeriesWriter
 from dem.watchdog import Watchdog
@@ -26,6 +26,8 @@ class Recorder:
         progress: told at every sample.
         series_steps: steps between samples.
         frame_steps: steps between frames; a whole multiple of `series_steps`.
+        spheres: writes the spheres as points; None: nobody does.
+        sphere_steps: steps between these; a whole multiple of `series_steps`.
     """
 
     series: SeriesWriter
@@ -34,6 +36,8 @@ class Recorder:
     progress: Progress
     series_steps: int
     frame_steps: int
+    spheres: FrameWriter | None = None
+    sphere_steps: int = 0
     next_step: int = 0
 
     def record(self, engine: Engine, phase: int) -> None:
@@ -56,6 +60,8 @@ class Recorder:
             )
             self.frames.write(mesh, engine.time)
             self.series.write()
+        if self.spheres is not None and engine.count and engine.steps % self.sphere_steps == 0:
+            self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last picture of a run that fails is worth having.
         self.watchdog.check(
             state,
@@ -70,11 +76,18 @@ class Recorder:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns of the series."""
-        return {"next_step": self.next_step, "frames": self.frames.times, "series": self.series.memory}
+        spheres = {} if self.spheres is None else {"spheres": self.spheres.times}
+        return {"next_step": self.next_step, "frames": self.frames.times, **spheres, "series": self.series.memory}
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
         self.next_step = memory["next_step"]
-        self.frames.truncate(memory["frames"])
+        self.truncate(memory)
         self.series.restore(memory["series"], columns)
         self.series.write()
+
+    def truncate(self, memory: Mapping[str, Any]) -> None:
+        """Keep the frames of `memory` only; of an empty one none."""
+        self.frames.truncate(memory.get("frames", []))
+        if self.spheres is not None:
+            self.spheres.truncate(memory.get("spheres", []))

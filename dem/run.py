@@ -16,6 +16,8 @@ import h5py
 import meshio
 import numpy as np
 
+from dem import effects
+from dem.actuation_checks import actuation_warnings
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
@@ -24,11 +26,9 @@ from dem.frames import FrameWriter
 from dem.hooks import PullHook
 from dem.library import yade_threads, yade_version
 from dem.motor import MotorLaw
-from dem.parts import Shake
-from dem.phases import shake_amplitude
+from dem.parts import Shake, shake_amplitude
 from dem.progress import Progress
 from dem.recorder import Recorder
-from dem.release import RemoveContainer
 from dem.rundir import DONE, FAILED, MANIFEST, SCENE, claimed, log_of, mark_done, mark_failed, recorded_scene_hash
 from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
@@ -120,6 +120,9 @@ def _run(
             yade=yade,
             checkpoint_steps=round((scene.recording.checkpoint_interval_s or 0.0) / dt),
         )
+        for warning in actuation_warnings(scene):
+            log.warning("%s", warning)
+            bar.warn(warning)
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()
@@ -154,7 +157,7 @@ def _run(
 def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, yade: str) -> None:
     if not has_checkpoint(out):
         log.info("resumed from the start: no checkpoint was written")
-        simulation.recorder.frames.truncate([])
+        simulation.recorder.truncate({})
         return
     checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
     if warning:
@@ -217,9 +220,9 @@ def _build_engine(scene: Scene, dt: float) -> Engine:
         law=contact_law(scene),
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
-        shaken=any(isinstance(phase, Shake) for phase in scene.phases),
-        hinges=(hinge_law(scene), motor_law(scene)) if scene.actuates else None,
-        track_work=scene.recording.energies,
+        shaken=effects.CONTAINER_MOTION.called_for(scene),
+        hinges=(hinge_law(scene), motor_law(scene)) if effects.ARTICULATION.called_for(scene) else None,
+        track_work=effects.ENERGIES.called_for(scene),
         dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
         hooks=None if scene.hooks is None else scene.hooks.crosses,
     )
@@ -255,11 +258,11 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
             out,
             radius,
             {"scene_sha256": scene_hash(scene), "seed": scene.seed},
-            motors=engine.hinged,
-            energy=scene.recording.energies,
-            ledger=scene.recording.dissipation_interval_s is not None,
-            hooks=scene.hooks is not None,
-            release=any(isinstance(phase, RemoveContainer) for phase in scene.phases),
+            motors=effects.MOTORS.called_for(scene),
+            energy=effects.ENERGIES.called_for(scene),
+            ledger=effects.ENERGY_ACCOUNT.called_for(scene),
+            hooks=effects.HOOKS.called_for(scene),
+            release=effects.WALL_REMOVAL.called_for(scene),
         ),
         frames=FrameWriter(out),
         watchdog=Watchdog(
@@ -270,6 +273,8 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         progress=progress,
         series_steps=round(scene.recording.series_interval_s / dt),
         frame_steps=round(scene.recording.frame_interval_s / dt),
+        spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
+        sphere_steps=round((scene.recording.sphere_interval_s or 0.0) / dt),
     )
 
 

@@ -137,7 +137,7 @@ class Scene(Part):
 
     def _check_recording(self) -> None:
         series = self.recording.series_interval_s
-        for key in ("frame_interval_s", "checkpoint_interval_s"):
+        for key in ("frame_interval_s", "sphere_interval_s", "checkpoint_interval_s"):
             interval = getattr(self.recording, key)
             if interval is None:
                 continue

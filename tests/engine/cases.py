@@ -19,7 +19,7 @@ from dem.container import Cylinder
 from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.library import yade_version
-from dem.phases import shake_amplitude
+from dem.parts import shake_amplitude
 from dem.placement import Poses, place_layer
 from dem.run import run_scene
 from dem.scene import Scene, parse_scene

@@ -34,7 +34,8 @@ def complete(scene: Path, out: Path) -> str:
 
 
 def results(out: Path) -> dict[str, bytes]:
-    files = [out / "frames.pvd", out / "series.h5", *sorted((out / "frames").iterdir())]
+    folders = [out / name for name in ("frames", "spheres") if (out / name).exists()]
+    files = [out / "series.h5", *sorted(out.glob("*.pvd")), *(path for each in folders for path in each.iterdir())]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
 

@@ -18,7 +18,7 @@ seed: 3
 fidelity: draft
 count: 12
 container: {radius_m: 0.0145}
-recording: {checkpoint_interval_s: 0.04, frame_interval_s: 0.02, energy: true}
+recording: {checkpoint_interval_s: 0.04, frame_interval_s: 0.02, sphere_interval_s: 0.028, energy: true}
 """
 SCENES = {
     "pulled and lifted": """\
@@ -104,4 +104,5 @@ def test_a_run_killed_in_each_phase_gives_the_same_bits(tmp_path: Path, name: st
     for at, entry in zip(resumed, new, strict=True):
         assert entry["start_s"] < at <= entry["end_s"]
     assert len(results(whole)) > 20
+    assert len(list((whole / "spheres").iterdir())) > 10
     assert differing(results(whole), results(out)) == []

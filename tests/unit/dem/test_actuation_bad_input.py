@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 import dem.scene
+from dem.actuation_checks import actuation_warnings, overshoot
 from dem.errors import InputError
+from dem.plan import plan
 from dem.scene import Scene, parse_scene
 
 SceneData = Callable[..., dict[str, Any]]
@@ -222,7 +224,7 @@ MOTORS: list[tuple[dict[str, Any], str]] = [
     (
         {"fidelity": {"control_interval_s": 3e-4}},
         "fidelity.control_interval_s: 0.0003 s is not a whole fraction of recording.series_interval_s = 0.004 s; "
-        "use e.g. 0.0002857 s",
+        "use e.g. 0.00025 s",
     ),
     (
         {"smarticle__aspect_ratio": 0},
@@ -255,7 +257,7 @@ def test_the_ways_out_lead_out(scene_data: SceneData) -> None:
     checked(scene_data, actuate({**SINE, "amplitude_deg": 15}, duration_s=2))
     checked(scene_data, actuate(RAMP, active_fraction=0.1))
     checked(scene_data, SHAPE_CHANGE, fidelity={"diameter_m": 1.2e-3}, smarticle__aspect_ratio=0.155)
-    checked(scene_data, SHAPE_CHANGE, fidelity={"control_interval_s": 0.004 / 14})
+    checked(scene_data, SHAPE_CHANGE, fidelity={"control_interval_s": 0.00025})
 
 
 def test_scaled_swing_names_what_is_possible_for_its_barbs(scene_data: SceneData) -> None:
@@ -358,3 +360,38 @@ def test_scene_without_actuated_phases_is_not_asked(scene_data: SceneData, monke
     checked(scene_data, relax)
     with pytest.raises(ZeroDivisionError):
         checked(scene_data, SHAPE_CHANGE)
+
+
+# -- what is not refused, but said ---------------------------------------------------------------------------------
+
+
+def test_motors_that_one_look_takes_far_beyond_their_limit_are_warned_of(scene_data: SceneData) -> None:
+    quick = {"motor__speed_limit_rad_per_s": 60}
+    scene = checked(scene_data, SHAPE_CHANGE, **quick)
+    # k ω Δt = 3e-3 · 60 · 2e-4 N m over the paper's 1.607e-5 N m.
+    assert overshoot(scene) == pytest.approx(3e-3 * 60 * 2e-4 / 1.607e-5, rel=1e-3)
+    (warning,) = actuation_warnings(scene)
+    assert warning == (
+        "motor.torque_limit_N_m: τ_max = 1.61e-05 N m, but within one look of fidelity.control_interval_s = 0.0002 s "
+        "at motor.speed_limit_rad_per_s = 60 rad/s a motor can go beyond it by 2.24 τ_max; use control_interval_s: "
+        "4e-05 or stiffness_N_m_per_rad: 0.000669, or law: slip"
+    )
+    planned = plan(scene)
+    assert planned.warnings == (warning,)
+    assert f"warning: {warning}" in planned.to_text()
+    # Each way out leads out, and not much farther than it must.
+    for way_out in (
+        {"fidelity": {"control_interval_s": 4e-05}},
+        {"motor__stiffness_N_m_per_rad": 0.000669},
+        {"motor__law": "slip"},
+    ):
+        assert actuation_warnings(checked(scene_data, SHAPE_CHANGE, **quick, **way_out)) == ()
+    for not_enough in ({"fidelity": {"control_interval_s": 0.004 / 89}}, {"motor__stiffness_N_m_per_rad": 0.00068}):
+        assert actuation_warnings(checked(scene_data, SHAPE_CHANGE, **quick, **not_enough))
+
+
+def test_default_motors_and_scenes_without_motors_are_not_warned_of(scene_data: SceneData) -> None:
+    scene = checked(scene_data, SHAPE_CHANGE)
+    assert overshoot(scene) == pytest.approx(0.224, rel=1e-2)
+    assert actuation_warnings(scene) == ()
+    assert actuation_warnings(checked(scene_data, {"type": "relax"}, motor__speed_limit_rad_per_s=60)) == ()

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.frames import FrameWriter, frame_mesh
+from dem.frames import FrameWriter, frame_mesh, sphere_mesh
 from dem.motor import MotorLaw, Motors
-from dem.particle import Boxes
+from dem.particle import Boxes, Particle, SphereChain
 from dem.state import State
 
 W, RATIO = 0.0117, 0.7
@@ -147,3 +147,31 @@ def test_frame_is_binary_and_compressed(tmp_path: Path) -> None:
     written(tmp_path, make_state())
     head = (tmp_path / "frames" / "frame_000000.vtu").read_bytes()[:600].decode(errors="replace")
     assert "vtkZLibDataCompressor" in head
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_spheres_are_points_on_their_links(tmp_path: Path, rows: int) -> None:
+    state = make_state()
+    diameter = 0.9e-3 if rows == 1 else 0.5e-3
+    particle = Particle(state.boxes, SphereChain(rows=rows, diameter=diameter, pitch=diameter))
+    FrameWriter(tmp_path, "sphere").write(sphere_mesh(state, particle), 0.5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["spheres", "spheres.pvd"]
+    listed = ElementTree.parse(tmp_path / "spheres.pvd").getroot().findall("Collection/DataSet")
+    assert [(row.attrib["timestep"], row.attrib["file"]) for row in listed] == [("0.5", "spheres/sphere_000000.vtu")]
+    mesh = meshio.read(tmp_path / "spheres" / "sphere_000000.vtu")
+    each = len(particle.centres)
+    assert [(block.type, block.data.shape) for block in mesh.cells] == [("vertex", (COUNT * each, 1))]
+    data = mesh.point_data
+    assert set(data) == {"radius_m", "smarticle_id", "link"}
+    assert (data["radius_m"] == diameter / 2).all()
+    assert np.array_equal(data["smarticle_id"], np.repeat(np.arange(COUNT), each))
+    # Independent of how the state places spheres: each is as far from its link's line as its row is from the plane.
+    ends = state.vertices[data["smarticle_id"]]
+    start, end = (ends[np.arange(COUNT * each), data["link"] + k] for k in (0, 1))
+    along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
+    off = mesh.points - start
+    beside = np.linalg.norm(off - (off * along).sum(axis=1)[:, None] * along, axis=1)
+    assert beside == pytest.approx(np.tile(np.abs(particle.centres[:, 2]), COUNT), abs=1e-12)
+    assert ((off * along).sum(axis=1) > -1e-12).all()
+    assert ((off * along).sum(axis=1) < np.linalg.norm(end - start, axis=1) + 1e-12).all()
+    assert set(data["link"]) == {0, 1, 2}
