@@ -31,6 +31,8 @@ _SHOWN = (
     ("voronoi", "phi voronoi [-]", ".4f", 1.0),
     ("⟨N⟩", "crossings mean [-]", ".2f", 1.0),
     ("z [mm]", "com height [m]", ".2f", 1e3),
+    ("peak F/nW", "hook peak force over n W_s [-]", ".3f", 1.0),
+    ("hook work [mJ]", "hook work [J]", ".3g", 1e3),
 )
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 
@@ -135,7 +137,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
     print(_table(table))
-    print(_legend(per_frame=arguments.frames))
+    print(_legend(per_frame=arguments.frames, hooks="hook work [J]" in table.columns))
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
     return 0
@@ -165,10 +167,11 @@ def _cell(value: object, form: str, factor: float) -> Cell | str:
     return Cell(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 
-def _legend(*, per_frame: bool) -> str:
+def _legend(*, per_frame: bool, hooks: bool) -> str:
     """What the columns mean, and over what they are averaged."""
     from postprocess.measure import LAST_FRAMES  # noqa: PLC0415
     from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
+    from postprocess.pull import WINDOW  # noqa: PLC0415
 
     costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
     averaged = f"means over the last {LAST_FRAMES} frames of each phase, SE: their standard error"
@@ -180,6 +183,11 @@ def _legend(*, per_frame: bool) -> str:
         ),
         "⟨N⟩: links of others through a smarticle's plane; z: height of the centre of mass above the floor",
     ]
+    if hooks:
+        lines.append(
+            f"peak F/nW: largest mean over {WINDOW:g} s of the force on the hook that is raised, over the weight of "
+            "all smarticles; hook work: ∫ F dz over the whole pull"
+        )
     return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
 
 

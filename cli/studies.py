@@ -150,4 +150,13 @@ amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): pac
 energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
 reach at a small l/w are left out. --quick takes minutes.""",
     ),
+    "fracture": Study(
+        analyse=partial(_analyse_reported, module="postprocess.fracture"),
+        pictured={"procedure": "shape-change", "l_over_w": 0.7},
+        about="""\
+a hook is pulled out of piles that were prepared by each procedure, by internal oscillation of several
+amplitudes θ, and of several l/w, against the findings of Savoie et al. (Soft Matter 2023) on tensile loading:
+force against time, peak force, work, and how they go with entanglement. 36 runs of the paper's numbers of
+smarticles, seed by seed; --quick takes minutes.""",
+    ),
 }

@@ -14,6 +14,7 @@ from dem.errors import InputError
 from postprocess.colouring import COLOURINGS, Colouring
 from postprocess.frames import Frame
 from postprocess.manifest import RunManifest
+from postprocess.surroundings import Surroundings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,15 +83,34 @@ class Look:
         return np.stack([right, np.cross(right, forward), forward])
 
 
-def extent(frame: Frame, run: RunManifest, look: Look) -> NDArray[np.float64]:
+def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
     """Points (n, 3) [mm] above the floor that must be in the picture; the floor is at z = 0."""
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
+    if surroundings.hooks is not None:
+        # The upper one may be above the pile.
+        upper = circle(surroundings.hooks.length / 2, surroundings.hooks.heights(frame.time)[1])
+        points = np.concatenate([points, upper * MILLIMETRE])
+    parts = [points, circle(run.container_radius * MILLIMETRE, 0.0)]
     top = _wall_height(float(points[:, 2].max()), run)
-    rim = circle(run.container_radius * MILLIMETRE, top)
-    if look.elevation < 90:
-        rim = rim[rim @ look.axes[2] > look.axes[2, 2] * top]
-    floor = circle(run.container_radius * MILLIMETRE, 0.0)
-    return np.concatenate([points, floor, rim])
+    for radius, height in wall_corners(top, run, surroundings)[1:]:
+        rim = circle(radius, height)
+        # The front is cut open.
+        parts.append(rim if look.elevation >= 90 else rim[rim @ look.axes[2] > look.axes[2, 2] * height])
+    return np.concatenate(parts)
+
+
+def wall_corners(top: float, run: RunManifest, surroundings: Surroundings) -> list[tuple[float, float]]:
+    """Radius and height of the corners of the wall from the floor up [mm]; the highest part ends at `top` [mm].
+
+    The top tier of a mould is high enough to pour through; it is cut as well, but not all of it.
+    """
+    corners = [(radius * MILLIMETRE, height * MILLIMETRE) for radius, height in surroundings.corners]
+    if corners:
+        *below, (radius, height) = corners
+        least = below[-1][1] + run.middle_length * MILLIMETRE / 4
+        return [*below, (radius, min(height, max(top, least)))]
+    radius = run.container_radius * MILLIMETRE
+    return [(radius, 0.0), (radius, top)]
 
 
 def _wall_height(top: float, run: RunManifest) -> float:

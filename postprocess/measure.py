@@ -18,6 +18,7 @@ from postprocess.geometry import centres_of_mass
 from postprocess.heights import heights
 from postprocess.manifest import read_run
 from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_fraction
+from postprocess.pull import PULL, has_pull, pull_columns
 from postprocess.series import Series, read_series
 
 if TYPE_CHECKING:
@@ -52,6 +53,9 @@ _SERIES_COLUMNS = {
     "motor_torque_N_m": "motor torque",
     "halted_fraction": "halted fraction",
     "joint_gap_m": "joint gap",
+    "hook_upper_force_N": "upper hook force",
+    "hook_lower_force_N": "lower hook force",
+    "hook_upper_z_m": "upper hook z",
 }
 # What the columns of a series of vectors are, by their number.
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
@@ -121,7 +125,8 @@ def summarise_run(
 
     Each measure has a second column, "… SE", with the standard error of the mean as in
     `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
-    those of the last frame alone, without an error, unless asked for at every frame.
+    those of the last frame alone, without an error, unless asked for at every frame. A phase that pulls a
+    hook has the measures of `pull.pull_columns` as well.
 
     Args:
         directory: A run directory.
@@ -152,6 +157,10 @@ def summarise_run(
             quantity, _, unit = name.rpartition(" [")
             summary[name] = mean.value
             summary[f"{quantity} SE [{unit}"] = mean.standard_error
+        index = part[0].phase
+        if manifest.phases[index].type == PULL and series is not None and has_pull(series, index):
+            # Of the whole phase, not of its last frames.
+            summary |= pull_columns(manifest, series, index)
         summaries.append(summary)
     return pd.DataFrame(summaries)
 

@@ -9,7 +9,7 @@ bounces, and is looser while it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -229,11 +229,12 @@ def static_spread(runs: pd.DataFrame) -> float:
     return float((groups.max() - groups.min()).max())
 
 
-def points(table: pd.DataFrame) -> pd.DataFrame:
+def points(table: pd.DataFrame, quantities: Iterable[str] = tuple(QUANTITIES)) -> pd.DataFrame:
     """One row per procedure, aspect ratio and θ: means over seeds with their errors.
 
     Args:
         table: See `samples`.
+        quantities: Columns that are averaged.
 
     Returns:
         The table; `… SE` is the standard error, `… 95 %` the half-width of the confidence interval, `… seeds`
@@ -248,7 +249,7 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
             SEEDS: len(group),
             "seeds": " ".join(map(str, sorted(group[SEED]))),
         }
-        for quantity in QUANTITIES:
+        for quantity in quantities:
             mean = mean_over_seeds(group[quantity])
             row[quantity] = mean.value
             row[marked(quantity, "SE")] = mean.standard_error

@@ -15,6 +15,7 @@ from postprocess.camera import Look, extent
 from postprocess.frames import FrameSequence, read_frames
 from postprocess.manifest import read_run
 from postprocess.stage import Stage
+from postprocess.surroundings import read_surroundings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,10 +33,10 @@ def render_run(
     view: str = "front",
     overwrite: bool = False,
 ) -> Path:
-    """Draws one frame of a run: every link as its real box, in a cylinder cut open in front.
+    """Draws one frame of a run: every link as its real box, in a container cut open in front, with its hooks.
 
-    The cylinder is drawn up to a little above the pile: a run does not record how tall its
-    container is.
+    A cylinder is drawn up to a little above the pile, a mould of tiers as it is. A wall that is being lifted is where
+    it is then; of one that was taken away its outline is left, faint.
 
     Args:
         directory: A run directory with at least one frame; the run need not be done.
@@ -62,7 +63,8 @@ def render_run(
     run, frames = read_run(directory), read_frames(directory)
     frame = frames[_frame_at(frames, time)]
     values = look.colouring.values(frame)
-    with Stage(run, look, extent(frame, run, look), _span(values)) as stage:
+    around = read_surroundings(run)
+    with Stage(run, look, around, extent(frame, run, look, around), _span(values)) as stage:
         image = stage.picture(frame, values)
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
@@ -115,14 +117,15 @@ def render_film(
         msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; use render_run"
         raise InputError(msg)
     shown = np.unique(np.linspace(0, len(frames) - 1, most_frames).round().astype(int))
+    around = read_surroundings(run)
     extents, values = [], []
     for index in shown:
         frame = frames[int(index)]
-        extents.append(extent(frame, run, look))
+        extents.append(extent(frame, run, look, around))
         values.append(look.colouring.values(frame))
 
     with (
-        Stage(run, look, np.concatenate(extents), _span(np.concatenate(values))) as stage,
+        Stage(run, look, around, np.concatenate(extents), _span(np.concatenate(values))) as stage,
         figures.whole_file(output, overwrite=overwrite) as temporary,
     ):
 

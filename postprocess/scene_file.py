@@ -1,4 +1,4 @@
-"""What the scene of a run asked of its phases, from `scene.yaml`."""
+"""What the scene of a run asked for: its phases, container and hooks, from `scene.yaml`."""
 
 from __future__ import annotations
 
@@ -17,19 +17,17 @@ _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhaseSettings:
-    """One phase as the scene describes it.
+class Settings:
+    """A part of the scene.
 
     Attributes:
         path: The scene file.
-        index: Position in the run, as in `Frame.phase`.
-        type: Name of the kind of phase.
+        place: Where in it, e.g. "phases.2."; empty for the scene itself.
         values: Everything that the scene says of it, defaults included.
     """
 
     path: Path
-    index: int
-    type: str
+    place: str = ""
     values: Mapping[str, Any]
 
     def number(self, key: str) -> float:
@@ -40,8 +38,72 @@ class PhaseSettings:
         """
         value = self.values.get(key)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            refuse("scene", self.path, f"phases.{self.index}.{key} must be a finite number: got {value!r}", _REMEDY)
+            refuse("scene", self.path, f"{self.place}{key} must be a finite number: got {value!r}", _REMEDY)
         return float(value)
+
+    def part(self, key: str) -> Settings | None:
+        """A part of this part; None where there is none, or null.
+
+        Raises:
+            InputError: It is something else than a mapping.
+        """
+        value = self.values.get(key)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            refuse("scene", self.path, f"{self.place}{key} must be a mapping: got {value!r}", _REMEDY)
+        return Settings(path=self.path, place=f"{self.place}{key}.", values=MappingProxyType(value))
+
+    def parts(self, key: str) -> tuple[Settings, ...]:
+        """A list of parts; empty where there is none, or null.
+
+        Raises:
+            InputError: It is something else than a list of mappings.
+        """
+        value = self.values.get(key)
+        if value is None:
+            return ()
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            refuse("scene", self.path, f"{self.place}{key} must be a list of mappings: got {value!r}", _REMEDY)
+        return tuple(
+            Settings(path=self.path, place=f"{self.place}{key}.{index}.", values=MappingProxyType(item))
+            for index, item in enumerate(value)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseSettings(Settings):
+    """One phase as the scene describes it.
+
+    Attributes:
+        index: Position in the run, as in `Frame.phase`.
+        type: Name of the kind of phase.
+    """
+
+    index: int
+    type: str
+
+
+def read_scene(directory: Path | str) -> Settings:
+    """The scene of a run.
+
+    Args:
+        directory: A run directory.
+
+    Raises:
+        InputError: The file is missing, damaged, or no mapping.
+
+    Source:
+        ARCHITECTURE.md, "The run directory": the resolved scene, every default written out.
+    """
+    path = Path(directory) / "scene.yaml"
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        refuse("scene", path, error, _REMEDY)
+    if not isinstance(content, dict):
+        refuse("scene", path, "it must be a mapping", _REMEDY)
+    return Settings(path=path, values=MappingProxyType(content))
 
 
 def read_phases(directory: Path | str) -> tuple[PhaseSettings, ...]:
@@ -54,20 +116,13 @@ def read_phases(directory: Path | str) -> tuple[PhaseSettings, ...]:
         The phases in order.
 
     Raises:
-        InputError: The file is missing, damaged, or lists no phases.
-
-    Source:
-        ARCHITECTURE.md, "The run directory": the resolved scene, every default written out.
+        InputError: As in `read_scene`, or the scene lists no phases.
     """
-    path = Path(directory) / "scene.yaml"
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        refuse("scene", path, error, _REMEDY)
-    phases = content.get("phases") if isinstance(content, dict) else None
+    scene = read_scene(directory)
+    phases = scene.values.get("phases")
     if not isinstance(phases, list) or not all(isinstance(phase, dict) and "type" in phase for phase in phases):
-        refuse("scene", path, "'phases' must be a list of phases with a type", _REMEDY)
+        refuse("scene", scene.path, "'phases' must be a list of phases with a type", _REMEDY)
     return tuple(
-        PhaseSettings(path=path, index=index, type=str(phase["type"]), values=MappingProxyType(phase))
-        for index, phase in enumerate(phases)
+        PhaseSettings(path=part.path, place=part.place, values=part.values, index=index, type=str(part.values["type"]))
+        for index, part in enumerate(scene.parts("phases"))
     )

@@ -11,7 +11,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -21,7 +21,7 @@ from PIL import Image
 
 from dem.errors import InputError, RunError
 from postprocess import figures
-from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, circle, fitted_camera
+from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, circle, fitted_camera, wall_corners
 from postprocess.colouring import ColourScale
 from postprocess.entanglement import entanglement
 from postprocess.errors import UndefinedMeasureError
@@ -29,6 +29,7 @@ from postprocess.frames import Frame
 from postprocess.geometry import checked_vertices, link_lengths, plane_frames
 from postprocess.manifest import RunManifest
 from postprocess.packing import packing_fraction
+from postprocess.surroundings import Hooks, Surroundings
 
 with warnings.catch_warnings():
     # PyVista imports pyplot: see postprocess.figures.
@@ -95,13 +96,17 @@ class Stage:
         self,
         run: RunManifest,
         look: Look,
+        surroundings: Surroundings,
         extent: NDArray[np.float64],
         span: tuple[float, float],
     ) -> None:
         self._run = run
         self._look = look
+        self._surroundings = surroundings
         self._scale = ColourScale.of(look.colouring, *span)
         self._wall: list[Any] = []  # what goes away with the container
+        self._ghost: Any = None  # what is left of it then
+        self._hooks: list[Any] = []  # the lower and the upper one
         _check_graphics()
         with _quiet_vtk():
             width, height = look.panel
@@ -149,8 +154,7 @@ class Stage:
                 reset_camera=False,
                 render=False,
             )
-            for part in self._wall:
-                part.visibility = self._run.walled(frame.phase)
+            self._move(frame)
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
         panel = Image.fromarray(pixels).resize(self._look.panel, Image.Resampling.LANCZOS)
@@ -159,19 +163,27 @@ class Stage:
     def _build(self, extent: NDArray[np.float64]) -> None:
         plotter, axes = self._plotter, self._look.axes
         radius = self._run.container_radius * MILLIMETRE
-        top = float(extent[:, 2].max())  # of the wall's rim, which is above the pile
         plotter.set_background("white")
         floor = pv.Disc(inner=0, outer=radius, c_res=180)
         plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
-        arc = _back_arc(radius, axes[2])
-        if arc is not None:
-            wall = pv.MultipleLines(arc).extrude((0.0, 0.0, top), capping=False)
-            upper = arc + np.array([0.0, 0.0, top])
+        corners = wall_corners(float(extent[:, 2].max()), self._run, self._surroundings)
+        rims = _back_rims(corners, axes[2])
+        if rims is None:
+            for outer, height in corners[1:]:
+                self._add_outline(pv.MultipleLines(circle(outer, height)))
+        else:
+            outline = _outline(rims)
             self._wall = [
-                plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False),
-                self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]])),
+                plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
+                self._add_outline(outline),
             ]
-        self._add_outline(circle(radius, 0.0 if arc is not None else top))
+            if self._surroundings.removed is not None:
+                self._ghost = self._add_outline(outline, opacity=0.3)
+            self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
+        if self._surroundings.hooks is not None:
+            mesh = _cross(self._surroundings.hooks)
+            look = {"color": "#b3261e", "ambient": 0.25, "diffuse": 0.8, "render": False}
+            self._hooks = [plotter.add_mesh(mesh, **look) for _ in range(2)]
         width, height = self._look.panel
         position, focus = fitted_camera(extent, axes, width / height)
         self._light(position, focus)
@@ -190,9 +202,23 @@ class Stage:
             blur=True,
         )
 
-    def _add_outline(self, points: NDArray[np.float64]) -> Any:
+    def _move(self, frame: Frame) -> None:
+        """Puts walls and hooks where they are in a frame."""
+        top = float(frame.vertices[..., 2].max()) - frame.floor_z
+        raised = self._surroundings.raised(frame.time, frame.phase, top)
+        for part in self._wall:
+            part.visibility = raised is not None
+            part.position = (0.0, 0.0, MILLIMETRE * (raised or 0.0))
+        if self._ghost is not None:
+            self._ghost.visibility = raised is None
+        if self._surroundings.hooks is not None:
+            for hook, height in zip(self._hooks, self._surroundings.hooks.heights(frame.time), strict=True):
+                hook.position = (0.0, 0.0, MILLIMETRE * height)
+
+    def _add_outline(self, lines: pv.PolyData, *, opacity: float = 1.0) -> Any:
         return self._plotter.add_mesh(
-            pv.MultipleLines(points),
+            lines,
+            opacity=opacity,
             color="#7d8f9f",
             line_width=1.8 * _OVERSAMPLING,
             lighting=False,
@@ -259,13 +285,39 @@ class Stage:
             return Image.fromarray(figures.pixels(figure))
 
 
-def _back_arc(radius: float, forward: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The half of the rim (n, 3) that faces the camera from behind; None seen from above."""
+def _back_rims(corners: Sequence[tuple[float, float]], forward: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The halves (m, n, 3) of a wall's rims that face the camera from behind; None seen from above."""
     if math.hypot(forward[0], forward[1]) < 1e-9:
         return None
     middle = math.atan2(forward[1], forward[0])
     angle = middle + np.linspace(-math.pi / 2, math.pi / 2, 91)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    return np.stack([radius * arc + [0.0, 0.0, height] for radius, height in corners])
+
+
+def _bands(rims: NDArray[np.float64]) -> pv.PolyData:
+    """The surface between successive rims (m, n, 3)."""
+    count, points = rims.shape[:2]
+    first = (points * np.arange(count - 1)[:, None] + np.arange(points - 1)).ravel()
+    faces: Any = np.stack([first, first + 1, first + points + 1, first + points], axis=1)
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(rims.reshape(-1, 3), faces)
+    return mesh
+
+
+def _outline(rims: NDArray[np.float64]) -> pv.PolyData:
+    """Both edges of a wall, and every rim of it but the lowest, (m, n, 3)."""
+    lines = [rims[:, 0], *rims[1:], rims[:, -1]]
+    first, *rest = (pv.MultipleLines(line) for line in lines)
+    mesh: pv.PolyData = first.append_polydata(*rest)
+    return mesh
+
+
+def _cross(hooks: Hooks) -> pv.PolyData:
+    """The two bars of a hook, centred at the origin [mm]."""
+    long, thick = MILLIMETRE * hooks.length / 2, MILLIMETRE * hooks.side / 2
+    bars = [pv.Box((-x, x, -y, y, -thick, thick)) for x, y in ((long, thick), (thick, long))]
+    mesh: pv.PolyData = bars[0].append_polydata(bars[1])
+    return mesh
 
 
 def _check_graphics() -> None:

@@ -17,6 +17,7 @@ from postprocess.frames import read_frames
 from postprocess.manifest import read_run
 from postprocess.render import render_film, render_run
 from postprocess.stage import link_boxes
+from postprocess.surroundings import read_surroundings
 
 SIZE = (240, 240)
 
@@ -100,7 +101,8 @@ def test_camera_sees_everything_and_stands_no_further_than_needed(tmp_path, view
     scene = SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(packing,))
     directory = write_run(tmp_path, scene)
     look = Look.checked(color_by="id", size=SIZE, view=view)
-    points = extent(read_frames(directory)[0], read_run(directory), look)
+    run = read_run(directory)
+    points = extent(read_frames(directory)[0], run, look, read_surroundings(run))
     right, up, forward = look.axes
     position, focus = fitted_camera(points, look.axes, 1.3)
     assert np.cross(focus - position, forward) == pytest.approx(0, abs=1e-6 * np.linalg.norm(focus - position))

@@ -1,0 +1,166 @@
+"""The paper's findings on tensile loading, section "Tensile loading and fracture", each judged by our own runs.
+
+Runs of one l/w and seed were poured alike, so they are compared seed by seed, and slopes are taken within seeds. The
+paper's text claims nothing of how the force depends on l/w or on θ by itself: of these there are figures and means.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
+from postprocess.fracture_runs import PEAK, PEAK_RAISED
+from postprocess.procedures_effects import of_procedure, paired
+from postprocess.procedures_runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
+from postprocess.seeds import slope_within
+from postprocess.study_runs import ASPECT, SEED
+
+SHOWN_ASPECT = 0.7
+"""Aspect ratio at which procedures and amplitudes are compared, as in the paper [-]."""
+
+
+def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
+    """All findings, judged.
+
+    Args:
+        table: One row per run, see `fracture_runs.fracture_row`.
+    """
+    judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
+        _shape_change_strongest,
+        _internal_weakest,
+        _other_order_than_crossings,
+        _goes_with_crossings_over_amplitude,
+        _goes_with_crossings,
+        _harder_but_more_brittle,
+    )
+    return tuple(finding(table) for finding in judges)
+
+
+def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
+    """Runs at the aspect ratio of the comparison of procedures."""
+    return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
+
+
+def _compared(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str], sign: int) -> tuple[str, Verdict]:
+    """Whether one procedure is above (sign 1) or below (−1) each of others, seed by seed."""
+    effects = [paired(table, quantity, one, other) for other in others]
+    ours = ", ".join(f"less {other} {told(effect, 3)}" for other, effect in zip(others, effects, strict=True))
+    return ours, all_of([judge(effect if sign > 0 else negative(effect)) for effect in effects])
+
+
+def _shape_change_strongest(table: pd.DataFrame) -> Finding:
+    part = at_shown_aspect(table)
+    ours, verdict = _compared(part, PEAK, SHAPE, (EXTERNAL, INTERNAL), 1)
+    static = told(paired(part, PEAK, SHAPE, STATIC), 3)
+    return Finding(
+        paper=f"Shape change has the highest peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
+        ours=f"peak of shape-change {ours}; beside the criterion: less static {static}",
+        verdict=verdict,
+        criterion=f"peak force above those of external and of internal oscillation at θ = {AMPLITUDE:g}°, seed by seed",
+    )
+
+
+def _internal_weakest(table: pd.DataFrame) -> Finding:
+    part = at_shown_aspect(table)
+    ours, verdict = _compared(part, PEAK, INTERNAL, (EXTERNAL, SHAPE), -1)
+    static = told(paired(part, PEAK, INTERNAL, STATIC), 3)
+    return Finding(
+        paper=f"Internal oscillation has the least peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
+        ours=f"peak of internal {ours}; beside the criterion: less static {static}",
+        verdict=verdict,
+        criterion=f"peak force at θ = {AMPLITUDE:g}° below that of external oscillation and of shape change, by seed",
+    )
+
+
+def _other_order_than_crossings(table: pd.DataFrame) -> Finding:
+    part, names = at_shown_aspect(table), (EXTERNAL, INTERNAL, SHAPE)
+    against: list[str] = []
+    along: list[str] = []
+    unknown = False
+    for one, other in itertools.combinations(names, 2):
+        signs = []
+        for quantity in (CROSSINGS, PEAK):
+            effect = paired(part, quantity, one, other)
+            unknown |= math.isnan(effect.value)
+            above, below = judge(effect) == "found", judge(negative(effect)) == "found"
+            signs.append(above - below)
+        if all(signs):
+            (along if signs[0] == signs[1] else against).append(f"{one} and {other}")
+    verdict: Verdict = "not resolved"
+    if against:
+        verdict = "found"
+    elif unknown:
+        verdict = "no data"
+    elif len(along) == len(names):
+        verdict = "not found"
+    ours = "; ".join(
+        f"by {name}: {_ranked(part, quantity, names)}" for name, quantity in (("⟨N⟩", CROSSINGS), ("peak", PEAK))
+    )
+    ours += f"; clearly apart the other way round: {', '.join(against) or 'none'}, alike: {', '.join(along) or 'none'}"
+    return Finding(
+        paper="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
+        ours=ours,
+        verdict=verdict,
+        criterion="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
+        "clearly in the same sense",
+    )
+
+
+def _ranked(part: pd.DataFrame, quantity: str, names: Sequence[str]) -> str:
+    """`shape-change 5.1 > internal 4.2`, means over seeds."""
+    means = {name: float(of_procedure(part, name)[quantity].mean()) for name in names}
+    known = sorted((name for name in names if math.isfinite(means[name])), key=lambda name: -means[name])
+    return " > ".join(f"{name} {means[name]:.3g}" for name in known) or "none"
+
+
+def _goes_with_crossings_over_amplitude(table: pd.DataFrame) -> Finding:
+    part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
+    thetas = " ".join(f"{theta:g}" for theta in sorted(part[THETA].unique()))
+    ours, verdict = _against_crossings(part, part[SEED].tolist())
+    return Finding(
+        paper="Internal oscillation: over θ, the peak force goes with ⟨N⟩",
+        ours=f"{ours}, θ = {thetas}°, l/w = {SHOWN_ASPECT:g}" if thetas else "no data",
+        verdict=verdict,
+        criterion=f"slope of the peak force against ⟨N⟩ > 0, within seeds, l/w = {SHOWN_ASPECT:g}",
+    )
+
+
+def _goes_with_crossings(table: pd.DataFrame) -> Finding:
+    blocks = list(zip(table[ASPECT], table[SEED], strict=True))
+    ours, verdict = _against_crossings(table, blocks)
+    internal = table[table[PROCEDURE] == INTERNAL]
+    beside, _ = _against_crossings(internal, internal[SEED].tolist())
+    return Finding(
+        paper="Tensile strength and number of entanglements are connected",
+        ours=f"all runs: {ours}; beside the criterion: internal over θ and l/w: {beside}",
+        verdict=verdict,
+        criterion="slope of the peak force against ⟨N⟩ > 0 over all procedures and θ, within runs of one l/w and seed",
+    )
+
+
+def _against_crossings(part: pd.DataFrame, blocks: Sequence[object]) -> tuple[str, Verdict]:
+    """Slope and correlation of the peak force with ⟨N⟩ within blocks."""
+    slope = slope_within(part[CROSSINGS], part[PEAK], [str(block) for block in blocks])
+    back = slope_within(part[PEAK], part[CROSSINGS], [str(block) for block in blocks])
+    # The product of the two slopes is r².
+    product = slope.value * back.value
+    correlation = f", r = {math.copysign(math.sqrt(product), slope.value):+.2f}" if product >= 0 else ""
+    return f"peak against ⟨N⟩ {told(slope, 3, ' per link')}{correlation}", judge(slope)
+
+
+def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:
+    part = at_shown_aspect(table)
+    harder, brittle = (paired(part, quantity, SHAPE, INTERNAL) for quantity in (PEAK, PEAK_RAISED))
+    return Finding(
+        paper="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
+        "oscillation",
+        ours=f"shape-change less internal: peak {told(harder, 3)}, hook raised at the peak {told(brittle, 3, ' m')}",
+        verdict=all_of([judge(harder), judge(negative(brittle))]),
+        criterion="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
+        "that its fracture tests support this, not by which measure",
+    )

@@ -1,0 +1,181 @@
+"""What a hook tells that is pulled out of a pile: its force against time, peak, work, and whether it came free.
+
+Forces are those that it takes to raise the hook, upwards positive: what the smarticles exert on it, with the other
+sign. The series holds means between samples, so nothing is missed between two of them, but contacts come and go and
+one sample scatters: a peak is the largest mean over a window.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dem.errors import InputError
+from postprocess.manifest import RunManifest
+from postprocess.scene_file import read_scene
+from postprocess.series import Series
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+PULL = "pull-hook"
+"""Type of the phase."""
+
+WINDOW = 0.04
+"""Over which forces are averaged for a peak [s]: at w per second the hook rises by 0.47 mm meanwhile, less than t2."""
+
+FREE = 0.1
+"""A hook is free once its force stays below this share of the peak [-]."""
+
+END = 0.1
+"""At the end of the pull, over which the force is averaged that is left [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pull:
+    """A hook's history while it is pulled.
+
+    Attributes:
+        edges: (n + 1,) times since the pull began, of samples and of the one before them [s].
+        raised: (n + 1,) how far the hook has been raised there [m].
+        force: (n,) needed to raise it, mean between two samples [N].
+        before: The same force before the pull [N]: what rested on the hook; negative where it was held up.
+        engine_work: Work of the hook on the smarticles by the engine's own account [J]; NaN where not recorded.
+    """
+
+    edges: NDArray[np.float64] = field(repr=False)
+    raised: NDArray[np.float64] = field(repr=False)
+    force: NDArray[np.float64] = field(repr=False)
+    before: float
+    engine_work: float
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """(n,) middles of the intervals that forces are means over [s]."""
+        middles: NDArray[np.float64] = (self.edges[:-1] + self.edges[1:]) / 2
+        return middles
+
+    @property
+    def work(self) -> float:
+        """∫ F dz over the whole pull [J]; a hook that came free adds nothing from then on."""
+        return float(self.force @ np.diff(self.raised))
+
+    @property
+    def left(self) -> float:
+        """Mean force over the last `END` of the pull [N]: what the hook still holds, less friction."""
+        return float(self.force[self.times > self.edges[-1] - END].mean())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """The largest force of a pull.
+
+    Attributes:
+        force: Mean over the window [N].
+        time: Of the window's middle, since the pull began [s].
+        raised: How far the hook had been raised then [m].
+    """
+
+    force: float
+    time: float
+    raised: float
+
+
+def read_pull(run: RunManifest, series: Series, phase: int) -> Pull:
+    """A hook's history in a phase, so far as it has come.
+
+    Args:
+        run: The run.
+        series: Its series.
+        phase: Index of a phase that pulls a hook.
+
+    Raises:
+        InputError: The series lacks the hook's force or height, or does not reach into the phase.
+    """
+    inside = np.nonzero(series["phase"] == phase)[0]
+    force = -series["hook_upper_force_N"][:, 2]
+    # The hooks move with the container, which does not move now.
+    height = series["hook_upper_z_m"]
+    if len(inside) < 2 or inside[0] == 0 or not np.isfinite(force[inside]).all():
+        msg = f"{series.path}: no force of a hook throughout phase {phase} of {run.directory}; run it again"
+        raise InputError(msg)
+    span = np.concatenate([[inside[0] - 1], inside])
+    resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
+    resting = resting[np.isfinite(resting)][-max(1, _samples(series.time[span], END)) :]
+    work = series.data.get("container_work_J")
+    return Pull(
+        edges=series.time[span] - series.time[span[0]],
+        raised=height[span] - height[span[0]],
+        force=force[inside],
+        before=float(resting.mean()) if len(resting) else math.nan,
+        engine_work=math.nan if work is None else float(work[span[-1]] - work[span[0]]),
+    )
+
+
+def weight_of_one(run: RunManifest) -> float:
+    """W_s, weight of one smarticle [N].
+
+    Raises:
+        InputError: The scene cannot be read, or does not tell gravity.
+    """
+    return run.smarticle_mass * read_scene(run.directory).number("gravity_m_per_s2")
+
+
+def moving_mean(pull: Pull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means of the force over every window: middles (m,) [s] and forces (m,) [N].
+
+    Args:
+        pull: The history.
+        window: [s]; rounded to whole samples, one at least, all at most.
+    """
+    count = _samples(pull.edges, window)
+    weights = np.full(count, 1 / count)
+    return np.convolve(pull.times, weights, mode="valid"), np.convolve(pull.force, weights, mode="valid")
+
+
+def peak(pull: Pull, window: float = WINDOW) -> Peak:
+    """The largest mean over a window; arguments as in `moving_mean`."""
+    times, means = moving_mean(pull, window)
+    highest = int(means.argmax())
+    time = float(times[highest])
+    return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
+
+
+def freed(pull: Pull, window: float = WINDOW) -> float:
+    """Time from which the windowed force stays below `FREE` of its peak [s]; NaN if it does not come to that."""
+    times, means = moving_mean(pull, window)
+    held = np.nonzero(means > FREE * means.max())[0]
+    if not len(held) or held[-1] + 1 == len(means):
+        return math.nan
+    return float(times[held[-1] + 1])
+
+
+def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, float]:
+    """Measures of a pull for a table, forces over the weight of all smarticles, n W_s.
+
+    Raises:
+        InputError: As `read_pull` and `weight_of_one`.
+    """
+    pull, weight = read_pull(run, series, phase), weight_of_one(run)
+    highest = peak(pull)
+    return {
+        "hook peak force over n W_s [-]": highest.force / weight / run.count,
+        "hook peak time [s]": highest.time,
+        "hook peak raised [m]": highest.raised,
+        "hook work [J]": pull.work,
+        "hook free time [s]": freed(pull),
+        "hook load at the end [smarticles]": pull.left / weight,
+    }
+
+
+def has_pull(series: Series, phase: int) -> bool:
+    """Whether there is enough of a pull in a series to measure."""
+    return "hook_upper_force_N" in series.data and int((series["phase"] == phase).sum()) >= 2
+
+
+def _samples(edges: NDArray[np.float64], window: float) -> int:
+    """Samples in a window [s], one at least and all at most."""
+    return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)

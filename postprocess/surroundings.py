@@ -1,0 +1,145 @@
+"""What does not give way to smarticles, for pictures: hooks and walls, where they are at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from postprocess.manifest import RunManifest
+from postprocess.scene_file import Settings, read_scene
+from postprocess.series import Series, read_series
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_REMOVAL = "remove-container"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hooks:
+    """Two crosses of two square bars each.
+
+    Attributes:
+        side: Of the bars [m].
+        length: Of the bars [m].
+        lower: Height of the lower cross above the floor [m].
+        times: (n,) at which the upper cross's height is known [s].
+        upper: (n,) height of the upper cross above the floor [m].
+    """
+
+    side: float
+    length: float
+    lower: float
+    times: NDArray[np.float64] = field(repr=False)
+    upper: NDArray[np.float64] = field(repr=False)
+
+    @classmethod
+    def of(cls, settings: Settings, series: Series | None) -> Self:
+        """Hooks of a scene; without a series the upper one is drawn where it started."""
+        times, upper = np.zeros(1), np.array([settings.number("upper_height_m")])
+        if series is not None:
+            times, upper = series.time, series["hook_upper_z_m"] - series["container_z_m"]
+        return cls(
+            side=settings.number("side_m"),
+            length=settings.number("length_m"),
+            lower=settings.number("lower_height_m"),
+            times=times,
+            upper=upper,
+        )
+
+    def heights(self, time: float) -> tuple[float, float]:
+        """Heights of the lower and the upper cross above the floor at a time [m]."""
+        return self.lower, float(np.interp(time, self.times, self.upper))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lift:
+    """A wall that is lifted.
+
+    Attributes:
+        start: Time at which it begins to rise [s].
+        end: Time at which it stops, if it was not clear of the pile before [s].
+        speed: [m/s].
+    """
+
+    start: float
+    end: float
+    speed: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surroundings:
+    """The container and the hooks of a run.
+
+    Attributes:
+        tiers: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder, which is drawn
+            as high as the pile needs.
+        removed: Index of the phase that takes the wall away; None if none does.
+        lift: How it is lifted; None if it goes at once.
+        hooks: None in scenes without.
+    """
+
+    tiers: tuple[tuple[float, float], ...] = ()
+    removed: int | None = None
+    lift: Lift | None = None
+    hooks: Hooks | None = field(default=None, repr=False)
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Radius and height of the corners of a mould's wall, from the floor up [m]: walls and ceilings in turn."""
+        found = [(self.tiers[0][0], 0.0), self.tiers[0]] if self.tiers else []
+        for (_, top), (radius, higher) in pairwise(self.tiers):
+            found += [(radius, top), (radius, higher)]
+        return found
+
+    def raised(self, time: float, phase: int, top: float) -> float | None:
+        """How far the wall has been lifted [m]; None once it is gone.
+
+        Args:
+            time: [s].
+            phase: Index of the phase at that time.
+            top: Height of the pile's top above the floor [m]; a wall that is lifted clear of it is gone.
+        """
+        if self.removed is None or phase < self.removed:
+            return 0.0
+        if self.lift is None:
+            return None
+        raised = self.lift.speed * (min(max(time, self.lift.start), self.lift.end) - self.lift.start)
+        return raised if raised <= top else None
+
+
+def read_surroundings(run: RunManifest) -> Surroundings:
+    """What the scene of a run says of its container and hooks, and where the series says that they are.
+
+    Raises:
+        InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
+    """
+    scene = read_scene(run.directory)
+    series = read_series(run.directory) if (run.directory / "series.h5").exists() else None
+    container, hooks = scene.part("container"), scene.part("hooks")
+    tops = [0.0]
+    tiers = container.parts("tiers") if container is not None else ()
+    for tier in tiers:
+        tops.append(tops[-1] + tier.number("height_m"))
+    removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
+    return Surroundings(
+        tiers=tuple((tier.number("radius_m"), top) for tier, top in zip(tiers, tops[1:], strict=True)),
+        removed=removed,
+        lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
+        hooks=None if hooks is None else Hooks.of(hooks, series),
+    )
+
+
+def _lift(run: RunManifest, phase: Settings, series: Series | None, index: int) -> Lift | None:
+    if phase.values.get("speed_m_per_s") is None:
+        return None
+    start = run.phases[index].start
+    if start is None:
+        # Not done yet: the phase began with the last sample of the one before.
+        if series is None:
+            return None
+        start = float(series.time[series["phase"] < index].max(initial=0.0))
+    return Lift(start=start, end=start + phase.number("duration_s"), speed=phase.number("speed_m_per_s"))

@@ -1,0 +1,57 @@
+"""Synthetic runs with hooks: what the upper one feels is a given function of how far it has been raised."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from synthetic import SyntheticRun, W, write_run
+
+GRAVITY = 9.81
+SPEED = W  # of the hook: w per second
+LOWER, UPPER = 0.005, 0.010
+INTERVAL = 0.004
+AFTER_REST = ("deposit", "relax", "pull-hook")
+
+
+def weight(run: SyntheticRun) -> float:
+    """Of one smarticle [N]."""
+    return 7850 * run.solid_volume * GRAVITY
+
+
+def write_hooked_run(
+    directory: Path, run: SyntheticRun, force: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> Path:
+    """A whole run whose last phase pulls the hook; `force` [N] needed, of times since the pull began [s]."""
+    write_run(directory, run)
+    path = directory / "scene.yaml"
+    scene = yaml.safe_load(path.read_text())
+    scene["gravity_m_per_s2"] = GRAVITY
+    scene["hooks"] = {"side_m": 5e-4, "length_m": W, "lower_height_m": LOWER, "upper_height_m": UPPER}
+    path.write_text(yaml.safe_dump(scene))
+    ends = np.cumsum([run.durations[kind] for kind in run.phases])
+    times = np.arange(1, round(ends[-1] / INTERVAL) + 1) * INTERVAL
+    phase = np.searchsorted(ends, times - INTERVAL / 2)
+    since = np.clip(times - ends[-2], 0, None)
+    upper = np.zeros((len(times), 3))
+    # A sample is the mean since the one before: taken in the middle between them.
+    upper[:, 2] = -np.where(since > 0, force(since - INTERVAL / 2), weight(run))
+    raised = SPEED * since
+    work = np.cumsum(-upper[:, 2] * np.diff(raised, prepend=0.0))
+    columns = {
+        "time_s": (times, "s"),
+        "phase": (phase, "1"),
+        "hook_upper_force_N": (upper, "N"),
+        "hook_lower_force_N": (np.zeros_like(upper), "N"),
+        "hook_upper_z_m": (UPPER + run.floor_z + raised, "m"),
+        "container_z_m": (np.full(len(times), run.floor_z), "m"),
+        "container_work_J": (work, "J"),
+    }
+    with h5py.File(directory / "series.h5", "w") as file:
+        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": run.seed})
+        for name, (values, unit) in columns.items():
+            file[name] = values
+            file[name].attrs.update({"unit": unit, "description": name})
+    return directory
