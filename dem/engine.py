@@ -127,7 +127,7 @@ class Engine:
     def _assemble(self, law: ContactLaw, *, shaken: bool, hinged: HingeLaw | None) -> None:
         yade = self._yade.classes
         friction = yade.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
-        shaker = [yade.HarmonicMotionEngine(ids=self.fixtures.bodies, dead=True)] if shaken else []
+        shaker = [yade.HarmonicMotionEngine(dead=True)] if shaken else []
         hooked = bool(self.fixtures.hooks)
         bars = [yade.Bo1_Box_Aabb()] if hooked else []
         collider = yade.InsertionSortCollider(
@@ -243,7 +243,7 @@ class Engine:
         self._smarticle_seconds += steps * self.time_step * self.count
 
     def shake(self, *, amplitude: float, frequency: float) -> None:
-        """Move the container as z = A sin(2πf t), t from now; it starts at the position where it is.
+        """Move what is there of the container as z = A sin(2πf t), t from now; it starts where it is.
 
         Args:
             amplitude: A [m].
@@ -259,8 +259,8 @@ class Engine:
         self._shaker.A = self._yade.vector(0, 0, amplitude)
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
+        self._shaker.ids = self.fixtures.moving = self.fixtures.bodies
         self._shaker.dead = False
-        self.fixtures.moving = self.fixtures.bodies
 
     def remove_wall(self) -> None:
         """Take the container's wall away; what its contacts had stored is lost."""

@@ -131,9 +131,10 @@ def _effects(scene: Scene) -> tuple[Effect, ...]:
     contact, recording = scene.contact, scene.recording
     shakes = [(k, phase) for k, phase in enumerate(scene.phases) if isinstance(phase, Shake)]
     shaken = bool(shakes)
+    removed = next((k for k, phase in enumerate(scene.phases) if isinstance(phase, RemoveContainer)), len(scene.phases))
     amplitudes = ", ".join(
         f"phase {k}: Γ = {phase.peak_acceleration_g:g}, f = {phase.frequency_hz:g} Hz, "
-        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm"
+        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm{', the floor alone' if k > removed else ''}"
         for k, phase in shakes
     )
     return (
