@@ -59,7 +59,6 @@ def add_engines(
     hinges: HingeLaw | None,
     gravity: float,
     radius: float,
-    movable: Sequence[int],
 ) -> None:
     """Make the engines and give them to the simulation.
 
@@ -70,7 +69,6 @@ def add_engines(
         hinges: stiffness of the hinges, where there are any.
         gravity: g, downwards [m/s²].
         radius: of the spheres [m].
-        movable: ids of the bodies that a moving container is made of.
     """
     classes = yade.classes
     # The materials of smarticles and wall are the first two.
@@ -85,7 +83,7 @@ def add_engines(
             "creep_viscosity": 0.0 if hinges is None else hinges.damper_viscosity,
         },
         "InsertionSortCollider": {"verletDist": VERLET_DISTANCE * radius},
-        "HarmonicMotionEngine": {"ids": movable, "dead": True},
+        "HarmonicMotionEngine": {"dead": True},
         "NewtonIntegrator": {
             "damping": 0,
             "gravity": yade.vector(0, 0, -gravity),

@@ -139,9 +139,10 @@ def _restitution(scene: Scene) -> tuple[bool, str]:
 
 
 def _container_motion(scene: Scene) -> tuple[bool, str]:
+    removed = next((k for k, phase in enumerate(scene.phases) if isinstance(phase, RemoveContainer)), len(scene.phases))
     shakes = [
         f"phase {k}: Γ = {phase.peak_acceleration_g:g}, f = {phase.frequency_hz:g} Hz, "
-        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm"
+        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm{', the floor alone' if k > removed else ''}"
         for k, phase in enumerate(scene.phases)
         if isinstance(phase, Shake)
     ]

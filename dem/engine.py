@@ -109,7 +109,6 @@ class Engine:
             hinges=hinge_law,
             gravity=gravity,
             radius=particle.radius,
-            movable=self.fixtures.bodies,
         )
         self._omega.dt = time_step
         self._bind()
@@ -197,7 +196,7 @@ class Engine:
         self._smarticle_seconds += steps * self.time_step * self.count
 
     def shake(self, *, amplitude: float, frequency: float) -> None:
-        """Move the container as z = A sin(2πf t), t from now; it starts at the position where it is.
+        """Move what is there of the container as z = A sin(2πf t), t from now; it starts where it is.
 
         Args:
             amplitude: A [m].
@@ -213,8 +212,8 @@ class Engine:
         self._shaker.A = self._yade.vector(0, 0, amplitude)
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
+        self._shaker.ids = self.fixtures.moving = self.fixtures.bodies
         self._shaker.dead = False
-        self.fixtures.moving = self.fixtures.bodies
 
     def remove_wall(self) -> None:
         """Take the container's wall away; what its contacts had stored is lost."""

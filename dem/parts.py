@@ -302,7 +302,11 @@ class Relax(Part):
 
 
 class Shake(Part):
-    """Shake the whole container along the vertical, z = A sin(2πft) with A = Γg/(2πf)²."""
+    """Shake the whole container along the vertical, z = A sin(2πft) with A = Γg/(2πf)².
+
+    After a phase that takes the container away, its floor alone is shaken, a plane without end: what rolls off the
+    pile goes on being shaken.
+    """
 
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]")

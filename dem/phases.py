@@ -76,7 +76,7 @@ class Resting:
 
 
 class Shaking:
-    """The container moves."""
+    """The container moves, or its floor alone where the wall was taken away."""
 
     def __init__(self, phase: Shake, gravity: float) -> None:
         self._phase = phase
@@ -88,6 +88,13 @@ class Shaking:
         if self.memory["begun"]:
             engine.stop_container()
             return 0.0
+        if engine.fixtures.walled and not engine.fixtures.enclosed:
+            msg = (
+                f"the wall hangs in the pile, {engine.fixtures.wall_bottom - engine.floor:.3g} m above the floor that "
+                "is to be shaken: it was not clear of the pile when remove-container ended; lengthen that phase's "
+                "duration_s or raise its speed_m_per_s"
+            )
+            raise RunError(msg)
         self.memory["begun"] = True
         engine.weld()
         engine.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)

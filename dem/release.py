@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 class RemoveContainer(Part):
     """Take the container's wall away and let the pile rest on its floor, which has no end. Motors hold.
 
-    Smarticles are not held back from then on: how far they go is measured, not refused.
+    Smarticles are not held back from then on: how far they go is measured, not refused. A later phase that shakes the
+    container shakes the floor, and those that have rolled away with it.
     """
 
     type: Literal["remove-container"]
@@ -30,7 +31,7 @@ class RemoveContainer(Part):
 
 
 def check_release(scene: Scene) -> None:
-    """Check that the container is taken away once at most, and that no later phase needs it.
+    """Check that the container is taken away once at most.
 
     Raises:
         ValueError: one line with key, value and the way out.
@@ -42,9 +43,3 @@ def check_release(scene: Scene) -> None:
                 msg = f"phases.{index}: remove-container, but phases.{removed} did so already; leave one of them out"
                 raise ValueError(msg)
             removed = index
-        elif phase.type == "shake" and removed is not None:
-            msg = (
-                f"phases.{index}: shake moves the container, which phases.{removed} (remove-container) takes away; "
-                "shake before it"
-            )
-            raise ValueError(msg)
