@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 from dem.assembly import Assembly
@@ -65,6 +66,11 @@ class Account:
         """Energy in the springs of contacts and of hinges [J]."""
         hinges = self._assembly.hinges
         return self._meter.contacts({}).elastic_energy, 0.0 if hinges is None else hinges.elastic_energy()
+
+    @property
+    def given(self) -> float:
+        """Energy added and work of fixtures since the start [J]; NaN while one moves whose work is not added up."""
+        return math.nan if self._fixtures.moving and not self._works else self.added + self.container_work
 
     def removed(self, remove: Callable[[], None]) -> None:
         """Do something that takes contacts away; what their springs held is dissipated."""

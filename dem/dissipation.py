@@ -143,8 +143,12 @@ class Meter:
         return Contacts(normals, first, last, overlaps, rest[:, 1], shear, rest[:, 2:4], rest[:, 4:6], rest[:, 6])
 
     def _contacts(self) -> Iterator[Any]:
-        smarticle_of = self._assembly.smarticle_of
-        for interaction in self._yade.omega.interactions:
-            # The others are bonds of hinges.
-            if interaction.isReal and (interaction.id1 in smarticle_of or interaction.id2 in smarticle_of):
-                yield interaction
+        return contacts_of(self._yade, self._assembly)
+
+
+def contacts_of(yade: Yade, assembly: Assembly) -> Iterator[Any]:
+    """YADE's interactions that are contacts; the others are bonds of hinges."""
+    smarticle_of = assembly.smarticle_of
+    for interaction in yade.omega.interactions:
+        if interaction.isReal and (interaction.id1 in smarticle_of or interaction.id2 in smarticle_of):
+            yield interaction

@@ -28,6 +28,7 @@ from dem.motor import MotorLaw, Motors
 from dem.particle import Particle
 from dem.placement import Poses
 from dem.state import State
+from dem.strain import Strain, measure_strain
 from dem.timestep import ContactLaw
 
 Array = NDArray[np.float64]
@@ -69,6 +70,7 @@ class Engine:
     ) -> None:
         self._yade = load_yade()
         self._omega = self._yade.omega
+        self._law = law
         self.particle = particle
         self.cylinder = cylinder
         self.time_step = time_step
@@ -329,6 +331,10 @@ class Engine:
                     if k is not None:
                         result[k] += 1
         return result
+
+    def strain(self) -> Strain:
+        """How far contacts and hinges are strained at present."""
+        return measure_strain(self._yade, self._assembly, self._law)
 
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""

@@ -12,6 +12,7 @@ from dem.engine import Engine
 from dem.frames import FrameWriter, frame_mesh, sphere_mesh
 from dem.progress import Progress
 from dem.series import SeriesWriter
+from dem.state import State
 from dem.watchdog import Watchdog
 
 
@@ -26,6 +27,7 @@ class Recorder:
         progress: told at every sample.
         series_steps: steps between samples.
         frame_steps: steps between frames; a whole multiple of `series_steps`.
+        strain_steps: steps between the watchdog's looks at contacts; a whole multiple of `series_steps`.
         spheres: writes the spheres as points; None: nobody does.
         sphere_steps: steps between these; a whole multiple of `series_steps`.
     """
@@ -36,6 +38,7 @@ class Recorder:
     progress: Progress
     series_steps: int
     frame_steps: int
+    strain_steps: int
     spheres: FrameWriter | None = None
     sphere_steps: int = 0
     next_step: int = 0
@@ -63,15 +66,26 @@ class Recorder:
         if self.spheres is not None and engine.count and engine.steps % self.sphere_steps == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last picture of a run that fails is worth having.
-        self.watchdog.check(
+        self._watch(engine, state)
+        self.progress.update(time=engine.time, phi=phi, count=engine.count)
+        self.next_step = engine.steps + self.series_steps
+
+    def _watch(self, engine: Engine, state: State) -> None:
+        watchdog, time = self.watchdog, engine.time
+        watchdog.check(
             state,
             floor=engine.floor,
-            time=engine.time,
+            time=time,
             raised=engine.fixtures.raised,
             gaps=engine.joint_gaps() if engine.articulated else None,
         )
-        self.progress.update(time=engine.time, phi=phi, count=engine.count)
-        self.next_step = engine.steps + self.series_steps
+        strain = None
+        if engine.steps % self.strain_steps == 0:
+            strain = engine.strain()
+            watchdog.check_depths(strain, count=engine.count, time=time)
+        given = engine.account.given + (0.0 if engine.motors is None else float(engine.motors.work.sum()))
+        energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
+        watchdog.check_energy(state, energy=energy, strain=strain, time=time)
 
     @property
     def memory(self) -> dict[str, Any]:

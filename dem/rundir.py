@@ -88,10 +88,18 @@ def recorded_scene_hash(out: Path) -> str:
         raise InputError(msg) from None
 
 
-def mark_failed(out: Path, *, status: str, cause: str, time: float) -> None:
-    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too."""
+def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
+    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too.
+
+    Args:
+        out: the run directory.
+        status: "failed" or "interrupted".
+        cause: why.
+        time: simulated time that the run came to [s].
+        checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
+    """
     try:
-        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time})
+        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
     except RunError:
         return
 

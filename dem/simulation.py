@@ -47,6 +47,8 @@ class Simulation:
     log: logging.Logger
     yade: str
     checkpoint_steps: int
+    checkpointed: float | None = None
+    """Simulated time of the newest checkpoint [s], at which the watchdog found nothing; None: there is none."""
     _phase: int = 0
     _stage: Stage | None = None
     _target: int = 0
@@ -153,6 +155,7 @@ class Simulation:
             "cpu_s": self.cpu,
         }
         write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
+        self.checkpointed = self.engine.time
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
             raise StopRequestedError(msg)
@@ -178,6 +181,7 @@ class Simulation:
             self.engine.load(saved, state["engine"])
         finally:
             saved.unlink(missing_ok=True)
+        self.checkpointed = self.engine.time
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
         self._stage = begin(self.scene, self._phase)

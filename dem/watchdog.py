@@ -11,23 +11,32 @@ from numpy.typing import NDArray
 from dem.container import Cylinder
 from dem.errors import refuse
 from dem.state import State
+from dem.strain import Strain
 
 Array = NDArray[np.float64]
 
+LOWER_STEP = "lower fidelity.time_step_fraction"
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(kw_only=True)
 class Watchdog:
     """Limits that no smarticle may pass.
 
     Args:
         cylinder: the container; a centre of mass beyond its wall has escaped, one above it has been thrown out.
-        speed: [m/s]; faster than anything that falls or is shaken in the scene.
+        speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
         gap: [m]; a hinge whose links are farther apart is broken.
+        depth: [m]; contacts that overlap by more no longer keep bodies apart.
+        energy: [J]; smarticles that gain more from nowhere are blowing up.
     """
 
     cylinder: Cylinder
     speed: float
     gap: float = math.inf
+    depth: float = math.inf
+    energy: float = math.inf
+    # What kinetic and potential energy less the work done may amount to from now on [J].
+    _ceiling: float = math.inf
 
     def check(
         self, state: State, *, floor: float, time: float, raised: float | None = 0.0, gaps: Array | None = None
@@ -45,21 +54,16 @@ class Watchdog:
             RunError: cause, smarticles concerned, time and the way out.
         """
         positions = state.positions
-        speeds = np.linalg.norm(state.velocities, axis=1)
+        speeds = _speeds(state)
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
-        refuse(
-            broken,
-            time,
-            "a position or velocity that is no number",
-            "lower fidelity.time_step_fraction",
-        )
+        refuse(broken, time, "a position or velocity that is no number", LOWER_STEP)
         refuse(
             speeds > self.speed,
             time,
             f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
             "which nothing in this scene explains",
-            "lower fidelity.time_step_fraction",
+            LOWER_STEP,
         )
         if gaps is not None:
             # A gap that is no number is not below the limit either.
@@ -67,7 +71,7 @@ class Watchdog:
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
-                "lower fidelity.time_step_fraction, or raise fidelity.hinge_stiffness_N_per_m",
+                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
             )
         radii, height = np.full(state.count, math.inf), math.inf
         if raised is not None:
@@ -80,3 +84,62 @@ class Watchdog:
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
             "raise container.height_m or shake less",
         )
+
+    def check_depths(self, strain: Strain, *, count: int, time: float) -> None:
+        """Look at all contacts once.
+
+        Args:
+            strain: the contacts.
+            count: smarticles.
+            time: simulated time [s].
+
+        Raises:
+            RunError: cause, smarticles concerned, time and the way out.
+        """
+        deep = strain.smarticles[~np.less_equal(strain.depths, self.depth)]
+        refuse(
+            np.isin(np.arange(count), deep),
+            time,
+            f"contacts more than {self.depth:.3g} m deep (deepest {strain.depths.max(initial=0):.3g} m), so that links "
+            "pass through each other or through the container",
+            "raise fidelity.stiffness_N_per_m, or load the pile less",
+        )
+
+    def check_energy(self, state: State, *, energy: float, strain: Strain | None, time: float) -> None:
+        """Compare the energy with what it may be after all that was seen before.
+
+        Contacts, hinges and welding only take energy away, and what their springs hold comes back once at most. So
+        kinetic and potential energy less the work done can never rise above what they were at any earlier time by more
+        than the springs held then. The lowest of these ceilings counts: dissipation makes no room for a later rise.
+
+        Args:
+            state: the smarticles, to name the fast ones.
+            energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
+                where the work is not known at present: then everything seen so far is forgotten.
+            strain: contacts and hinges, which lower the ceiling; None: not looked at this time.
+            time: simulated time [s].
+
+        Raises:
+            RunError: cause, smarticles concerned, time and the way out.
+        """
+        if math.isnan(energy):
+            self._ceiling = math.inf
+            return
+        rise = energy - self._ceiling
+        if rise > self.energy:
+            speeds = _speeds(state)
+            refuse(
+                speeds >= speeds.max() / 2,
+                time,
+                f"an energy that has risen by {rise:.3g} J more than gravity, motors and springs explain (limit "
+                f"{self.energy:.3g} J); these are the fastest, up to {speeds.max():.3g} m/s",
+                LOWER_STEP,
+            )
+        if strain is not None:
+            self._ceiling = min(self._ceiling, energy + strain.elastic_energy)
+
+
+def _speeds(state: State) -> Array:
+    """(N,) speed of the fastest link's centre of each smarticle [m/s]."""
+    speeds: Array = np.linalg.norm(state.link_velocities, axis=-1).max(axis=-1)
+    return speeds

@@ -22,17 +22,12 @@ from dem.library import yade_version
 from dem.parts import shake_amplitude
 from dem.placement import Poses, place_layer
 from dem.run import run_scene
-from dem.scene import Scene, parse_scene
+from dem.scene import Scene
 from dem.series import SeriesWriter
-from dem.state import State
 from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step, typical_effective_mass
+from stability.hand import add, body_rotations, load, push
 
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
-FLAT = Rotation.identity()
-
-
-def load(data: dict[str, Any]) -> Scene:
-    return parse_scene(data, source="case")
 
 
 def build(
@@ -52,26 +47,6 @@ def build(
         time_step=dt or time_step(scene),
         shaken=shaken,
     )
-
-
-def add(engine: Engine, position: Any, rotation: Rotation = FLAT) -> None:
-    engine.add(Poses(np.array([position], dtype=float), (rotation,)))
-
-
-def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> None:
-    """Give a welded smarticle a velocity; YADE integrates the angular momentum, so that is set too."""
-    clump = engine._omega.bodies[engine._assembly.bodies[k]].state
-    rotation = body_rotations(engine.state())[k]
-    momentum = rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
-    vector = engine._yade.vector
-    clump.vel = vector(*map(float, velocity))
-    clump.angVel = vector(*map(float, spin))
-    clump.angMom = vector(*momentum)
-
-
-def body_rotations(state: State) -> np.ndarray:
-    """(N, 3, 3) body frame to laboratory frame of welded smarticles."""
-    return state.link_rotations[:, 1] @ state.boxes.link_rotations[1].T
 
 
 def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:

@@ -44,11 +44,11 @@ def broken_position(state: State) -> None:
 
 
 def broken_velocity(state: State) -> None:
-    state.velocities[1, 2] = math.inf
+    state.link_velocities[1, 2, 2] = math.inf
 
 
 def fast(state: State) -> None:
-    state.velocities[1] = [0.0, 3.0, -4.1]
+    state.link_velocities[1, 2] = [0.0, 3.0, -4.1]  # a barb, not the whole
 
 
 def through_the_wall(state: State) -> None:
