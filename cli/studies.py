@@ -150,4 +150,19 @@ amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): pac
 energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
 reach at a small l/w are left out. --quick takes minutes.""",
     ),
+    "melting": Study(
+        analyse=partial(_analyse_reported, module="postprocess.melting"),
+        pictured={"procedure": "shape-change", "lift_m_per_s": 0, "l_over_w": 0.7},
+        about="""\
+the container's wall is taken away, at once or lifted, after shape change, internal or external oscillation or
+none: what holds together, spreads, comes off or falls over within 2 s, against the text of Savoie et al.
+48 runs of hours; --quick takes minutes.""",
+    ),
+    "casting": Study(
+        analyse=partial(_analyse_reported, module="postprocess.casting"),
+        pictured={"procedure": "internal"},
+        about="""\
+smarticles of l/w = 0.8 poured into a mould of three tiers, each narrower than the one below, and activated; the
+walls go at once: how well each tier is filled before, and what is kept 1 s later. --quick takes minutes.""",
+    ),
 }
