@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
 
-Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that centrelines
-come nearer still. A twentieth more keeps contacts that open and close while a pile settles."""
+Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
+centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles."""
 
 OUTSIDE = 0.5
 """How far beyond the wall that was, in w, a centre of mass must be to have come off the pile [-].
