@@ -159,4 +159,19 @@ amplitudes θ, and of several l/w, against the findings of Savoie et al. (Soft M
 force against time, peak force, work, and how they go with entanglement. 36 runs of the paper's numbers of
 smarticles, seed by seed; --quick takes minutes.""",
     ),
+    "melting": Study(
+        analyse=partial(_analyse_reported, module="postprocess.melting"),
+        pictured={"procedure": "shape-change", "lift_m_per_s": 0, "l_over_w": 0.7},
+        about="""\
+the container's wall is taken away, at once or lifted, after shape change, internal or external oscillation or
+none: what holds together, spreads, comes off or falls over within 2 s, against the text of Savoie et al.
+48 runs of hours; --quick takes minutes.""",
+    ),
+    "casting": Study(
+        analyse=partial(_analyse_reported, module="postprocess.casting"),
+        pictured={"procedure": "internal"},
+        about="""\
+smarticles of l/w = 0.8 poured into a mould of three tiers, each narrower than the one below, and activated; the
+walls go at once: how well each tier is filled before, and what is kept 1 s later. --quick takes minutes.""",
+    ),
 }

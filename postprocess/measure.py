@@ -20,6 +20,7 @@ from postprocess.manifest import read_run
 from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_fraction
 from postprocess.pull import PULL, has_pull, pull_columns
 from postprocess.series import Series, read_series
+from postprocess.spread import free_pile
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -275,6 +276,8 @@ def _rows(
             "phase type": manifest.phases[frame.phase].type,
         }
         row |= _shape_columns(frame, manifest)
+        if not manifest.walled(manifest.phases[-1].index):
+            row |= _free_columns(frame, manifest)
         for definition in definitions:
             wanted = take_costly or definition not in COSTLY_DEFINITIONS
             phi = _phi(frame, manifest, definition) if wanted else float("nan")
@@ -311,6 +314,22 @@ def _shape_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
         "planes [-]": int(tangle.has_plane.sum()),
         "contacts mean [-]": float(frame.contacts.mean()),
     }
+
+
+def _free_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
+    """What is told of a pile without a wall; NaN while there is one."""
+    pile = None
+    if not manifest.walled(frame.phase):
+        pile = free_pile(frame.vertices, manifest, floor_z=frame.floor_z)
+    names = {
+        "largest cluster by contact [-]": "touching",
+        "largest cluster by crossings [-]": "entangled",
+        "spread radius 50 % [m]": "radius_half",
+        "spread radius 95 % [m]": "radius_most",
+        "sloughed [-]": "sloughed",
+        "tilt [degree]": "tilt",
+    }
+    return {name: float("nan") if pile is None else getattr(pile, key) for name, key in names.items()}
 
 
 def _escaped(frame: Frame, radius: float) -> int:

@@ -34,10 +34,18 @@ def test_no_packing_fraction_where_no_one_cylinder_is_filled(make_run):
     table = measure_run(run, costly="never")
     assert table["phase"].tolist() == [0, 0, 1, 2, 2]
     assert table[PHI].notna().tolist() == [False, True, False, False, False]  # the first has one smarticle
+    free = table.columns[table.columns.str.contains("cluster|spread|sloughed|tilt")]
+    assert len(free) == 6
+    assert table.loc[table["phase"] == 0, free].isna().all(axis=None)
+    assert table.loc[table["phase"] > 0, free].notna().all(axis=None)
+    assert (table["spread radius 50 % [m]"] < table["spread radius 95 % [m]"]).sum() == 3
     manifest |= {"container_tiers": 2}
     manifest["phases"][1]["type"] = "relax"
     (run / "run.json").write_text(json.dumps(manifest))
-    assert measure_run(run, costly="never")[PHI].isna().all()
+    table = measure_run(run, costly="never")
+    assert table[PHI].isna().all()
+    # A run that keeps its wall has no columns for a pile without one.
+    assert not table.columns.str.contains("cluster|spread|sloughed|tilt").any()
 
 
 def test_mean_of_independent_samples():

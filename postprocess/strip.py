@@ -1,0 +1,90 @@
+"""Pictures of several runs at several times in one: a row for each run, under one camera each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from postprocess import figures
+from postprocess.camera import Look, extent
+from postprocess.frames import Frame, read_frames
+from postprocess.manifest import read_run
+
+_PANEL = (440, 440)  # pixel
+_GAP = 6  # pixel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """Pictures of one run.
+
+    Attributes:
+        directory: The run.
+        label: What is written beside them.
+        times: Simulated times [s]; of each the nearest frame is drawn.
+    """
+
+    directory: Path
+    label: str
+    times: tuple[float, ...]
+
+
+def draw_strip(
+    rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str], color_by: str = "crossings"
+) -> Path:
+    """Draws a picture of each run at each of its times, and writes them as one.
+
+    Args:
+        rows: The runs, from above.
+        output: File to write, `.png`.
+        columns: What is written above the pictures, one each.
+        footer: Origin, one statement each.
+        color_by: Key of `colouring.COLOURINGS`.
+
+    Returns:
+        The file.
+
+    Raises:
+        InputError: A run has no frames.
+        RunError: This machine lacks the libraries to draw without a display.
+    """
+    pictures = [_pictures(row, color_by) for row in rows]
+    width, height = _PANEL
+    across, down = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
+    canvas = Image.new("RGB", (across, down), "white")
+    for i, line in enumerate(pictures):
+        for k, picture in enumerate(line):
+            canvas.paste(picture, (k * (width + _GAP), i * (height + _GAP)))
+    with figures.style():
+        scale = 2 * figures.COLUMN_WIDTH / across
+        figure = figures.blank_figure(2 * figures.COLUMN_WIDTH + 0.3, down * scale)
+        axes = figure.add_subplot()
+        axes.imshow(np.asarray(canvas))
+        axes.grid(visible=False)
+        axes.set_frame_on(False)
+        axes.set_xticks([(k + 0.5) * (width + _GAP) for k in range(len(columns))], labels=list(columns))
+        axes.set_yticks([(i + 0.5) * (height + _GAP) for i in range(len(rows))], labels=[row.label for row in rows])
+        axes.tick_params(length=0, labeltop=True, labelbottom=False)
+        for label in axes.get_yticklabels():
+            label.set(rotation=90, va="center")
+        figures.add_footer(figure, footer)
+        with figures.whole_file(output) as temporary:
+            figure.savefig(temporary, format="png", dpi=180)
+    return output
+
+
+def _pictures(row: Row, color_by: str) -> list[Image.Image]:
+    from postprocess.stage import Stage  # noqa: PLC0415  (imports PyVista)
+
+    run, frames = read_run(row.directory), read_frames(row.directory)
+    shown: list[Frame] = [frames[int(np.argmin(np.abs(frames.times - time)))] for time in row.times]
+    look = Look.checked(color_by=color_by, size=_PANEL, view="front")
+    values = [look.colouring.values(frame) for frame in shown]
+    span = float(min(value.min() for value in values)), float(max(value.max() for value in values))
+    extents = np.concatenate([extent(frame, run, look) for frame in shown])
+    with Stage(run, look, extents, span) as stage:
+        return [stage.picture(frame, value) for frame, value in zip(shown, values, strict=True)]

@@ -1,0 +1,120 @@
+"""Piles without a wall whose spread, tilt and losses follow from how they were laid."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from dem.errors import InputError
+from postprocess.errors import UndefinedMeasureError
+from postprocess.spread import (
+    OUTSIDE,
+    centre_of_mass,
+    free_pile,
+    has_toppled,
+    share_outside,
+    spread_radius,
+    tilt,
+)
+
+W = 0.0117
+RUN = SimpleNamespace(sphere_diameter=1.2e-3, container_radius=0.0234, middle_length=W)
+
+
+def line(start, end):
+    """A straight smarticle of three equal links."""
+    return np.linspace(start, end, 4)
+
+
+def column(radius, height, count=4000, seed=1):
+    """Upright needles evenly over a cylinder that stands on the floor."""
+    rng = np.random.default_rng(seed)
+    distance, angle = radius * np.sqrt(rng.random(count)), 2 * math.pi * rng.random(count)
+    foot = np.stack([distance * np.cos(angle), distance * np.sin(angle), 0 * angle], axis=1)
+    return np.array([line(place, place + np.array([0, 0, height])) for place in foot])
+
+
+def test_the_radius_of_an_even_disc_holds_its_share():
+    """A share s of an even disc lies within R √s: 0.707 R for half, 0.975 R for 95 %."""
+    pile = column(0.02, 0.03)
+    for share in (0.5, 0.95):
+        found = spread_radius(pile, share=share, axis=(0.0, 0.0))
+        assert found == pytest.approx(0.02 * math.sqrt(share), rel=0.02)
+
+
+def test_a_level_line_through_the_axis_is_cut_where_the_circle_is():
+    """Of a line from −a to a about its own middle, the share within r is r/a: exact."""
+    pile = np.array([line([-0.03, 0.0, 0.01], [0.03, 0.0, 0.01])])
+    for share in (0.1, 0.5, 0.95, 1.0):
+        assert spread_radius(pile, share=share) == pytest.approx(0.03 * share, rel=1e-9)
+    # Beside the axis: from (b, −a) to (b, a) the share within r is √(r² − b²)/a.
+    beside = pile + np.array([0, 0.01, 0])
+    assert spread_radius(beside, share=0.5, axis=(0.0, 0.0)) == pytest.approx(math.hypot(0.015, 0.01), rel=1e-9)
+
+
+def test_an_upright_line_is_a_point():
+    pile = np.array([line([0.01, 0, 0], [0.01, 0, 0.02])])
+    assert spread_radius(pile, share=0.5, axis=(0.0, 0.0)) == pytest.approx(0.01, rel=1e-9)
+    assert spread_radius(pile, share=0.95) == pytest.approx(0.0, abs=1e-9)
+
+
+@given(seed=st.integers(0, 1000), angle=st.floats(0, 2 * math.pi), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+def test_spread_does_not_depend_on_place_or_direction(seed, angle, shift):
+    rng = np.random.default_rng(seed)
+    pile = rng.normal(0, 0.01, (5, 4, 3))
+    moved = Rotation.from_euler("z", angle).apply(pile.reshape(-1, 3)).reshape(pile.shape) + np.array([*shift, 0.0])
+    assert spread_radius(moved, share=0.7) == pytest.approx(spread_radius(pile, share=0.7), rel=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 5.0, 30.0, 60.0])
+def test_a_column_turned_about_its_foot_has_that_tilt(degrees):
+    upright = column(0.01, 0.06)
+    upright[:, :, :2] -= centre_of_mass(upright)[:2]
+    about = Rotation.from_rotvec(math.radians(degrees) * np.array([0.6, 0.8, 0.0]))
+    turned = about.apply(upright.reshape(-1, 3)).reshape(upright.shape) + np.array([0.05, -0.02, 0.3])
+    assert math.degrees(tilt(turned, foot=(0.05, -0.02), floor_z=0.3)) == pytest.approx(degrees, abs=1e-6)
+
+
+def test_a_column_that_fell_over_its_edge_has_toppled_and_one_that_spread_has_not():
+    radius, height = 0.01, 0.04
+    upright = column(radius, height, count=300)
+    upright[:, :, :2] -= centre_of_mass(upright)[:2]
+    about_edge = Rotation.from_euler("y", 90, degrees=True)
+    fallen = about_edge.apply((upright - np.array([radius, 0, 0])).reshape(-1, 3)).reshape(upright.shape) + np.array(
+        [radius, 0, 0]
+    )
+    lying = free_pile(fallen, RUN)
+    # Its centre of mass came to lie (R + h/2, R): beyond the base, at more than 45 degrees.
+    assert lying.offset == pytest.approx(radius + height / 2, rel=1e-6)
+    assert lying.tilt == pytest.approx(math.degrees(math.atan2(radius + height / 2, radius)), rel=1e-6)
+    assert has_toppled(lying.offset, radius)
+    spread = upright * [3, 3, 0.1]
+    assert not has_toppled(free_pile(spread, RUN).offset, radius)
+    assert free_pile(spread, RUN).tilt == pytest.approx(0, abs=1e-6)
+
+
+def test_what_lies_beyond_the_former_wall_came_off():
+    edge = RUN.container_radius + OUTSIDE * W
+    inside = [line([x, 0, 0], [x, 0, 0.01]) for x in (0.0, 0.01, edge - 1e-4)]
+    outside = [line([0, y, 0], [0, y, 0.01]) for y in (edge + 1e-4,)]
+    pile = np.array(inside + outside)
+    assert share_outside(pile, edge) == 0.25
+    found = free_pile(pile, RUN)
+    assert found.sloughed == 0.25
+    assert (found.touching, found.entangled) == (0.25, 0.25)
+    assert found.radius_half < found.radius_most
+
+
+def test_what_has_no_meaning_is_refused():
+    pile = column(0.01, 0.02, count=3)
+    with pytest.raises(InputError, match="share must be above 0 and up to 1 of the material: got 95"):
+        spread_radius(pile, share=95)
+    with pytest.raises(UndefinedMeasureError, match="below the floor; check floor_z"):
+        tilt(pile, floor_z=1.0)
+    for measure in (centre_of_mass, lambda none: spread_radius(none, share=0.5), lambda none: share_outside(none, 1.0)):
+        with pytest.raises(UndefinedMeasureError, match="got 0"):
+            measure(np.empty((0, 4, 3)))
