@@ -13,6 +13,7 @@ from postprocess import figures
 from postprocess.camera import Look, extent
 from postprocess.frames import Frame, read_frames
 from postprocess.manifest import read_run
+from postprocess.surroundings import read_surroundings
 
 _PANEL = (440, 440)  # pixel
 _GAP = 6  # pixel
@@ -85,6 +86,7 @@ def _pictures(row: Row, color_by: str) -> list[Image.Image]:
     look = Look.checked(color_by=color_by, size=_PANEL, view="front")
     values = [look.colouring.values(frame) for frame in shown]
     span = float(min(value.min() for value in values)), float(max(value.max() for value in values))
-    extents = np.concatenate([extent(frame, run, look) for frame in shown])
-    with Stage(run, look, extents, span) as stage:
+    around = read_surroundings(run)
+    extents = np.concatenate([extent(frame, run, look, around) for frame in shown])
+    with Stage(run, look, around, extents, span) as stage:
         return [stage.picture(frame, value) for frame, value in zip(shown, values, strict=True)]
