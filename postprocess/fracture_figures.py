@@ -155,7 +155,8 @@ def _draw_forces(
             for times, force in (force_history(by_name[n]) for n in names)
         ]
         if histories:
-            label = f"{line.label} (n = {len(histories)})"
+            seeds = "1 seed" if len(histories) == 1 else f"{len(histories)} seeds"
+            label = f"{line.label} ({seeds})"
             draw_history(axes, histories, WINDOW, colour=line.colour, label=label)
             drawn += 1
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
