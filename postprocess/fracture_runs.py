@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
@@ -149,8 +148,3 @@ def force_history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.flo
     """
     pull = read_pull(run, read_series(run.directory), pull_phase(run).index)
     return pull.times, pull.force / run.count / weight_of_one(run)
-
-
-def sorted_runs(runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs in the order of procedure, l/w, θ and seed."""
-    return runs.sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
