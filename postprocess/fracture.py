@@ -27,7 +27,6 @@ from postprocess.fracture_runs import (
     WINDOWS,
     WORK,
     fracture_row,
-    sorted_runs,
 )
 from postprocess.manifest import RunManifest
 from postprocess.origin import Origin, make_folder
@@ -37,6 +36,7 @@ from postprocess.pull import END, FREE, WINDOW
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import (
     ASPECT,
+    SEED,
     SEEDS,
     collect_runs,
     refuse_mixture,
@@ -71,7 +71,7 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     output = make_folder(output)
     manifests, rows, missing = collect_runs(_STUDY, run_dirs, fracture_row)
     _refuse_unlike(manifests, rows)
-    runs = sorted_runs(runs_table(rows))
+    runs = runs_table(rows).sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
     means, found = points(runs, QUANTITIES), findings(runs)
     origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=SAVOIE)
     footer = _footer(origin, runs, means)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,14 +78,10 @@ def draw(
         The files written.
     """
     by_name = {run.directory.name: run for run in manifests}
-    procedures = [
-        _Line(label=label, colour=_COLOURS[name], shape=_MARKERS[name], part=_at_aspect_of(name))
-        for name, label in _LABELS.items()
-    ]
     amplitudes, aspects = _amplitudes(runs), _aspects(runs)
     at_aspect, at_amplitude = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
     with figures.style():
-        written = _draw_forces(output / "force_time", procedures, runs, by_name, [at_aspect, *footer])
+        written = _draw_forces(output / "force_time", _procedures(), runs, by_name, [at_aspect, *footer])
         if len(amplitudes) > 1:
             below = [f"Internal oscillation, {at_aspect}", *footer]
             written += _draw_forces(output / "force_time_theta", amplitudes, runs, by_name, below)
@@ -118,10 +114,10 @@ def _at_ratio(aspect: float) -> Callable[[pd.DataFrame], pd.DataFrame]:
     return part
 
 
-def _amplitudes(runs: pd.DataFrame) -> list[_Line]:
-    """The internal oscillation at the aspect ratio of the comparison, a line for each θ."""
+def _amplitudes(runs: pd.DataFrame, *, but: float | None = None) -> list[_Line]:
+    """The internal oscillation at the aspect ratio of the comparison, a line for each θ but one."""
     shown = at_shown_aspect(runs[runs[PROCEDURE] == INTERNAL])
-    thetas = sorted(shown[THETA].unique())
+    thetas = sorted(theta for theta in shown[THETA].unique() if theta != but)
     colours = figures.sequence(len(thetas), last=0.85)
     return [
         _Line(label=rf"$\theta$ = {theta:g}°", colour=colour, shape="o", part=_at_amplitude(theta))
@@ -129,12 +125,12 @@ def _amplitudes(runs: pd.DataFrame) -> list[_Line]:
     ]
 
 
-def _aspects(runs: pd.DataFrame) -> list[_Line]:
-    """The internal oscillation at the amplitude of the comparison, a line for each aspect ratio."""
-    ratios = sorted(of_procedure(runs, INTERNAL)[ASPECT].unique())
+def _aspects(runs: pd.DataFrame, *, but: float | None = None) -> list[_Line]:
+    """The internal oscillation at the amplitude of the comparison, a line for each aspect ratio but one."""
+    ratios = sorted(ratio for ratio in of_procedure(runs, INTERNAL)[ASPECT].unique() if ratio != but)
     colours = figures.sequence(len(ratios), last=0.85)
     return [
-        _Line(label=rf"$l/w$ = {ratio:g}", colour=colour, shape="o", part=_at_ratio(ratio))
+        _Line(label=rf"$l/w$ = {ratio:g}", colour=colour, shape="v", part=_at_ratio(ratio))
         for ratio, colour in zip(ratios, colours, strict=True)
     ]
 
@@ -155,7 +151,8 @@ def _draw_forces(
             for times, force in (force_history(by_name[n]) for n in names)
         ]
         if histories:
-            label = f"{line.label} (n = {len(histories)})"
+            seeds = "1 seed" if len(histories) == 1 else f"{len(histories)} seeds"
+            label = f"{line.label} ({seeds})"
             draw_history(axes, histories, WINDOW, colour=line.colour, label=label)
             drawn += 1
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
@@ -185,7 +182,7 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
     """Peak force against ⟨N⟩: every run, and the means with their standard errors."""
     figure, axes = figures.new_figure(height=2.8)
     drawn = 0
-    for line in [*_named_lines(runs)]:
+    for line in _all_points(runs):
         one, mean = line.part(runs), line.part(points)
         if one.empty:
             continue
@@ -202,17 +199,18 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
     return finished(figure, path, [told, *footer])
 
 
-def _named_lines(runs: pd.DataFrame) -> list[_Line]:
-    """All points: the procedures, and the internal oscillation of each other θ and l/w."""
-    lines = [
+def _procedures() -> list[_Line]:
+    """The procedures at the aspect ratio and the amplitude of the comparison."""
+    return [
         _Line(label=label, colour=_COLOURS[name], shape=_MARKERS[name], part=_at_aspect_of(name))
         for name, label in _LABELS.items()
     ]
-    others = [line for line in _amplitudes(runs) if not line.label.endswith(f"= {AMPLITUDE:g}°")]
-    lines += [_Line(label=f"internal, {line.label}", colour=line.colour, shape="o", part=line.part) for line in others]
-    ratios = [line for line in _aspects(runs) if not line.label.endswith(f"= {SHOWN_ASPECT:g}")]
-    lines += [_Line(label=f"internal, {line.label}", colour=line.colour, shape="v", part=line.part) for line in ratios]
-    return lines
+
+
+def _all_points(runs: pd.DataFrame) -> list[_Line]:
+    """The procedures, and the internal oscillation of each other θ and l/w."""
+    others = [*_amplitudes(runs, but=AMPLITUDE), *_aspects(runs, but=SHOWN_ASPECT)]
+    return [*_procedures(), *(replace(line, label=f"internal, {line.label}") for line in others)]
 
 
 def _legend_above(axes: Axes, entries: int) -> None:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
@@ -19,7 +18,7 @@ from postprocess.geometry import centres_of_mass
 from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
-from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, moving_mean, peak, read_pull, weight_of_one
+from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, peak, read_pull, weight_of_one
 from postprocess.scene_file import read_phases
 from postprocess.series import Series, read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, duration
@@ -142,15 +141,10 @@ def _above(run: RunManifest, series: Series, phase: int) -> int:
 
 
 def force_history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times since the pull began, (n,) [s], and force over n W_s, (n,) [-], mean over `WINDOW` about each.
+    """Times since the pull began, (n,) [s], and force over n W_s, (n,) [-], mean between two samples.
 
     Raises:
         InputError: There is no series of it.
     """
-    times, force = moving_mean(read_pull(run, read_series(run.directory), pull_phase(run).index))
-    return times, force / run.count / weight_of_one(run)
-
-
-def sorted_runs(runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs in the order of procedure, l/w, θ and seed."""
-    return runs.sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
+    pull = read_pull(run, read_series(run.directory), pull_phase(run).index)
+    return pull.times, pull.force / run.count / weight_of_one(run)

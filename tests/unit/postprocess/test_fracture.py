@@ -10,6 +10,7 @@ from hooked import AFTER_REST, UPPER, weight, write_hooked_run
 from PIL import Image
 from synthetic import SyntheticRun, W
 
+from cli.studies import STUDIES, Analysis
 from dem.errors import InputError
 from postprocess import fracture_figures
 from postprocess.fracture import analyse
@@ -151,6 +152,14 @@ def test_runs_that_must_not_be_averaged_are_refused(tmp_path, undrawn):
     shaken = [write(tmp_path / f"d{time:g}", EXTERNAL, seed=int(time), shake_time=time) for time in (1.0, 2.0)]
     with pytest.raises(InputError, match="runs of different duration"):
         analyse(shaken, tmp_path / "out", **ORIGIN)
+
+
+def test_the_terminal_is_told_points_and_findings(tmp_path, undrawn):
+    runs = [write(tmp_path / name, name) for name in (STATIC, SHAPE)]
+    told = STUDIES["fracture"].analyse(Analysis(runs=runs, output=tmp_path / "out", quick=True, **ORIGIN)).splitlines()
+    assert told[0].split()[:5] == ["procedure", "θ", "l/w", "seeds", "peak"]
+    assert [line.split()[0] for line in told[1:3]] == [STATIC, SHAPE]
+    assert "NO DATA: Internal oscillation: over θ, the peak force goes with ⟨N⟩" in told
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from hooked import AFTER_REST, INTERVAL, SPEED, weight, write_hooked_run
 from synthetic import SyntheticRun, write_run
 
+from cli.main import main
 from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.measure import summarise_run
@@ -124,6 +125,19 @@ def test_measure_gives_the_pull_with_its_phase(tmp_path):
     assert table.loc["pull-hook", "hook work [J]"] == pytest.approx(HEIGHT * BASE * SPEED, rel=1e-4)
     assert math.isnan(table.loc["relax", "hook work [J]"])
     assert "upper hook force z [N]" in table.columns
+
+
+def test_the_command_measure_shows_peak_and_work(tmp_path, capsys):
+    directory = write_hooked_run(tmp_path / "run", synthetic(), triangle)
+    assert main(["measure", str(directory)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[-4:] == ["F/nW", "hook", "work", "[mJ]"]
+    (row,) = (line.split() for line in lines if line.startswith("pull-hook"))
+    assert float(row[-1]) == pytest.approx(1e3 * HEIGHT * BASE * SPEED, rel=5e-3)
+    assert any(line.startswith("peak F/nW: largest mean over 0.04 s") for line in lines)
+    plain = write_run(tmp_path / "plain", SyntheticRun(frames_per_phase=1))
+    assert main(["measure", str(plain)]) == 0
+    assert "hook" not in capsys.readouterr().out
 
 
 def test_runs_without_hooks_have_no_such_columns(tmp_path):
