@@ -150,4 +150,12 @@ amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): pac
 energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
 reach at a small l/w are left out. --quick takes minutes.""",
     ),
+    "collapse": Study(
+        analyse=partial(_analyse_reported, module="postprocess.collapse"),
+        pictured={"l_over_w": 0.4, "gamma": 2.5},
+        about="""\
+free-standing columns of U-shapes on a vibrating floor at Γ = 2 to 4: collapse times, and Δ of
+τ = (1/f) exp(Δ/Γ) against l/w, compared with Gravish et al. (PRL 108, 208001). 72 runs, seed by seed;
+columns that stand to the end give bounds. --quick takes minutes: lower and narrower columns.""",
+    ),
 }
