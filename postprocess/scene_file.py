@@ -1,4 +1,4 @@
-"""What the scene of a run asked of its phases, from `scene.yaml`."""
+"""What the scene of a run asked of its phases and its container, from `scene.yaml`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import yaml
 
 from postprocess.errors import refuse
+from postprocess.region import Cylinder
 
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
@@ -59,15 +61,49 @@ def read_phases(directory: Path | str) -> tuple[PhaseSettings, ...]:
     Source:
         ARCHITECTURE.md, "The run directory": the resolved scene, every default written out.
     """
-    path = Path(directory) / "scene.yaml"
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        refuse("scene", path, error, _REMEDY)
-    phases = content.get("phases") if isinstance(content, dict) else None
+    path, content = _read(directory)
+    phases = content.get("phases")
     if not isinstance(phases, list) or not all(isinstance(phase, dict) and "type" in phase for phase in phases):
         refuse("scene", path, "'phases' must be a list of phases with a type", _REMEDY)
     return tuple(
         PhaseSettings(path=path, index=index, type=str(phase["type"]), values=MappingProxyType(phase))
         for index, phase in enumerate(phases)
     )
+
+
+def read_tiers(directory: Path | str) -> tuple[Cylinder, ...]:
+    """The tiers of a run's container, heights above its floor.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The tiers from below; none where the container is one cylinder.
+
+    Raises:
+        InputError: The file is missing or damaged, or a tier lacks its sizes.
+    """
+    path, content = _read(directory)
+    container = content.get("container")
+    tiers = container.get("tiers") if isinstance(container, dict) else None
+    found, bottom = [], 0.0
+    for number, tier in enumerate(tiers or ()):
+        sizes = [tier.get(key) if isinstance(tier, dict) else None for key in ("radius_m", "height_m")]
+        if not all(isinstance(size, int | float) and math.isfinite(size) and size > 0 for size in sizes):
+            refuse(
+                "scene", path, f"container.tiers.{number} must have radius_m and height_m > 0: got {tier!r}", _REMEDY
+            )
+        radius, height = np.array(sizes, dtype=np.float64).tolist()
+        found.append(Cylinder(radius=radius, bottom=bottom, top=bottom + height))
+        bottom += height
+    return tuple(found)
+
+
+def _read(directory: Path | str) -> tuple[Path, Mapping[str, Any]]:
+    """The scene of a run, and the file that it comes from."""
+    path = Path(directory) / "scene.yaml"
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        refuse("scene", path, error, _REMEDY)
+    return path, content if isinstance(content, dict) else {}
