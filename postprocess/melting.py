@@ -100,11 +100,11 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=SAVOIE)
     counts = points.set_index(keys)[SEEDS]
     sizes = ", ".join(
-        f"{count} in r = {radius:g} m at l/w {aspect:g}"
+        f"{count} smarticles in r = {radius:g} m at l/w {aspect:g}"
         for aspect, count, radius in sorted({(run.aspect_ratio, run.count, run.container_radius) for run in manifests})
     )
     footer = origin.footer(
-        f"{sizes} smarticles; {told_seeds(runs, counts, 'point')}.",
+        f"{sizes}; {told_seeds(runs, counts, 'point')}.",
         f"Clusters: centrelines within {TOUCHING:g} sphere diameters, or links through planes. Sloughed: centre of "
         f"mass farther than {OUTSIDE:g} w outside where the wall was. Tilt: of the line to the centre of mass from the "
         "floor below where it was before. Toppled: centre of mass beyond the radius that held 95 % before.",

@@ -10,7 +10,7 @@ from postprocess import figures
 from postprocess.manifest import RunManifest
 from postprocess.melting_runs import CONTACT, ENTANGLED, HEIGHT, LIFT, SLOUGHED, SPREAD, TILT, Melting
 from postprocess.procedures_runs import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
-from postprocess.release_runs import ORDER, removal
+from postprocess.release_runs import ORDER, around, removal
 from postprocess.strip import Row, draw_strip
 from postprocess.study_figures import History, bin_width, draw_history, finished
 from postprocess.study_runs import ASPECT, SEED
@@ -26,12 +26,23 @@ _PANELS = {
     SLOUGHED: "sloughed\nshare [-]",
     TILT: "tilt [degree]",
 }
+_RANGES = {
+    CONTACT: (0.8, 1.02),
+    ENTANGLED: (0.8, 1.02),
+    HEIGHT: (0.8, 1.02),
+    SPREAD: (0.98, 1.2),
+    SLOUGHED: (-0.002, 0.1),
+    TILT: (0.0, 10.0),
+}
 COLOURS: Mapping[str, str] = {
     STATIC: figures.GREY,
     EXTERNAL: figures.BLUE,
     INTERNAL: figures.SKY,
     SHAPE: figures.ORANGE,
 }
+_COLOURS = (
+    "Each smarticle has a colour of its own, the same in all pictures of a row; first seed; a ring marks the wall."
+)
 LABELS: Mapping[str, str] = {
     STATIC: "static",
     EXTERNAL: "external oscillation",
@@ -85,16 +96,19 @@ def _draw_times(
             if seeds:
                 draw_history(axes, seeds, width, colour=COLOURS[procedure], label=LABELS[procedure])
         axes.set_ylabel(label)
-        if quantity in {CONTACT, ENTANGLED, HEIGHT}:
-            axes.set_ylim(top=1.02)
-        elif quantity != SPREAD:
-            axes.set_ylim(bottom=0)
+        # At least so much of the axis, lest a change of one smarticle look like a fall.
+        low, high = axes.get_ylim()
+        least, most = _RANGES[quantity]
+        axes.set_ylim(min(low, least), max(high, most))
     for axes in grid[1]:
-        axes.set_xlabel("time since the wall began to go [s]")
+        axes.set_xlabel("time since the wall went [s]")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
     how = f"lifted at {lift:g} m/s" if lift else "gone at once"
-    told = f"l/w = {aspect:g}, wall {how}. Line: mean over seeds of means over {width:.2g} s; band: lowest to highest."
+    told = (
+        f"l/w = {aspect:g}, wall {how}; time from when it began to. Line: mean over seeds of means over {width:.2g} s; "
+        "band: lowest to highest seed."
+    )
     return finished(figure, path, [told, *footer])
 
 
@@ -112,9 +126,9 @@ def _draw_pictures(
         run = manifests[str(part["run"].iloc[0])]
         start, end = removal(run).start, run.end_time
         if start is not None and end is not None:
-            times = (start - 1e-6, start + 0.1, end)
+            times = (around(run)[0].time, start + 0.1, end)
             rows.append(Row(directory=run.directory, label=LABELS[procedure], times=times))
     if not rows:
         return []
     columns = ("before the wall goes", "0.1 s after", "at the end")
-    return [draw_strip(rows, path, columns=columns, footer=[footer[0], footer[-1]])]
+    return [draw_strip(rows, path, columns=columns, footer=[_COLOURS, footer[0], footer[-1]])]

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from postprocess.errors import refuse
+from postprocess.region import Cylinder
 
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
@@ -126,3 +127,24 @@ def read_phases(directory: Path | str) -> tuple[PhaseSettings, ...]:
         PhaseSettings(path=part.path, place=part.place, values=part.values, index=index, type=str(part.values["type"]))
         for index, part in enumerate(scene.parts("phases"))
     )
+
+
+def read_tiers(directory: Path | str) -> tuple[Cylinder, ...]:
+    """The tiers of a run's container, heights above its floor.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The tiers from below; none where the container is one cylinder.
+
+    Raises:
+        InputError: The file is missing or damaged, or a tier lacks its sizes.
+    """
+    container = read_scene(directory).part("container")
+    found, bottom = [], 0.0
+    for tier in container.parts("tiers") if container is not None else ():
+        top = bottom + tier.number("height_m")
+        found.append(Cylinder(radius=tier.number("radius_m"), bottom=bottom, top=top))
+        bottom = top
+    return tuple(found)

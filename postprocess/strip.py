@@ -15,7 +15,7 @@ from postprocess.frames import Frame, read_frames
 from postprocess.manifest import read_run
 from postprocess.surroundings import read_surroundings
 
-_PANEL = (440, 440)  # pixel
+_SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
 _GAP = 6  # pixel
 
 
@@ -34,17 +34,16 @@ class Row:
     times: tuple[float, ...]
 
 
-def draw_strip(
-    rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str], color_by: str = "crossings"
-) -> Path:
+def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
     """Draws a picture of each run at each of its times, and writes them as one.
+
+    A smarticle has the same colour in all pictures of a run.
 
     Args:
         rows: The runs, from above.
         output: File to write, `.png`.
         columns: What is written above the pictures, one each.
         footer: Origin, one statement each.
-        color_by: Key of `colouring.COLOURINGS`.
 
     Returns:
         The file.
@@ -53,8 +52,8 @@ def draw_strip(
         InputError: A run has no frames.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    pictures = [_pictures(row, color_by) for row in rows]
-    width, height = _PANEL
+    pictures = [_pictures(row) for row in rows]
+    width, height = pictures[0][0].size
     across, down = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
     canvas = Image.new("RGB", (across, down), "white")
     for i, line in enumerate(pictures):
@@ -74,19 +73,19 @@ def draw_strip(
             label.set(rotation=90, va="center")
         figures.add_footer(figure, footer)
         with figures.whole_file(output) as temporary:
-            figure.savefig(temporary, format="png", dpi=180)
+            figure.savefig(temporary, format="png", dpi=130)
     return output
 
 
-def _pictures(row: Row, color_by: str) -> list[Image.Image]:
+def _pictures(row: Row) -> list[Image.Image]:
     from postprocess.stage import Stage  # noqa: PLC0415  (imports PyVista)
 
     run, frames = read_run(row.directory), read_frames(row.directory)
     shown: list[Frame] = [frames[int(np.argmin(np.abs(frames.times - time)))] for time in row.times]
-    look = Look.checked(color_by=color_by, size=_PANEL, view="front")
-    values = [look.colouring.values(frame) for frame in shown]
-    span = float(min(value.min() for value in values)), float(max(value.max() for value in values))
+    look = Look.checked(color_by="id", size=_SIZE, view="front")
     around = read_surroundings(run)
     extents = np.concatenate([extent(frame, run, look, around) for frame in shown])
-    with Stage(run, look, around, extents, span) as stage:
-        return [stage.picture(frame, value) for frame, value in zip(shown, values, strict=True)]
+    width, height = look.panel
+    below = (0, _SIZE[1] - height, width, _SIZE[1])
+    with Stage(run, look, around, extents, (0.0, 1.0)) as stage:
+        return [stage.picture(frame, look.colouring.values(frame)).crop(below) for frame in shown]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from postprocess.manifest import RunManifest
-from postprocess.scene_file import Settings, read_scene
+from postprocess.scene_file import Settings, read_scene, read_tiers
 from postprocess.series import Series, read_series
 
 if TYPE_CHECKING:
@@ -119,14 +119,10 @@ def read_surroundings(run: RunManifest) -> Surroundings:
     """
     scene = read_scene(run.directory)
     series = read_series(run.directory) if (run.directory / "series.h5").exists() else None
-    container, hooks = scene.part("container"), scene.part("hooks")
-    tops = [0.0]
-    tiers = container.parts("tiers") if container is not None else ()
-    for tier in tiers:
-        tops.append(tops[-1] + tier.number("height_m"))
+    hooks = scene.part("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
     return Surroundings(
-        tiers=tuple((tier.number("radius_m"), top) for tier, top in zip(tiers, tops[1:], strict=True)),
+        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run.directory)),
         removed=removed,
         lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
         hooks=None if hooks is None else Hooks.of(hooks, series),
