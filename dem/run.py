@@ -182,15 +182,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
         "seed": scene.seed,
         "command": command,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {
-            "smarticles": _own_version(),
-            "git": _git_revision(),
-            "yade": yade,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "h5py": h5py.__version__,
-            "meshio": meshio.__version__,
-        },
+        "versions": versions(yade),
         "threads": 1,
         "fidelity": scene.fidelity.base,
         "count": scene.count,
@@ -271,6 +263,23 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         series_steps=round(scene.recording.series_interval_s / dt),
         frame_steps=round(scene.recording.frame_interval_s / dt),
     )
+
+
+def versions(yade: str) -> dict[str, str]:
+    """Versions of everything that results depend on.
+
+    Args:
+        yade: that of YADE.
+    """
+    return {
+        "smarticles": _own_version(),
+        "git": _git_revision(),
+        "yade": yade,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "meshio": meshio.__version__,
+    }
 
 
 def _own_version() -> str:
