@@ -147,7 +147,8 @@ def clump_sentences(clumps: pd.DataFrame) -> tuple[str, ...]:
         "n dashpots side by side damp √n times more.",
         f"From {few['contacts [1]']:.0f} to {many['contacts [1]']:.0f} contacts it sinks in {depth:.1f} times less "
         f"and touches {time:.1f} times shorter: n springs side by side are n times as stiff. More "
-        "spheres do not converge to a flat face of the same restitution and stiffness; these are properties of a contact, not of the body.",
+        "spheres do not converge to a flat face of the same restitution and stiffness; these are properties of a "
+        "contact, not of the body.",
     )
 
 

@@ -207,7 +207,7 @@ LADDERS = (
         size=0.208,
         order=1,
         why=TURNS,
-        steps=MIDDLE[1:],
+        steps=MIDDLE,
         errors=free.flip_errors,
     ),
     Ladder(

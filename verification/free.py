@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,7 +18,7 @@ SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose thr
 ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly about the axis of the middle moment
 
 
-def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[float, float]:
+def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
     """A smarticle thrown upwards in free fall.
 
     Args:
@@ -29,7 +28,8 @@ def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[float,
         centred: whether its first velocity is that of half a step before t = 0, as the scheme takes it.
 
     Returns:
-        Rise of the centre of mass [m] and its last velocity [m/s], half a step before the end.
+        (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
+        that it has turned [rad].
     """
     one = scene()
     engine = build(one.particle, contact_law(one), dt=dt, gravity=G)
@@ -37,20 +37,21 @@ def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[float,
     push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
     state = engine.state()
-    return float(state.positions[0, 2]) - 0.1, float(state.velocities[0, 2])
+    turned = (Rotation.from_matrix(body_rotations(state)[0]) * START.inv()).magnitude()
+    return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
 
 def free_fall() -> list[Check]:
     """The parabola."""
     dt, time, throw = 5e-5, 0.1, 0.3
-    rise, velocity = fall(dt, time=time, throw=throw, centred=True)
+    way, velocity, turned = fall(dt, time=time, throw=throw, centred=True)
     reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
     return [
         Check(
             quantity="rise after 0.1 s",
             unit="m",
             theory=throw * time - G * time**2 / 2,
-            measured=rise,
+            measured=float(way[2]),
             tolerance=1e-11,
             reason=reason,
         ),
@@ -62,12 +63,30 @@ def free_fall() -> list[Check]:
             tolerance=1e-11,
             reason=reason,
         ),
+        Check(
+            quantity="way across",
+            unit="m",
+            theory=0.0,
+            measured=float(np.hypot(*way[:2])),
+            tolerance=1e-11,
+            reason="nothing acts across",
+            scale=abs(throw * time - G * time**2 / 2),
+        ),
+        Check(
+            quantity="turn",
+            unit="rad",
+            theory=0.0,
+            measured=turned,
+            tolerance=1e-11,
+            reason="nothing turns it",
+            scale=1.0,
+        ),
     ]
 
 
 def fall_errors(steps: Sequence[float]) -> list[float]:
     """Error of the height of a smarticle let go from rest, as the pour does it, after 0.1 s [m]."""
-    return [abs(fall(dt, time=0.096, throw=0.0, centred=False)[0] + G * 0.096**2 / 2) for dt in steps]
+    return [abs(fall(dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
 
 
 def spin_rotations(dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
@@ -181,26 +200,28 @@ def planar_spin_errors(steps: Sequence[float]) -> list[float]:
     return [float(np.linalg.norm(_misfit(spin_rotations(dt, spin=spin, times=times)[0], exact))) for dt in steps]
 
 
-def half_period(dt: float) -> tuple[float, float]:
-    """Time between the first two flips of a U that spins about its middle axis [s]: in the engine, and in theory."""
-    inertia = scene().smarticle.boxes.inertia
-    spin = START.apply(ABOUT_MIDDLE)
-    times: Array = np.arange(2, 501, 2) * 1e-3
-    momentum = START.apply(inertia * ABOUT_MIDDLE)
+FLIPS = np.linspace(2e-3, 0.5, 250)  # s; times that a U about its middle axis is looked at
 
-    def between(rotations: Rotation) -> float:
-        # Angular momentum stands still, so its part along the body's y axis tells how the body turns under it.
-        roots = CubicSpline(times, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
-        return float(roots[1] - roots[0])
 
-    exact, _ = free_rotation(inertia=inertia, start=START, spin=spin, times=times)
-    return between(spin_rotations(dt, spin=spin, times=times)[0]), between(exact)
+def _between_flips(rotations: Rotation) -> float:
+    """Time between the first two flips [s]."""
+    # Angular momentum stands still, so its part along the body's y axis tells how the body turns under it.
+    momentum = START.apply(scene().smarticle.boxes.inertia * ABOUT_MIDDLE)
+    roots = CubicSpline(FLIPS, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
+    return float(roots[1] - roots[0])
+
+
+def _flip_times(steps: Sequence[float]) -> tuple[list[float], float]:
+    """Times between the first two flips [s] at time steps [s], and in theory."""
+    inertia, spin = scene().smarticle.boxes.inertia, START.apply(ABOUT_MIDDLE)
+    exact, _ = free_rotation(inertia=inertia, start=START, spin=spin, times=FLIPS)
+    found = [_between_flips(spin_rotations(dt, spin=spin, times=FLIPS)[0]) for dt in steps]
+    return found, _between_flips(exact)
 
 
 def flips() -> list[Check]:
     """The middle axis is unstable: the U flips over, again and again."""
-    coarse, exact = half_period(2e-5)
-    fine, _ = half_period(1e-5)
+    (coarse, fine), exact = _flip_times((2e-5, 1e-5))
     return [
         Check(
             quantity="time between two flips, dt → 0",
@@ -224,4 +245,5 @@ def flips() -> list[Check]:
 
 def flip_errors(steps: Sequence[float]) -> list[float]:
     """Error of the time between the first two flips [s]."""
-    return [math.fabs(found - exact) for found, exact in map(half_period, steps)]
+    found, exact = _flip_times(steps)
+    return [abs(time - exact) for time in found]
