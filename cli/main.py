@@ -12,7 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 
-from cli import commands_accuracy, commands_result, commands_run, commands_study, commands_sweep
+from cli import commands_accuracy, commands_result, commands_run, commands_study, commands_sweep, commands_verify
 from cli.parsing import Commands, Parser, add_debug
 from cli.stopping import orderly_stop
 from dem.errors import InputError, RunError
@@ -48,7 +48,7 @@ def build_parser() -> tuple[Parser, Commands]:
     parser.add_argument("--version", action="version", version=f"smarticles {release}")
     add_debug(parser)
     commands = Commands(parser)
-    for module in (commands_run, commands_result, commands_sweep, commands_study, commands_accuracy):
+    for module in (commands_run, commands_result, commands_sweep, commands_study, commands_accuracy, commands_verify):
         module.add(commands)
     return parser, commands
 

@@ -117,11 +117,11 @@ def _run(
     bar = Progress(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
-        engine = _build_engine(scene, dt)
+        engine = build_engine(scene, dt)
         simulation = Simulation(
             scene=scene,
             engine=engine,
-            recorder=_build_recorder(scene, engine, out, bar),
+            recorder=build_recorder(scene, engine, out, bar),
             folder=out,
             log=log,
             yade=yade,
@@ -214,15 +214,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) 
         "seed": scene.seed,
         "command": command,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {
-            "smarticles": _own_version(),
-            "git": _git_revision(),
-            "yade": yade,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "h5py": h5py.__version__,
-            "meshio": meshio.__version__,
-        },
+        "versions": versions(yade),
         "threads": threads,
         "fidelity": scene.fidelity.base,
         "count": scene.count,
@@ -242,7 +234,8 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) 
     }
 
 
-def _build_engine(scene: Scene, dt: float) -> Engine:
+def build_engine(scene: Scene, dt: float) -> Engine:
+    """The engine of a scene, with time step `dt` [s], which is not checked."""
     return Engine(
         particle=scene.particle,
         cylinder=scene.cylinder,
@@ -267,7 +260,8 @@ def motor_law(scene: Scene) -> MotorLaw:
     )
 
 
-def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
+def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
+    """The recorder of a scene, with the watchdog's limits."""
     gravity, dt = scene.gravity_m_per_s2, engine.time_step
     # No one radius gives the volume of a mould of tiers.
     radius = math.nan if scene.cylinder.upper else scene.container.radius_m
@@ -309,6 +303,23 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
         sphere_steps=round((scene.recording.sphere_interval_s or 0.0) / dt),
         strain_steps=series_steps * max(1, round(STRAIN_INTERVAL / scene.recording.series_interval_s)),
     )
+
+
+def versions(yade: str) -> dict[str, str]:
+    """Versions of everything that results depend on.
+
+    Args:
+        yade: that of YADE.
+    """
+    return {
+        "smarticles": _own_version(),
+        "git": _git_revision(),
+        "yade": yade,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "meshio": meshio.__version__,
+    }
 
 
 def _own_version() -> str:

@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from stability.check import Check, above, below, near, says
 from stability.extremes import narrowest
-from stability.hand import add, load, look, lying, watched
+from stability.hand import load, look, lying, watched
 from stability.runs import Watched, whole
 from stability.scenes import RELAX, scene, shape_change, turn
+from verification.bench import add
 
 TORQUE_LIMIT = 1.607e-5  # N m, the paper's
 

@@ -13,9 +13,10 @@ from dem.engine import Engine
 from dem.errors import RunError
 from dem.timestep import stable_step
 from stability.check import Check, below, says
-from stability.hand import add, fastest, look, lying, push, watched
+from stability.hand import fastest, look, lying, watched
 from stability.runs import whole
 from stability.scenes import RELAX, scene, shape_change, swing
+from verification.bench import add, push
 
 NO_NUMBER = "1 smarticle(s) (1): positions or velocities are no numbers, the simulation has blown up; lower fidelity"
 LEFT = "1 smarticle(s) (1): left through the wall or the floor; raise fidelity.stiffness_N_per_m"

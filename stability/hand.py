@@ -10,15 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine import Engine
 from dem.errors import RunError
-from dem.placement import Poses
 from dem.progress import Progress
 from dem.recorder import Recorder
-from dem.run import _build_engine, _build_recorder
+from dem.run import build_engine, build_recorder
 from dem.scene import Scene, parse_scene
-from dem.state import State
 from dem.timestep import time_step
 
-FLAT = Rotation.identity()
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
@@ -31,30 +28,9 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     """Engine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
     scene = load(data)
     Path(out).mkdir(parents=True, exist_ok=True)
-    engine = _build_engine(scene, time_step(scene) if dt is None else dt)
+    engine = build_engine(scene, time_step(scene) if dt is None else dt)
     progress = Progress(Path(out), scene.count, show=False)
-    return scene, engine, _build_recorder(scene, engine, Path(out), progress)
-
-
-def add(engine: Engine, position: Any, rotation: Rotation = FLAT) -> None:
-    """Add one smarticle at rest, its centre of mass at a position [m]."""
-    engine.add(Poses(np.array([position], dtype=float), (rotation,)))
-
-
-def push(engine: Engine, k: int, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> None:
-    """Give a welded smarticle a velocity [m/s] and a spin [rad/s]; YADE integrates the angular momentum, so set too."""
-    clump = engine._omega.bodies[engine._assembly.bodies[k]].state
-    rotation = body_rotations(engine.state())[k]
-    momentum = rotation @ np.diag(engine.particle.boxes.inertia) @ rotation.T @ np.array(spin, float)
-    vector = engine._yade.vector
-    clump.vel = vector(*map(float, velocity))
-    clump.angVel = vector(*map(float, spin))
-    clump.angMom = vector(*momentum)
-
-
-def body_rotations(state: State) -> np.ndarray:
-    """(N, 3, 3) body frame to laboratory frame of welded smarticles."""
-    return state.link_rotations[:, 1] @ state.boxes.link_rotations[1].T
+    return scene, engine, build_recorder(scene, engine, Path(out), progress)
 
 
 def look(engine: Engine, recorder: Recorder) -> str | None:

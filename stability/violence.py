@@ -9,9 +9,10 @@ import numpy as np
 
 from dem.errors import RunError
 from stability.check import Check, above, below, near, says
-from stability.hand import TILTED, add, energy, fastest, look, lying, push, watched
+from stability.hand import TILTED, energy, fastest, look, lying, watched
 from stability.runs import whole
 from stability.scenes import scene, shape_change
+from verification.bench import add, push
 
 
 def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:

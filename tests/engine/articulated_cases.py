@@ -7,7 +7,6 @@ throughout. Velocities belong to the half step before the positions (leapfrog).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +20,9 @@ from dem.placement import place_layer
 from dem.run import motor_law
 from dem.scene import Scene
 from dem.timestep import contact_law, hinge_law, time_step
+from verification.bench import bodies, drive
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
-Targets = Callable[[float], Any]
 
 
 def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> Engine:
@@ -46,11 +45,6 @@ def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0,
     cases.add(engine, (0, 0, 0.05), TILTED)
     cases.push(engine, 0, velocity=velocity, spin=spin)
     return scene, engine
-
-
-def bodies(engine: Engine) -> list[Any]:
-    """States of YADE's rigid bodies: one per smarticle, or three."""
-    return [engine._omega.bodies[body].state for body in engine._assembly.bodies]
 
 
 def vec(value: Any) -> np.ndarray:
@@ -84,33 +78,6 @@ def sphere_positions(engine: Engine) -> np.ndarray:
 
 def sphere_velocities(engine: Engine) -> np.ndarray:
     return np.array([vec(engine._omega.bodies[s].state.vel) for s in sorted(engine._assembly.smarticle_of)])
-
-
-def drive(
-    engine: Engine,
-    scene: Scene,
-    duration: float,
-    targets: Targets,
-    *,
-    log: tuple[list[Any], list[Any]] | None = None,
-    interval: float | None = None,
-) -> Iterator[float]:
-    """Let the motors follow `targets(t)` [rad] from now on; gives the time since then after each control period.
-
-    `log` takes torques and angles of smarticle 0 after each step, as YADE has them.
-    """
-    interval = interval or scene.fidelity.control_interval_s
-    steps = round(interval / engine.time_step)
-    for look in range(1, round(duration / interval) + 1):
-        engine.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
-        if log is None:
-            engine.advance(steps)
-        else:
-            for _ in range(steps):
-                engine.advance(1)
-                log[0].append(engine._hinges.torques()[0])
-                log[1].append(engine._hinges.angles()[0])
-        yield look * interval
 
 
 def snapshot(engine: Engine) -> dict[str, Any]:

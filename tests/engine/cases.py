@@ -6,9 +6,7 @@ and returns plain numbers and arrays; the tests compare them with the answer. SI
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +22,10 @@ from dem.placement import Poses, place_layer
 from dem.run import run_scene
 from dem.scene import Scene
 from dem.series import SeriesWriter
-from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step, typical_effective_mass
-from stability.hand import add, body_rotations, load, push
-
-UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
+from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
+from stability.hand import load
+from verification.bench import add, advance_watched, body_rotations, push
+from verification.floor import resting
 
 
 def build(
@@ -49,58 +47,8 @@ def build(
     )
 
 
-def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:
-    """Advance, and call `look` after each step."""
-    for _ in range(steps):
-        engine.advance(1)
-        look()
-
-
 def version() -> str:
     return yade_version()
-
-
-def fall(data: dict[str, Any], *, height: float, steps: list[int]) -> dict[str, Any]:
-    engine = build(load(data))
-    add(engine, (0, 0, height), Rotation.from_rotvec([0.3, -0.5, 0.2]))
-    times, heights, speeds = [], [], []
-    for n in steps:
-        engine.advance(n - engine.steps)
-        state = engine.state()
-        times.append(engine.time)
-        heights.append(state.positions[0, 2])
-        speeds.append(state.velocities[0, 2])
-    return {
-        "time": np.array(times),
-        "z": np.array(heights),
-        "v": np.array(speeds),
-        "dt": engine.time_step,
-        "xy": engine.state().positions[0, :2],
-        "rotation": body_rotations(engine.state())[0],
-    }
-
-
-def spin(data: dict[str, Any], *, spin: list[float], dt: float, samples: int, every: int) -> dict:
-    """A free spin; `before` is the rotation one step earlier: YADE's spin belongs to the middle of the step."""
-    engine = build(load(data), gravity=0.0, dt=dt)
-    add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
-    push(engine, 0, spin=spin)
-    out: dict[str, list[Any]] = {"time": [], "before": [], "rotation": [], "spin": [], "z": []}
-    start = engine.state()
-    for _ in range(samples):
-        engine.advance(every - 1)
-        out["before"].append(body_rotations(engine.state())[0])
-        engine.advance(1)
-        state = engine.state()
-        out["time"].append(engine.time)
-        out["rotation"].append(body_rotations(state)[0])
-        out["spin"].append(state.link_spins[0, 1])
-        out["z"].append(state.positions[0])
-    return {
-        **{key: np.array(value) for key, value in out.items()},
-        "start": body_rotations(start)[0],
-        "inertia": engine.particle.boxes.inertia,
-    }
 
 
 def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[str, Any]:
@@ -137,72 +85,12 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     }
 
 
-def rebound(data: dict[str, Any], *, speed: float, refine: float, resize: bool = False) -> dict[str, Any]:
-    """An upright bar falls on its end: the contact force passes through the centre of mass.
-
-    `resize` scales the dashpots from the typical mass, for which the law is made, to the mass that moves here.
-    """
+def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
+    """A smarticle lying flat on a floor without friction is pushed along it."""
     scene = load(data)
-    law = contact_law(scene)
-    if resize:
-        scale = math.sqrt(scene.smarticle.boxes.mass / typical_effective_mass(scene.particle))
-        law = dataclasses.replace(law, wall_damping=law.wall_damping * scale, normal_damping=law.normal_damping * scale)
-    engine = build(scene, law=law, gravity=0.0, dt=time_step(scene) / refine)
-    add(engine, (0, 0, scene.smarticle.middle_length_m / 2 + 1e-4), UPRIGHT)
-    push(engine, 0, velocity=(0, 0, -speed))
-    # A contact lasts π/ω and less, and the way back is short unless the rebound is slow.
-    contact = math.pi * math.sqrt(scene.smarticle.boxes.mass / law.normal_stiffness)
-    engine.advance(math.ceil((2e-4 / speed + 3 * contact) / engine.time_step))
-    state = engine.state()
-    return {
-        "after": state.velocities[0],
-        "spin": state.link_spins[0, 1],
-        "mass": engine.particle.boxes.mass,
-        "law": dataclasses.asdict(law),
-    }
-
-
-def collide(data: dict[str, Any], *, speed: float, refine: float) -> dict[str, Any]:
-    """Two upright bars in free space, end to end: the reduced mass is half of one."""
-    scene = load(data)
-    engine = build(scene, gravity=0.0, dt=time_step(scene) / refine)
-    w = scene.smarticle.middle_length_m
-    add(engine, (0, 0, 0.05), UPRIGHT)
-    add(engine, (0, 0, 0.05 + w + 1e-4), UPRIGHT)
-    push(engine, 0, velocity=(0, 0, speed / 2))
-    push(engine, 1, velocity=(0, 0, -speed / 2))
-    engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
-    v = engine.state().velocities
-    return {
-        "after": v,
-        "mass": engine.particle.boxes.mass,
-        "law": dataclasses.asdict(contact_law(scene)),
-    }
-
-
-def slide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """A smarticle lying flat is pushed along the floor, in the direction of its axis of symmetry."""
-    scene = load(data)
-    engine = build(scene, radius=0.1)
-    law, particle = contact_law(scene), scene.particle
-    sunk = particle.boxes.mass * scene.gravity_m_per_s2 / (len(particle.centres) * law.normal_stiffness)
-    lowest = particle.centres[:, 2].min() - particle.radius
-    add(engine, (0, -0.03, -lowest - sunk))
-    push(engine, 0, velocity=(0, speed, 0))
-    times, ys, vs = [0.0], [-0.03], [speed]
-    while engine.time < duration:
-        engine.advance(max(1, round(2e-3 / engine.time_step)))
-        state = engine.state()
-        times.append(engine.time)
-        ys.append(state.positions[0, 1])
-        vs.append(state.velocities[0, 1])
-    return {
-        "time": np.array(times),
-        "y": np.array(ys),
-        "v": np.array(vs),
-        "x": state.positions[0, 0],
-        "spin": state.link_spins[0, 1],
-    }
+    engine = resting(scene.particle, contact_law(scene), dt=time_step(scene), speed=speed)
+    engine.advance(round(duration / engine.time_step))
+    return {"v": engine.state().velocities[0, 1]}
 
 
 def pour(

@@ -18,7 +18,7 @@ from dem.effects import Adds, decide
 from dem.engine import Engine
 from dem.plan import plan
 from dem.recorder import Recorder
-from dem.run import _build_engine
+from dem.run import build_engine
 from dem.timestep import time_step
 
 # What every run directory holds, whatever the scene calls for.
@@ -85,7 +85,7 @@ def _look(engine: Engine, found: dict[str, set[Any]]) -> None:
 def calls_per_step(data: dict[str, Any], *, steps: int, moving: bool = False) -> dict[str, float]:
     """Functions of Python that are entered while time advances, by name, per step; with smarticles present."""
     scene = cases.load(data)
-    engine = _build_engine(scene, time_step(scene))
+    engine = build_engine(scene, time_step(scene))
     cases.add(engine, (0, 0, 0.05))
     if moving:
         engine.shake(amplitude=1e-4, frequency=30)
@@ -110,7 +110,7 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
     states = []
     for remove in (False, True):
         scene = cases.load(data)
-        engine = _build_engine(scene, time_step(scene))
+        engine = build_engine(scene, time_step(scene))
         cases.pour(engine, scene, scene.count, radius=0.7 * scene.container.radius_m)
         engine.advance(200)
         if remove and lift is None:
@@ -135,7 +135,7 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
 def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     """The energy account of a pile right before and right after the simulation is saved and loaded."""
     scene = cases.load(data)
-    engine = _build_engine(scene, time_step(scene))
+    engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)
     engine.advance(2500)
     before, path = engine.account.elastic(), Path(out) / "engine.yade"

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import cases
 import numpy as np
 from articulated_cases import (
-    Targets,
     angular_momentum,
-    bodies,
     build,
-    drive,
     floating,
     kinetic_energy,
     momentum,
@@ -22,29 +18,9 @@ from articulated_cases import (
 )
 from scipy.spatial.transform import Rotation
 
-from dem.engine import Engine
-from dem.scene import Scene
 from dem.timestep import contact_law, hinge_law, hinged_stable_time_step
-
-
-def hold(engine: Engine, links: Iterable[int], *, still: bool = True) -> None:
-    """Hold links of smarticle 0 where they are, or let go of them."""
-    for link in links:
-        body, zero = bodies(engine)[link], engine._yade.vector(0, 0, 0)
-        body.blockedDOFs = "xyzXYZ" if still else ""
-        body.vel, body.angVel, body.angMom = zero, zero, zero
-
-
-def upright(data: dict[str, Any], *, gravity: float, height: float = 0.05) -> tuple[Scene, Engine]:
-    """One articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
-    scene = cases.load(data)
-    engine = build(scene, gravity=gravity)
-    middle = Rotation.from_matrix(scene.smarticle.boxes.link_rotations[1].T)
-    turned = Rotation.from_euler("x", -90, degrees=True) * middle
-    cases.add(engine, np.array([0, 0, height]) - turned.apply(scene.smarticle.boxes.link_centres[1]), turned)
-    engine.articulate()
-    hold(engine, [1])
-    return scene, engine
+from verification.bench import Targets, bodies, drive, hold
+from verification.hinge import upright
 
 
 def gait(
@@ -94,89 +70,6 @@ def gait(
         "told": float(engine.motors.work.sum()),
         "twisted": float((tau[-1] ** 2).sum() / (2 * scene.motor.stiffness_N_m_per_rad)),
         "angles": engine.state().angles - begun,
-    }
-
-
-def pull(data: dict[str, Any], *, weights: float, duration: float) -> dict[str, Any]:
-    """A straight smarticle is pulled at both ends, along itself, by a force that grows and then stays."""
-    scene, engine = floating(data)
-    engine.articulate()
-    straight = engine.state().angles
-    along = engine.state().link_rotations[0, 1, :, 0]
-    force = weights * scene.smarticle.boxes.mass * 9.81
-    gaps = []
-    for time in drive(engine, scene, duration, lambda _: straight):
-        grown = min(1.0, 2 * time / duration) * force * along
-        for link, sign in ((0, -1), (2, 1)):
-            engine._omega.forces.setPermF(engine._assembly.bodies[link], engine._yade.vector(*(sign * grown)))
-        gaps.append(engine.joint_gaps().max())
-    return {
-        "force": force,
-        "gaps": np.array(gaps),
-        "stiffness": hinge_law(scene).pin_stiffness,
-        "diameter": scene.sphere_diameter,
-    }
-
-
-def droop(data: dict[str, Any], *, duration: float) -> dict[str, Any]:
-    """Straight barbs under gravity, the middle link held: torques and how far the hinges give way, averaged."""
-    scene, engine = upright(data, gravity=9.81)
-    begun = engine.state().angles
-    rows = [
-        (*engine._hinges.torques()[0], *engine.joint_gaps()[0], *(engine.state().angles - begun)[0])
-        for _ in drive(engine, scene, duration, lambda _: begun)
-    ]
-    # The shaft has no damping: barbs vibrate about where they hang. Hann's window takes the vibration out.
-    means = np.average(rows, axis=0, weights=np.hanning(len(rows)))
-    boxes = scene.smarticle.boxes
-    return {
-        "torques": means[:2],
-        "gaps": means[2:4],
-        "sag": means[4:],
-        "expected": boxes.link_masses[0] * 9.81 * boxes.barb_length / 2,
-        "weight": boxes.link_masses[0] * 9.81,
-        "pin": hinge_law(scene).pin_stiffness,
-        "shaft": scene.motor.stiffness_N_m_per_rad,
-    }
-
-
-def sideways(data: dict[str, Any], *, to_deg: float, sweeps: int, rest: float) -> dict[str, Any]:
-    """Lying in the air, the middle link held, barbs sweep to an angle, and back and there again; then hang still."""
-    scene = cases.load(data)
-    engine = build(scene, gravity=9.81)
-    cases.add(engine, (0, 0, 0.05))
-    engine.articulate()
-    hold(engine, [1])
-    begun, goal, each = engine.state().angles[0], math.radians(to_deg), 0.35
-    for _ in drive(engine, scene, each * sweeps, lambda t: begun + (goal - begun) * (1 - abs(t / each % 2 - 1))):
-        pass
-    begun, tilts = engine.motors.commands[0].copy(), []
-    for _ in drive(engine, scene, rest, lambda _: begun):
-        normals = engine.state().link_rotations[0, :, :, 2]
-        tilts.append(np.cross(normals[1], normals[[0, 2]]))
-    boxes, along = scene.smarticle.boxes, engine.state().link_rotations[0, [0, 2], :, 0]
-    moments = np.cross(along * boxes.barb_length / 2, [0, 0, -boxes.link_masses[0] * 9.81])
-    return {
-        "tilts": np.average(tilts, axis=0, weights=np.hanning(len(tilts))),
-        "expected": moments / hinge_law(scene).tilt_stiffness,
-        "angles": np.degrees(engine.state().angles[0]),
-    }
-
-
-def pendulum(data: dict[str, Any], *, duration: float) -> dict[str, Any]:
-    """Barbs that hang from a held middle link by a shaft without stiffness to speak of, let go at a small angle."""
-    scene, engine = upright(data, gravity=9.81)
-    begun = engine.state().angles
-    times, angles = [], []
-    for time in drive(engine, scene, duration, lambda _: begun):
-        times.append(time)
-        angles.append(engine.state().angles[0])
-    boxes = scene.smarticle.boxes
-    return {
-        "time": np.array(times),
-        "angles": np.array(angles),
-        "inertia": boxes.link_inertias[0, 2] + boxes.link_masses[0] * (boxes.barb_length / 2) ** 2,
-        "moment": boxes.link_masses[0] * 9.81 * boxes.barb_length / 2,
     }
 
 
@@ -342,7 +235,7 @@ def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest:
     scene = cases.load(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
-    scene, engine = upright(data, gravity=0.0, height=height)
+    engine = upright(scene, gravity=0.0, height=height)
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):

@@ -1,4 +1,4 @@
-"""Hinges: what a smarticle of three links and two hinges keeps, bears and survives."""
+"""Hinges: what a smarticle of three links and two hinges keeps and survives; loads: see `test_verification.py`."""
 
 from __future__ import annotations
 
@@ -100,59 +100,6 @@ def test_links_of_one_smarticle_never_touch(
     assert sweep["angles"].max(axis=0) == pytest.approx([106.5, 106.5], abs=1.6)
     assert sweep["angles"].min(axis=0) == pytest.approx([-16.5, -16.5], abs=1.6)
     assert sweep["gap"] < 0.01
-
-
-# -- loads -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("aspect_ratio", [0.4, 0.7, 1.0])
-@pytest.mark.parametrize(("fidelity", "most"), [("standard", 0.01), ("draft", 0.03)])
-def test_pull_of_a_hundred_weights_opens_a_hinge_by_a_hundredth(
-    simulate: Simulate, data: SceneData, fidelity: str, most: float, aspect_ratio: float
-) -> None:
-    pull = simulate(hinge_cases.pull, data(shape(aspect_ratio, fidelity, (0, 0))), weights=100, duration=0.02)
-    # The pin is a spring; the links' masses swing on it for a while, by per cents.
-    assert pull["gaps"][-20:].mean() == pytest.approx(pull["force"] / pull["stiffness"], rel=0.01)
-    assert pull["gaps"].max() < most * pull["diameter"]
-
-
-@pytest.mark.parametrize("fidelity", ["draft", "standard"])
-@pytest.mark.parametrize("aspect_ratio", [0.4, 1.0])
-def test_horizontal_barb_hangs_on_its_motor(
-    simulate: Simulate, data: SceneData, fidelity: str, aspect_ratio: float
-) -> None:
-    droop = simulate(hinge_cases.droop, data(shape(aspect_ratio, fidelity, (0, 0))), duration=0.2)
-    assert droop["torques"] == pytest.approx(np.full(2, -droop["expected"]), rel=0.01)
-    assert droop["sag"] == pytest.approx(np.full(2, droop["expected"] / droop["shaft"]), rel=0.01)
-    assert droop["gaps"] == pytest.approx(np.full(2, droop["weight"] / droop["pin"]), rel=0.01)
-
-
-@pytest.mark.parametrize("sweeps", [1, 3])
-def test_barb_that_turned_far_hangs_out_of_plane_as_one_that_did_not(
-    simulate: Simulate, data: SceneData, sweeps: int
-) -> None:
-    # Bonds add up their moments step by step, and turn them with half of the twist: after one sweep of 105° the tilt
-    # would be wrong by as much as itself, and after several more so.
-    hang = simulate(hinge_cases.sideways, data(shape(0.7)), to_deg=-15, sweeps=sweeps, rest=0.05)
-    assert hang["angles"] == pytest.approx([-15, -15], abs=0.5)
-    size = np.linalg.norm(hang["expected"][0])
-    assert hang["tilts"] == pytest.approx(hang["expected"], abs=0.05 * size)
-
-
-@pytest.mark.parametrize("aspect_ratio", [0.4, 0.7, 1.0])
-def test_free_barb_swings_as_a_physical_pendulum(simulate: Simulate, data: SceneData, aspect_ratio: float) -> None:
-    changes = shape(aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG)
-    swing = simulate(hinge_cases.pendulum, data(changes), duration=0.45)
-    begun, angles = math.radians(6), swing["angles"] - np.pi / 2
-    # Lengthened by the amplitude; the shaft's stiffness is a thousandth of the weight's at most.
-    period = 2 * math.pi * math.sqrt(swing["inertia"] / swing["moment"]) * (1 + begun**2 / 16)
-    for barb, sign in ((0, 1), (1, -1)):
-        angle, time = sign * angles[:, barb], swing["time"]
-        (before,) = np.nonzero(np.diff(np.sign(angle)))
-        crossings = time[before] - angle[before] * np.diff(time)[0] / np.diff(angle)[before]
-        assert len(crossings) >= 5
-        assert 2 * np.diff(crossings).mean() == pytest.approx(period, rel=0.01)
-        assert np.abs(angle).max() == pytest.approx(begun, rel=0.01)
 
 
 # -- violence ----------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("cli", "dem", "postprocess", "templates")
+PACKAGES = ("cli", "dem", "postprocess", "templates", "verification")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
@@ -75,13 +75,20 @@ def test_only_one_module_imports_yade() -> None:
 def test_dem_knows_no_pictures_no_measures_and_no_templates() -> None:
     for path in of("dem"):
         assert not among(names(path), "pyvista", "vtk", "vtkmodules", "postprocess", "templates", "cli"), path
+        assert not among(names(path), "verification"), path
 
 
 def test_postprocess_knows_neither_yade_nor_the_simulator() -> None:
     for path in of("postprocess"):
         found = names(path)
-        assert not among(found, "yade", "templates", "cli"), path
+        assert not among(found, "yade", "templates", "cli", "verification"), path
         assert not among(found, "dem") - among(found, "dem.errors", "dem.files"), path
+
+
+def test_verification_knows_the_simulator_and_draws_nothing() -> None:
+    for path in of("verification"):
+        found = names(path)
+        assert not among(found, "yade", "pyvista", "vtk", "matplotlib", "postprocess", "templates", "cli"), path
 
 
 def test_templates_know_only_the_scene() -> None:
@@ -113,7 +120,7 @@ def test_importing_everything_loads_neither_yade_nor_two_vtks(package: str) -> N
         "import importlib, sys\n"
         f"for name in {modules!r}: importlib.import_module(name)\n"
         "loaded = {name.split('.')[0] for name in sys.modules}\n"
-        "print(*sorted(loaded & {'yade', 'pyvista', 'vtkmodules', 'vtk', 'dem', 'postprocess', 'templates', 'cli'}))"
+        f"print(*sorted(loaded & {{'yade', 'pyvista', 'vtkmodules', 'vtk', *{PACKAGES!r}}}))"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
@@ -122,7 +129,7 @@ def test_importing_everything_loads_neither_yade_nor_two_vtks(package: str) -> N
     loaded = set(answer.stdout.split())
     assert package in loaded
     assert "yade" not in loaded
-    if package in ("dem", "templates", "cli"):
+    if package in ("dem", "templates", "cli", "verification"):
         assert not loaded & {"pyvista", "vtkmodules", "vtk"}
     if package == "dem":
         assert loaded == {"dem"}

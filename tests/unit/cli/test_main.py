@@ -17,7 +17,8 @@ from cli.stopping import orderly_stop
 from dem.errors import InputError, RunError
 
 COMMANDS = {
-    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy"
+    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
+    "verify",
 }  # fmt: skip
 
 

@@ -1,0 +1,91 @@
+"""Known answers in the engine: the cases and ladders of `smarticles verify`, and other parameters of the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import pytest
+
+from postprocess.convergence import observed_order
+from postprocess.verification import BAND
+from verification import floor, hinge, impact
+from verification.answer import Case, Check, Ladder
+from verification.catalogue import CASES, LADDERS
+
+pytestmark = pytest.mark.engine
+
+Simulate = Callable[..., Any]
+
+
+def told(checks: list[Check]) -> list[Check]:
+    """The checks that fail; all of them have been made."""
+    assert checks
+    return [check for check in checks if not check.ok]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_known_answer(simulate: Simulate, case: Case) -> None:
+    assert told(simulate(case.measure)) == []
+
+
+# The second and the last step of each ladder, a factor of four apart, and fewer places of the onset within a step.
+SHORT = {
+    "bounce, e = 0.5": {"phases": 16},
+    "bounce, elastic": {"phases": 16},
+    "collision, law of the scene": {"phases": 8},
+    "collision, elastic and smooth": {"phases": 8},
+    "sliding to rolling": {"phases": 2},
+}
+
+
+@pytest.mark.parametrize("ladder", LADDERS, ids=lambda ladder: ladder.name)
+def test_order_is_the_schemes(simulate: Simulate, ladder: Ladder) -> None:
+    steps = ladder.steps[1::2]
+    errors = simulate(partial(ladder.errors, steps, **SHORT.get(ladder.name, {})))
+    fit = observed_order(steps, errors, exact=0.0)
+    assert fit.order == pytest.approx(ladder.order, abs=BAND)
+    assert errors[0] < 0.1 * ladder.size  # the motion itself is resolved
+
+
+# -- other parameters --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("asked", [0.2, 0.9])
+@pytest.mark.parametrize("bars", [impact.bar_rebound, impact.bars_rebound])
+def test_rebound_of_bars(simulate: Simulate, bars: Callable[..., list[Check]], asked: float) -> None:
+    assert told(simulate(bars, asked)) == []
+
+
+@pytest.mark.parametrize("asked", [0.05, 0.2, 0.8])
+def test_rebound_of_the_typical_mass_is_the_one_asked_for(simulate: Simulate, asked: float) -> None:
+    assert told(simulate(impact.bar_rebound, asked, resized=True)) == []
+
+
+@pytest.mark.parametrize(("aspect_ratio", "friction"), [(0.7, 0.2), (0.3, 0.4)])
+def test_sliding_stops_by_coulombs_law(simulate: Simulate, aspect_ratio: float, friction: float) -> None:
+    assert told(simulate(floor.slide, aspect_ratio=aspect_ratio, friction=friction)) == []
+
+
+@pytest.mark.parametrize("aspect_ratio", [0.4, 0.7, 1.0])
+@pytest.mark.parametrize(("fidelity", "largest"), [("standard", 0.01), ("draft", 0.03)])
+def test_pull_of_a_hundred_weights_opens_a_hinge_by_a_hundredth(
+    simulate: Simulate, fidelity: str, largest: float, aspect_ratio: float
+) -> None:
+    assert told(simulate(hinge.pull, aspect_ratio=aspect_ratio, fidelity=fidelity, largest=largest)) == []
+
+
+@pytest.mark.parametrize("fidelity", ["draft", "standard"])
+@pytest.mark.parametrize("aspect_ratio", [0.4, 1.0])
+def test_horizontal_barb_hangs_on_its_motor(simulate: Simulate, fidelity: str, aspect_ratio: float) -> None:
+    assert told(simulate(hinge.droop, aspect_ratio=aspect_ratio, fidelity=fidelity)) == []
+
+
+def test_barb_that_turned_far_hangs_out_of_plane_as_one_that_did_not(simulate: Simulate) -> None:
+    assert told(simulate(hinge.tilt, sweeps=3)) == []
+
+
+@pytest.mark.parametrize("aspect_ratio", [0.4, 1.0])
+def test_free_barb_swings_as_a_physical_pendulum(simulate: Simulate, aspect_ratio: float) -> None:
+    assert told(simulate(hinge.pendulum, aspect_ratio=aspect_ratio)) == []
