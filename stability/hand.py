@@ -59,7 +59,7 @@ def body_rotations(state: State) -> np.ndarray:
 
 def look(engine: Engine, recorder: Recorder) -> str | None:
     """What the recorder's next look says, contacts included; None: nothing."""
-    recorder.strain_steps = 1
+    recorder.watch_steps = 1
     try:
         recorder.record(engine, 0)
     except RunError as error:
