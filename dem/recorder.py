@@ -23,11 +23,11 @@ class Recorder:
     Args:
         series: writes the series.
         frames: writes the frames.
-        watchdog: looks at every sampled state.
+        watchdog: looks at the state now and then, at every checkpoint and at the end.
         progress: told at every sample.
         series_steps: steps between samples.
         frame_steps: steps between frames; a whole multiple of `series_steps`.
-        strain_steps: steps between the watchdog's looks at contacts; a whole multiple of `series_steps`.
+        watch_steps: steps between the watchdog's looks; a whole multiple of `series_steps`.
         spheres: writes the spheres as points; None: nobody does.
         sphere_steps: steps between these; a whole multiple of `series_steps`.
     """
@@ -38,7 +38,7 @@ class Recorder:
     progress: Progress
     series_steps: int
     frame_steps: int
-    strain_steps: int
+    watch_steps: int
     spheres: FrameWriter | None = None
     sphere_steps: int = 0
     next_step: int = 0
@@ -66,12 +66,18 @@ class Recorder:
         if self.spheres is not None and engine.count and engine.steps % self.sphere_steps == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last picture of a run that fails is worth having.
-        self._watch(engine, state)
+        if engine.steps % self.watch_steps == 0:
+            self.watch(engine, state)
         self.progress.update(time=engine.time, phi=phi, count=engine.count)
         self.next_step = engine.steps + self.series_steps
 
-    def _watch(self, engine: Engine, state: State) -> None:
-        watchdog, time = self.watchdog, engine.time
+    def watch(self, engine: Engine, state: State | None = None) -> None:
+        """Let the watchdog look at everything.
+
+        Raises:
+            RunError: it stopped the run.
+        """
+        state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         watchdog.check(
             state,
             floor=engine.floor,
@@ -79,13 +85,11 @@ class Recorder:
             raised=engine.fixtures.raised,
             gaps=engine.joint_gaps() if engine.articulated else None,
         )
-        strain = None
-        if engine.steps % self.strain_steps == 0:
-            strain = engine.strain()
-            watchdog.check_depths(strain, count=engine.count, time=time)
+        strain = engine.strain(watchdog.depth)
+        watchdog.check_depths(strain, time=time)
         given = engine.account.given + (0.0 if engine.motors is None else float(engine.motors.work.sum()))
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
-        watchdog.check_energy(state, energy=energy, strain=strain, time=time)
+        watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
 
     @property
     def memory(self) -> dict[str, Any]:

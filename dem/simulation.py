@@ -77,6 +77,7 @@ class Simulation:
                 self._run_phase()
         finally:
             signal.signal(signal.SIGUSR1, before)
+        self.recorder.watch(self.engine)
         self.recorder.series.write()
         return self._performed
 
@@ -134,6 +135,8 @@ class Simulation:
 
     def _checkpoint(self) -> None:
         saved = self.folder / ".engine.partial.yade"
+        # A checkpoint is good: the watchdog has looked at it.
+        self.recorder.watch(self.engine)
         self._check_space()
         try:
             memory = self.engine.save(saved)

@@ -20,32 +20,38 @@ class Strain:
     """All contacts and hinges at one instant.
 
     Args:
-        smarticles: (M, 2) int64, the two smarticles of each contact; -1 for container and hooks.
-        depths: (M,) overlaps [m]; negative where a contact has just ended.
+        deepest: overlap of the deepest contact [m].
+        deep: (N,) bool, smarticles with a contact that is deeper than asked for.
         elastic_energy: no less than what the springs of all contacts and hinges hold [J].
     """
 
-    smarticles: NDArray[np.int64]
-    depths: Array
+    deepest: float
+    deep: NDArray[np.bool_]
     elastic_energy: float
 
 
-def measure_strain(yade: Yade, assembly: Assembly, law: ContactLaw) -> Strain:
+def measure_strain(yade: Yade, assembly: Assembly, law: ContactLaw, limit: float) -> Strain:
     """Look at all contacts and hinges of a running simulation.
 
     Args:
         yade: the simulation.
         assembly: the smarticles in it.
         law: of all contacts.
+        limit: overlap [m] of contacts whose smarticles are to be named.
     """
-    number = assembly.smarticle_of.get
-    # One pass that reads no more than this: it is made in every run.
-    rows = [(number(c.id1, -1), number(c.id2, -1), c.geom.penetrationDepth) for c in contacts_of(yade, assembly)]
-    table = np.array(rows).reshape(-1, 3)
-    depths = table[:, 2]
+    hinges = assembly.hinges
+    # Made in every run: without hinges every interaction is a contact, and none is asked for its bodies.
+    contacts = contacts_of(yade, assembly) if hinges is not None else (c for c in yade.omega.interactions if c.isReal)
+    depths = np.array([contact.geom.penetrationDepth for contact in contacts])
+    deepest = float(depths.max(initial=0.0))
+    deep = np.zeros(assembly.count, dtype=np.bool_)
+    if not deepest <= limit:
+        for contact in contacts_of(yade, assembly):
+            if not contact.geom.penetrationDepth <= limit:
+                number = map(assembly.smarticle_of.get, (contact.id1, contact.id2))
+                deep[[k for k in number if k is not None]] = True
     normal = law.normal_stiffness / 2 * float((np.maximum(depths, 0.0) ** 2).sum())
     # Friction bounds what tangential springs hold by what normal ones do.
     friction = max(law.friction, law.wall_friction)
     tangential = friction**2 * law.normal_stiffness / law.tangential_stiffness * normal
-    held = 0.0 if assembly.hinges is None else assembly.hinges.elastic_energy()
-    return Strain(table[:, :2].astype(np.int64), depths, normal + tangential + held)
+    return Strain(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()))

@@ -85,27 +85,25 @@ class Watchdog:
             "raise container.height_m or shake less",
         )
 
-    def check_depths(self, strain: Strain, *, count: int, time: float) -> None:
+    def check_depths(self, strain: Strain, *, time: float) -> None:
         """Look at all contacts once.
 
         Args:
-            strain: the contacts.
-            count: smarticles.
+            strain: the contacts, those deeper than `depth` named.
             time: simulated time [s].
 
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
         """
-        deep = strain.smarticles[~np.less_equal(strain.depths, self.depth)]
         refuse(
-            np.isin(np.arange(count), deep),
+            strain.deep,
             time,
-            f"contacts more than {self.depth:.3g} m deep (deepest {strain.depths.max(initial=0):.3g} m), so that links "
-            "pass through each other or through the container",
+            f"contacts more than {self.depth:.3g} m deep (deepest {strain.deepest:.3g} m), so that links pass through "
+            "each other or through the container",
             "raise fidelity.stiffness_N_per_m, or load the pile less",
         )
 
-    def check_energy(self, state: State, *, energy: float, strain: Strain | None, time: float) -> None:
+    def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
         """Compare the energy with what it may be after all that was seen before.
 
         Contacts, hinges and welding only take energy away, and what their springs hold comes back once at most. So
@@ -116,7 +114,7 @@ class Watchdog:
             state: the smarticles, to name the fast ones.
             energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
                 where the work is not known at present: then everything seen so far is forgotten.
-            strain: contacts and hinges, which lower the ceiling; None: not looked at this time.
+            elastic: what the springs of contacts and hinges hold at most [J].
             time: simulated time [s].
 
         Raises:
@@ -135,8 +133,7 @@ class Watchdog:
                 f"{self.energy:.3g} J); these are the fastest, up to {speeds.max():.3g} m/s",
                 LOWER_STEP,
             )
-        if strain is not None:
-            self._ceiling = min(self._ceiling, energy + strain.elastic_energy)
+        self._ceiling = min(self._ceiling, energy + elastic)
 
 
 def _speeds(state: State) -> Array:

@@ -136,15 +136,19 @@ def _cases() -> list[Case]:
         *cases,
         Case("spoilt: pile that is heated", broken.heated, {"count": 4, "share": 0.3}),
         Case("spoilt: pile that is kicked", broken.kicked, {"count": 4, "speed": 0.3}),
-        Case("spoilt: contacts too soft", broken.soft, {"stiffness": 8.0}),
-        *(
-            Case(
-                f"spoilt: time step {factor:g} of the stable one",
-                broken.wrong_step,
-                {"factor": factor, "count": 6, "seconds": 0.3},
-                {"count": 40},
-            )
-            for factor in (2.0, 4.0)
+        Case("spoilt: contacts too soft", broken.soft, {"stiffness": 0.5}),
+        Case(
+            "spoilt: time step 2 of the stable one",
+            broken.wrong_step,
+            {"factor": 2.0, "count": 6, "seconds": 0.3},
+            {"count": 40},
+        ),
+        # Welded smarticles chatter and never settle, which takes as long as the pour may wait.
+        Case(
+            "spoilt: time step 4 of the stable one",
+            broken.wrong_step,
+            None,
+            {"factor": 4.0, "count": 6, "seconds": 0.3},
         ),
         Case("spoilt: late in a run", broken.late),
         *(

@@ -35,7 +35,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
 
 def look(engine: Engine, recorder: Recorder) -> str | None:
     """What the recorder's next look says, contacts included; None: nothing."""
-    recorder.strain_steps = 1
+    recorder.watch_steps = 1
     try:
         recorder.record(engine, 0)
     except RunError as error:

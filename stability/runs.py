@@ -40,7 +40,7 @@ class Noting(Watchdog):
 
     def check_depths(self, strain: Strain, **options: Any) -> None:
         """See `Watchdog`."""
-        self._note("depth", strain.depths.max(initial=0.0) / self.depth)
+        self._note("depth", strain.deepest / self.depth)
         super().check_depths(strain, **options)
 
     def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
@@ -117,12 +117,18 @@ class Watched:
         return checks
 
 
-def whole(data: dict[str, Any], out: Path) -> Watched:
-    """Run a scene into a run directory."""
-    scene, spent = None, [0.0]
-    looked = Recorder._watch
+def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
+    """Run a scene into a run directory.
 
-    def watch(recorder: Recorder, engine: Engine, state: State) -> None:
+    Args:
+        data: the scene.
+        out: the run directory.
+        note: whether to note how near smarticles come to the watchdog's limits, which costs as much as the watchdog.
+    """
+    scene, spent = None, [0.0]
+    looked = Recorder.watch
+
+    def watch(recorder: Recorder, engine: Engine, state: State | None = None) -> None:
         begun = time.process_time()
         try:
             looked(recorder, engine, state)
@@ -134,7 +140,7 @@ def whole(data: dict[str, Any], out: Path) -> Watched:
     begun = time.process_time()
     try:
         scene = parse_scene(data, source="case")
-        with patch.object(dem.run, "Watchdog", Noting), patch.object(Recorder, "_watch", watch):
+        with patch.object(dem.run, "Watchdog", Noting if note else Watchdog), patch.object(Recorder, "watch", watch):
             dem.run.run_scene(scene, out, command="stability", progress=False)
     except (InputError, RunError) as caught:
         error = type(caught).__name__, str(caught)

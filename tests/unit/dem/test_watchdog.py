@@ -12,6 +12,7 @@ from dem.container import Cylinder
 from dem.errors import RunError
 from dem.particle import Boxes
 from dem.state import State
+from dem.strain import Strain
 from dem.watchdog import Watchdog
 
 BOXES = Boxes(
@@ -102,3 +103,55 @@ def test_broken_hinge_is_named_with_its_gap() -> None:
         gaps[2, 1] = bad
         with pytest.raises(RunError, match=r"1\.2500 s: 1 smarticle\(s\) \(2\): links more than 0\.0002 m apart"):
             dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+
+
+def test_deep_contacts_are_named() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
+    deep = np.zeros(4, dtype=bool)
+    dog.check_depths(Strain(5.9e-4, deep, 0.0), time=1.25)
+    deep[[1, 3]] = True
+    with pytest.raises(RunError) as caught:
+        dog.check_depths(Strain(7e-4, deep, 0.0), time=1.25)
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
+        "pass through each other or through the container; raise fidelity.stiffness_N_per_m, or load the pile less"
+    )
+
+
+def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
+    """Energy less work [J] and what springs hold [J], look by look."""
+    for energy, elastic in energies:
+        dog.check_energy(healthy(), energy=energy, elastic=elastic, time=1.25)
+
+
+def test_energy_may_fall_and_springs_may_give_back_what_they_held() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    # Falls on to springs, which throw it back; then less and less.
+    looks(dog, (5.0, 0.0), (2.0, 3.0), (4.9, 0.0), (1.0, 2.0), (2.9, 0.0), (2.0, 0.0), (0.5, 0.0), (0.5, 0.0))
+    # What is within the limit, again and again, is not summed up.
+    looks(dog, *[(0.59, 0.0), (0.5, 0.0)] * 10)
+
+
+def test_energy_from_nowhere_stops_the_run() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    looks(dog, (5.0, 0.0), (0.5, 0.2))
+    with pytest.raises(RunError) as caught:
+        looks(dog, (0.81, 0.0))
+    # Of four smarticles, one is three times as fast as the next.
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 1 smarticle(s) (0): an energy that has risen by 0.11 J more than gravity, motors and springs "
+        "explain (limit 0.1 J); these are the fastest, up to 4.9 m/s; lower fidelity.time_step_fraction"
+    )
+
+
+def test_energy_that_rises_slowly_is_seen_however_slowly() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    with pytest.raises(RunError, match="an energy that has risen by"):
+        looks(dog, *[(1.0 + 0.003 * n, 0.0) for n in range(40)])
+
+
+def test_unknown_work_forgets_what_was_seen() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    looks(dog, (1.0, 0.0), (math.nan, 0.0), (9.0, 0.0), (9.05, 0.0))
+    with pytest.raises(RunError, match="risen by"):
+        looks(dog, (9.2, 0.0))
