@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
+from dem.chain import Arrange, Strain, chain_of
 from dem.hooks import PullHook
 from dem.parts import Deposit, Shake
 from dem.phases import shake_amplitude
@@ -105,6 +106,8 @@ def plan(scene: Scene) -> Plan:
         if isinstance(phase, Deposit):
             estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
             phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
+        elif isinstance(phase, Arrange):
+            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0))
         else:
             estimate = phase.duration_s
             wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)

@@ -6,7 +6,7 @@ import logging
 import math
 import platform
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,11 +16,13 @@ import h5py
 import meshio
 import numpy as np
 
+from dem.chain import Strain
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
+from dem.hinges import DAMPER_TIME
 from dem.hooks import PullHook
 from dem.library import yade_version
 from dem.motor import MotorLaw
@@ -207,7 +209,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
         "spheres_per_smarticle": len(particle.centres),
         "time_step_s": dt,
         "phases": [{"index": k, "type": phase.type} for k, phase in enumerate(scene.phases)],
-    }
+    } | ({} if scene.plane is None else {"planar": True})
 
 
 def _build_engine(scene: Scene, dt: float) -> Engine:
@@ -218,10 +220,15 @@ def _build_engine(scene: Scene, dt: float) -> Engine:
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
         shaken=any(isinstance(phase, Shake) for phase in scene.phases),
-        hinges=(hinge_law(scene), motor_law(scene)) if scene.actuates else None,
+        # No damper may relax more than all of its force in a step.
+        hinges=(replace(hinge_law(scene), damper_time=max(DAMPER_TIME, dt)), motor_law(scene))
+        if scene.actuates
+        else None,
         track_work=scene.recording.energies,
         dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
         hooks=None if scene.hooks is None else scene.hooks.crosses,
+        channel=scene.channel,
+        strengths=scene.motor_strengths,
     )
 
 
@@ -232,13 +239,14 @@ def motor_law(scene: Scene) -> MotorLaw:
         speed_limit=scene.motor.speed_limit_rad_per_s,
         stiffness=scene.motor.stiffness_N_m_per_rad,
         law=scene.motor.law,
+        damping=scene.motor.damping_N_m_s_per_rad,
     )
 
 
 def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
     gravity, dt = scene.gravity_m_per_s2, engine.time_step
     # No one radius gives the volume of a mould of tiers.
-    radius = math.nan if scene.cylinder.upper else scene.container.radius_m
+    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
     raised = sum(phase.distance_m for phase in scene.phases if isinstance(phase, PullHook))
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + raised))
     shaking = max(
@@ -260,6 +268,7 @@ def _build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress)
             ledger=scene.recording.dissipation_interval_s is not None,
             hooks=scene.hooks is not None,
             release=any(isinstance(phase, RemoveContainer) for phase in scene.phases),
+            strained=any(isinstance(phase, Strain) for phase in scene.phases),
         ),
         frames=FrameWriter(out),
         watchdog=Watchdog(
