@@ -150,4 +150,12 @@ amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): pac
 energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
 reach at a small l/w are left out. --quick takes minutes.""",
     ),
+    "chain": Study(
+        analyse=partial(_analyse_reported, module="postprocess.chain"),
+        pictured={"variant": "baseline", "count": 2, "h_over_H": 0.8},
+        about="""\
+strain test of a chain of two or six robots between two walls, against the findings of Savoie et al. (Soft Matter
+2023): force, yield, width, fracture against confinement; and what friction, servos and strings, which the paper
+does not tell, matter. 95 runs, seed by seed. --quick takes minutes.""",
+    ),
 }

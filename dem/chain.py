@@ -1,7 +1,7 @@
 """The chain of interlocked smarticles and its strain test, as data: how it is laid out, tied and pulled.
 
-⊔-⊓-⊔: every second smarticle is turned by half a turn, and neighbouring barbs hook into each other. The chain lies along
-x, its middle at the origin. Source: Savoie et al., Soft Matter 2023, "Robophysical experiment".
+⊔-⊓-⊔: every second smarticle is turned by half a turn, and neighbouring barbs hook into each other. The chain lies
+along x, its middle at the origin. Source: Savoie et al., Soft Matter 2023, "Robophysical experiment".
 """
 
 from __future__ import annotations
@@ -43,12 +43,15 @@ class Arrange(Part):
 class Strain(Part):
     """Pull the chain by strings at its two end barbs, one held, one moved along x, until it parts.
 
-    The strings are tied where the end barbs cross the chain's axis. They pull and never push. Motors hold their angles.
+    The other ends of the strings are on the chain's axis. Strings pull and never push. Motors hold their angles.
     """
 
     type: Literal["strain"]
     speed_m_per_s: float = Field(0.005, gt=0, le=1, description="speed of the moved end [m/s]")
     distance_m: Length = Field(..., description="how far it moves at most [m]; the phase ends when the chain parts")
+    tied_at: Literal["tip", "axis"] = Field(
+        "tip", description="where on the end barbs: at their tips, or where they cross the chain's axis"
+    )
     string_length_m: Length = Field(0.1, description="length of either string [m]")
     string_stiffness_N_per_m: float = Field(5000.0, gt=0, description="of either string when taut [N/m]")
     string_damping_N_s_per_m: float = Field(1.0, ge=0, description="of either string when taut [N s/m]")
@@ -109,7 +112,7 @@ class Chain:
 
     @property
     def length(self) -> float:
-        """Distance of the two points where strings are tied."""
+        """Distance along x of the two points where strings are tied."""
         return (self.count - 1) * self.step + self.particle.boxes.middle_length
 
     def poses(self) -> Poses:
@@ -124,10 +127,10 @@ class Chain:
         positions = np.stack([along, across, np.zeros(self.count)], axis=1)
         return Poses(positions, tuple(Rotation.from_rotvec([0.0, 0.0, math.pi * half]) for half in turned))
 
-    @property
-    def ties(self) -> tuple[Tie, Tie]:
-        """Of the string at the lower and at the higher x: where the outer barbs cross the chain's axis."""
-        along = (self.offset - self.particle.boxes.barb_length) / 2
+    def ties(self, tied_at: Literal["tip", "axis"]) -> tuple[Tie, Tie]:
+        """Of the string at the lower and at the higher x, on the outer barbs; see `Strain.tied_at`."""
+        half = self.particle.boxes.barb_length / 2
+        along = half - self.particle.radius if tied_at == "tip" else self.offset / 2 - half
         last = self.count - 1
         return Tie(0, 0, along), Tie(last, 0 if last % 2 else 2, along)
 

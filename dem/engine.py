@@ -332,7 +332,7 @@ class Engine:
         self._hinges.set_torques(torques, self.time_step)
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie a string to each of some points of articulated smarticles, taut along x and away from the origin.
+        """Tie a string to each of some points of articulated smarticles, taut, its other end outwards on the x-axis.
 
         Args:
             ties: the points.
@@ -346,7 +346,7 @@ class Engine:
             place = state.link_positions[tie.smarticle, tie.link]
             place = place + state.link_rotations[tie.smarticle, tie.link] @ point
             away = math.copysign(1.0, place[0])
-            anchor = place + np.array([away * law.length, 0.0, 0.0])
+            anchor = np.array([place[0] + away * math.sqrt(law.length**2 - place[1] ** 2), 0.0, 0.0])
             ends.append(End(body=body, arm=arm.tolist(), anchor=anchor.tolist(), speed=away * speed))
         self.strings = Strings(self._yade, law, ends)
 

@@ -212,7 +212,7 @@ class Straining(Actuating):
                 stiffness=phase.string_stiffness_N_per_m,
                 damping=phase.string_damping_N_s_per_m,
             )
-            engine.tie(self._chain.ties, law, (0.0, phase.speed_m_per_s))
+            engine.tie(self._chain.ties(phase.tied_at), law, (0.0, phase.speed_m_per_s))
         over = self.memory["look"] % self._looks_per_check == 0 and parted(engine.state(), diameter)
         wait = 0.0 if over else super().proceed(engine)
         if not wait:

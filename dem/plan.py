@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
-from dem.chain import Arrange, Strain, chain_of
+from dem.chain import Arrange
 from dem.hooks import PullHook
 from dem.parts import Deposit, Shake
 from dem.phases import shake_amplitude

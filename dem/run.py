@@ -209,7 +209,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str) -> dict[str, A
         "spheres_per_smarticle": len(particle.centres),
         "time_step_s": dt,
         "phases": [{"index": k, "type": phase.type} for k, phase in enumerate(scene.phases)],
-    } | ({} if scene.plane is None else {"planar": True})
+    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
 
 
 def _build_engine(scene: Scene, dt: float) -> Engine:

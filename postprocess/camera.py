@@ -85,12 +85,24 @@ class Look:
 def extent(frame: Frame, run: RunManifest, look: Look) -> NDArray[np.float64]:
     """Points (n, 3) [mm] above the floor that must be in the picture; the floor is at z = 0."""
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
+    if run.planar:
+        thick = run.thickness_in_plane * MILLIMETRE
+        return np.concatenate([points - thick, points + thick, channel(points, run).reshape(-1, 3)])
     top = _wall_height(float(points[:, 2].max()), run)
     rim = circle(run.container_radius * MILLIMETRE, top)
     if look.elevation < 90:
         rim = rim[rim @ look.axes[2] > look.axes[2, 2] * top]
     floor = circle(run.container_radius * MILLIMETRE, 0.0)
     return np.concatenate([points, floor, rim])
+
+
+def channel(points: NDArray[np.float64], run: RunManifest) -> NDArray[np.float64]:
+    """(walls, 2, 3) [mm]: the two walls of a plane from above, as long as points (n, 3) [mm] reach; none without."""
+    if run.channel_width is None:
+        return np.empty((0, 2, 3))
+    half, top = run.channel_width * MILLIMETRE / 2, run.thickness_normal * MILLIMETRE
+    ends = points[:, 0].min(), points[:, 0].max()
+    return np.array([[[x, side * half, top] for x in ends] for side in (-1, 1)])
 
 
 def _wall_height(top: float, run: RunManifest) -> float:

@@ -21,7 +21,7 @@ from PIL import Image
 
 from dem.errors import InputError, RunError
 from postprocess import figures
-from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, circle, fitted_camera
+from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, channel, circle, fitted_camera
 from postprocess.colouring import ColourScale
 from postprocess.entanglement import entanglement
 from postprocess.errors import UndefinedMeasureError
@@ -161,17 +161,11 @@ class Stage:
         radius = self._run.container_radius * MILLIMETRE
         top = float(extent[:, 2].max())  # of the wall's rim, which is above the pile
         plotter.set_background("white")
-        floor = pv.Disc(inner=0, outer=radius, c_res=180)
-        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
-        arc = _back_arc(radius, axes[2])
-        if arc is not None:
-            wall = pv.MultipleLines(arc).extrude((0.0, 0.0, top), capping=False)
-            upper = arc + np.array([0.0, 0.0, top])
-            self._wall = [
-                plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False),
-                self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]])),
-            ]
-        self._add_outline(circle(radius, 0.0 if arc is not None else top))
+        if self._run.planar:
+            for wall in channel(extent, self._run):
+                self._add_outline(wall)
+        else:
+            self._add_cylinder(radius, top)
         width, height = self._look.panel
         position, focus = fitted_camera(extent, axes, width / height)
         self._light(position, focus)
@@ -189,6 +183,20 @@ class Stage:
             kernel_size=64,
             blur=True,
         )
+
+    def _add_cylinder(self, radius: float, top: float) -> None:
+        plotter = self._plotter
+        floor = pv.Disc(inner=0, outer=radius, c_res=180)
+        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
+        arc = _back_arc(radius, self._look.axes[2])
+        if arc is not None:
+            wall = pv.MultipleLines(arc).extrude((0.0, 0.0, top), capping=False)
+            upper = arc + np.array([0.0, 0.0, top])
+            self._wall = [
+                plotter.add_mesh(wall, color="#9db4c8", opacity=0.22, lighting=False, render=False),
+                self._add_outline(np.concatenate([arc[:1], upper, arc[-1:]])),
+            ]
+        self._add_outline(circle(radius, 0.0 if arc is not None else top))
 
     def _add_outline(self, points: NDArray[np.float64]) -> Any:
         return self._plotter.add_mesh(
