@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
-from dem.chain import Arrange
+from dem.chain import Arrange, Strain, chain_of
 from dem.hooks import PullHook
 from dem.parts import Deposit, Shake
 from dem.phases import shake_amplitude
@@ -62,6 +62,7 @@ class Plan:
     engines: tuple[str, ...]
     frames: int
     wall_s: float
+    planar: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -69,9 +70,10 @@ class Plan:
 
     def to_text(self) -> str:
         """A table for the terminal."""
+        wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
-            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, wall {1e3 * self.container_height_m:.0f} mm high",
+            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)",
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
@@ -127,6 +129,7 @@ def plan(scene: Scene) -> Plan:
         engines=_engines(effects),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
+        planar=scene.plane is not None,
     )
 
 
@@ -175,6 +178,7 @@ def _effects(scene: Scene) -> tuple[Effect, ...]:
         ),
         *_actuation_effects(scene),
         *_test_effects(scene),
+        *_chain_effects(scene),
         Effect(
             "energy",
             recording.energy,
@@ -207,6 +211,26 @@ def _test_effects(scene: Scene) -> tuple[Effect, Effect]:
             "hooks", hooks is not None, why, "four bodies, and their forces summed in every step" if hooks else "none"
         ),
         Effect("wall removal", bool(removals), ", ".join(removals) or "no phase of type remove-container", "none"),
+    )
+
+
+def _chain_effects(scene: Scene) -> tuple[Effect, ...]:
+    if scene.plane is None:
+        return (Effect("plane", False, "no key plane", "none"),)
+    chain, width = chain_of(scene), scene.plane.width_m
+    walls = "no walls"
+    if width is not None:
+        walls = f"two walls {1e3 * width:.3g} mm apart, h/H = {chain.width / width:.3g}"
+    pulls = [
+        f"phase {k} pulls at {1e3 * phase.speed_m_per_s:.3g} mm/s, tied at the {phase.tied_at}, "
+        f"{phase.string_stiffness_N_per_m:g} N/m each"
+        for k, phase in enumerate(scene.phases)
+        if isinstance(phase, Strain)
+    ]
+    lies = f"smarticles move along x and y and turn about z; {walls}; the table carries them and does not rub"
+    return (
+        Effect("plane", True, lies, "three degrees of freedom blocked for each body, none added"),
+        Effect("strings", bool(pulls), ", ".join(pulls) or "no phase of type strain", "two forces in every step"),
     )
 
 
