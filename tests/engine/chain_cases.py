@@ -26,10 +26,10 @@ def build(scene: Scene) -> Engine:
 
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, Engine]:
-    """One smarticle alone in the plane, its motors holding."""
+    """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""
     scene = load(data)
     engine = build(scene)
-    add(engine, (0, 0, 0), rotation)
+    add(engine, (0, -scene.particle.boxes.vertices[0, 1], 0), rotation)
     engine.articulate()
     return scene, engine
 

@@ -62,7 +62,7 @@ def test_a_servo_yields_like_a_damped_spring_and_then_holds_at_its_limit(simulat
     for found in (low, high):
         expected = STIFFNESS * found["opened"] + 1e-3 * found["rate"]
         # The inertia of barbs that speed up is the rest. Nothing would be zero, and no damping 4 % to 8 % less.
-        assert found["torque"] == pytest.approx(expected, rel=0.02)
+        assert found["torque"] == pytest.approx(expected, rel=0.01)
     assert 0.05 < low["opened"] < high["opened"] < LIMIT / STIFFNESS
     assert beyond["opened"] > 1.2 * LIMIT / STIFFNESS
     assert beyond["torque"] == pytest.approx(LIMIT, rel=0.01)
@@ -121,12 +121,13 @@ def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path
 
 def test_strings_and_servos_go_on_from_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
     data = chain()
+    data["phases"][1]["distance_m"] = 0.01
     whole = simulate(chain_cases.series, data, str(tmp_path / "whole"))
     data["recording"]["checkpoint_interval_s"] = 0.05
     loaded = simulate(chain_cases.series, data, str(tmp_path / "loaded"))
     forces = [found["string_pulled_force_N"][5:, 0] for found in (whole, loaded)]
     # Contacts are added up in another order after a checkpoint, and no more than that.
-    assert forces[0].max() > 0.3
+    assert forces[0].max() > 0.1
     assert forces[1] == pytest.approx(forces[0], abs=1e-6)
 
 
