@@ -156,6 +156,6 @@ reach at a small l/w are left out. --quick takes minutes.""",
         about="""\
 strain test of a chain of two or six robots between two walls, against the findings of Savoie et al. (Soft Matter
 2023): force, yield, width, fracture against confinement; and what friction, servos and strings, which the paper
-does not tell, matter. 95 runs, seed by seed. --quick takes minutes.""",
+does not tell, matter. 90 runs, seed by seed. --quick takes minutes.""",
     ),
 }

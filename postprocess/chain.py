@@ -145,7 +145,10 @@ def _markdown(found: Sequence[Finding], means: pd.DataFrame, changes: pd.DataFra
     lines += [f"| {' | '.join(row)} |" for row in rows]
     if len(changes):
         lines += ["", "## What the assumptions matter", ""]
-        lines += ["Change against the variant `fast`, in per cent ± 95 % half-width over pairs with the same seed.", ""]
+        lines += [
+            "Change against the baseline, in per cent ± 95 % half-width over pairs of runs with the same servos.",
+            "",
+        ]
         names = [PEAK, FRACTURE, STIFFNESS]
         lines += [f"| variant | {' | '.join(name.rpartition(' [')[0] for name in names)} |", "| --- " * 4 + "|"]
         for variant, group in changes.groupby(VARIANT, sort=False):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postprocess import figures
-from postprocess.chain_findings import COMPARED, COUNTS, RANGE
+from postprocess.chain_findings import COUNTS, RANGE
 from postprocess.chain_runs import (
     BASELINE,
     CONFINEMENT,
@@ -121,18 +121,17 @@ def _draw_confinement(path: Path, points: pd.DataFrame, footer: Sequence[str]) -
 
 
 def _draw_sensitivity(path: Path, changes: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
-    shown = changes[changes[VARIANT] != COMPARED]
-    names = list(dict.fromkeys(shown[VARIANT]))
+    names = list(dict.fromkeys(changes[VARIANT]))
     figure, axes = figures.new_figure(width=_WIDE, height=0.8 + 0.27 * len(names))
     for shift, quantity, look in ((0.14, PEAK, _LOOKS[2]), (-0.14, FRACTURE, _LOOKS[6])):
-        part = shown[shown["quantity"] == quantity].set_index(VARIANT).loc[names]
+        part = changes[changes["quantity"] == quantity].set_index(VARIANT).loc[names]
         rows = -np.arange(len(names)) + shift
         style = {"markersize": 3.4, "linestyle": "none", **look}
         name = quantity.rpartition(" [")[0]
         axes.errorbar(part["change [%]"], rows, xerr=part["change 95 % [%]"], label=name, **style)
     axes.axvline(0, color=figures.GREY, linewidth=0.6)
-    axes.set_yticks(-np.arange(len(names)), ["5 mm/s instead of 20" if n == BASELINE else n for n in names])
-    axes.set_xlabel(f"change against the variant {COMPARED} [%]")
+    axes.set_yticks(-np.arange(len(names)), names)
+    axes.set_xlabel("change against the baseline [%]")
     axes.legend(loc="best")
-    told = "Means over pairs of trials with the same seed; bars: 95 % intervals (Student's t). n = 2."
+    told = "Means over pairs of runs with the same servos; bars: 95 % intervals (Student's t). n = 2."
     return finished(figure, path, [told, *footer])

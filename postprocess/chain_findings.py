@@ -16,7 +16,7 @@ from postprocess.chain_runs import (
     DROP,
     FRACTURE,
     PEAK,
-    SPEED,
+    SLIP_WIDENING,
     STIFFNESS,
     VARIANT,
     WALL,
@@ -26,9 +26,6 @@ from postprocess.chain_runs import (
 from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import SEED
-
-COMPARED = "fast"
-"""The variant that the others are compared with: the chain of two at the same speed."""
 
 RANGE = (0.52, 0.65)
 """h/H of the paper."""
@@ -67,8 +64,8 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
 def _straight(base: pd.DataFrame) -> Finding:
     parts, verdicts = [], []
     for count in COUNTS:
-        ratio = mean_over_seeds(base.loc[base[COUNT] == count, BEND] - 1)
-        slope = mean_over_seeds(base.loc[base[COUNT] == count, STIFFNESS])
+        own = base[base[COUNT] == count]
+        ratio, slope = _by_trial(own.assign(**{BEND: own[BEND] - 1}), BEND), _by_trial(own, STIFFNESS)
         parts.append(f"n = {count}: {told(ratio, 3)}, slope {told(slope, 3, ' N')}")
         verdicts.append(all_of([judge(ratio, threshold=-STRAIGHT), judge(negative(ratio), threshold=-STRAIGHT)]))
     return Finding(
@@ -79,18 +76,23 @@ def _straight(base: pd.DataFrame) -> Finding:
     )
 
 
+def _by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
+    """Mean over seeds of means over h/H: before they touch a wall, runs with the same servos are the same run."""
+    return mean_over_seeds(part.groupby(SEED)[quantity].mean().tolist())
+
+
 def _yields(base: pd.DataFrame, count: int) -> Finding:
     part, expected = base[base[COUNT] == count], YIELDS[count]
     yielded = part[part[YIELD].notna()]
-    strain, loss = mean_over_seeds(yielded[YIELD]), mean_over_seeds(yielded[DROP])
-    slip = mean_over_seeds(part.loc[part[YIELD].isna(), AT_PEAK])
+    strain, loss = _by_trial(yielded, YIELD), _by_trial(yielded, DROP)
+    slip = _by_trial(part[part[YIELD].isna()], AT_PEAK)
     verdict: Verdict = "no data" if part.empty else "not found"
     if strain.count > 1:
-        off = mean_over_seeds(yielded[YIELD] - expected)
+        off = _by_trial(yielded.assign(**{YIELD: yielded[YIELD] - expected}), YIELD)
         verdict = all_of([judge(off, threshold=-NEAR), judge(negative(off), threshold=-NEAR)])
     return Finding(
         paper=f"A yield drop near a strain of {expected:g}, n = {count}",
-        ours=f"{strain.count} of {len(part)} trials have one, at {told(strain, 3)}, of {told(loss, 2)} of the force; "
+        ours=f"{len(yielded)} of {len(part)} runs have one, at {told(strain, 3)}, of {told(loss, 2)} of the force; "
         f"the others part at their first maximum, at {told(slip, 3)}",
         verdict=verdict,
         criterion=f"mean strain of the yield drop within {NEAR:g} of it; not found without drops",
@@ -98,10 +100,13 @@ def _yields(base: pd.DataFrame, count: int) -> Finding:
 
 
 def _widens(base: pd.DataFrame) -> Finding:
-    means = {count: mean_over_seeds(base.loc[base[COUNT] == count, WIDENING]) for count in COUNTS}
+    means = {count: _by_trial(base[base[COUNT] == count], WIDENING) for count in COUNTS}
+    slips = [told(_by_trial(base[base[COUNT] == count], SLIP_WIDENING), 3) for count in COUNTS]
     return Finding(
         paper="The chain widens while strained (auxetic)",
-        ours="widening before the fracture " + "; ".join(f"n = {n}: {told(mean, 3)}" for n, mean in means.items()),
+        ours="widening before the fracture "
+        + "; ".join(f"n = {n}: {told(mean, 3)}" for n, mean in means.items())
+        + f"; up to the first maximum of the force only {' and '.join(slips)}, the rest when barbs slip",
         verdict=all_of([judge(mean) for mean in means.values()]),
         criterion="largest width before the fracture over that at the start > 1, for n = 2 and 6",
     )
@@ -139,31 +144,22 @@ def _more(base: pd.DataFrame) -> Finding:
 
 
 def sensitivity(runs: pd.DataFrame) -> pd.DataFrame:
-    """What each variant changes against `COMPARED`: one row per variant and quantity, in per cent with its error.
+    """What each variant changes against the baseline with the same chain and walls, trial by trial.
 
     Args:
         runs: See `chain_runs.chain_row`.
 
     Returns:
-        The table; empty without runs of `COMPARED`. The baseline is in it at the point of `COMPARED`, so that its row
-        tells what the speed matters.
+        One row per variant and quantity; changes are in per cent of the baseline's trial with the same servos.
     """
-    reference = runs[runs[VARIANT] == COMPARED]
-    columns = [VARIANT, "quantity", "value", "change [%]", "change 95 % [%]", "trials [-]"]
-    if reference.empty:
-        return pd.DataFrame(columns=columns)
-    first = reference.iloc[0]
-    alike = runs[(runs[COUNT] == first[COUNT]) & (runs[CONFINEMENT] == first[CONFINEMENT])]
     rows: list[Sequence[object]] = []
-    for (variant, _), group in alike.groupby([VARIANT, SPEED], sort=False):
+    keys = [COUNT, CONFINEMENT, SEED]
+    base = runs[runs[VARIANT] == BASELINE].set_index(keys)
+    for variant, group in runs[runs[VARIANT] != BASELINE].groupby(VARIANT, sort=False):
         for quantity in (PEAK, FRACTURE, AT_PEAK, STIFFNESS):
-            mean = mean_over_seeds(group[quantity])
-            change = _paired(group, reference, quantity)
-            rows.append([variant, quantity, mean.value, change.value, change.half_width, change.count])
+            own = group.set_index(keys)[quantity]
+            change = mean_over_seeds((100 * (own / base[quantity] - 1)).dropna().tolist())
+            value = mean_over_seeds(own.tolist()).value
+            rows.append([variant, quantity, value, change.value, change.half_width, change.count])
+    columns = [VARIANT, "quantity", "value", "change [%]", "change 95 % [%]", "trials [-]"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def _paired(group: pd.DataFrame, reference: pd.DataFrame, quantity: str) -> SeedMean:
-    """Mean change in per cent over the seeds that both have: the same servos."""
-    both = group.set_index(SEED)[quantity] / reference.set_index(SEED)[quantity] - 1
-    return mean_over_seeds((100 * both).dropna().tolist())

@@ -31,18 +31,20 @@ VARIANT, COUNT, CONFINEMENT, SPEED = "variant", "smarticles [-]", "h/H [-]", "sp
 PEAK, AT_PEAK, FRACTURE = "peak force [N]", "strain at the peak [-]", "strain at fracture [-]"
 STIFFNESS, BEND = "stiffness at the start [N]", "second over first slope [-]"
 YIELD, DROP, WIDENING = "strain at the yield drop [-]", "force lost at the yield drop [-]", "widening [-]"
+SLIP_WIDENING = "widening at the first maximum [-]"
 WALL, IMBALANCE = "greatest force on a wall [N]", "imbalance of the strings [N]"
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         PEAK: "largest force of the pulled string, means over 1 ms",
         AT_PEAK: "strain where it is reached",
         FRACTURE: "largest strain while the force is a fifth of the peak or more",
-        STIFFNESS: "slope of force against strain, from 10 % to 60 % of the force at the first maximum",
+        STIFFNESS: "slope of force against strain, from 20 % to 80 % of the force at the first maximum",
         BEND: "the same for the upper half of these forces over that for the lower half: 1 for a straight line",
         YIELD: "strain at the first maximum that is followed by a loss of a tenth of the force or more, and by more "
         "strain of 0.05 at least before the fracture; empty without any",
         DROP: "share of the force that is lost there",
         WIDENING: "largest width of the chain before the fracture over the width at the start, less 1",
+        SLIP_WIDENING: "the same at the first maximum of the force",
         WALL: "largest force on either wall across the channel before the fracture, means over 0.1 s",
         IMBALANCE: "root mean square difference of the two strings' forces along x before the fracture",
     }
@@ -53,6 +55,8 @@ CARRIES = 0.2  # of the peak force, below which a chain no longer holds
 LOSS = 0.1  # of the force; a smaller one is no yield drop
 GOES_ON = 0.05  # strain between a yield drop and the fracture at least
 _WINDOW = 0.1  # s, over which the force on walls is averaged
+_QUIET = 0.05  # s, over which forces are averaged where maxima and slopes are looked for
+_TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,11 +140,12 @@ def measured(pull: Pull) -> dict[str, float]:
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
-    top, loss = first_drop(strains, forces)
+    interval = float(np.median(np.diff(pull.times)))
+    quiet = _mean_over(forces, _QUIET / interval)
+    top, loss = first_drop(quiet)
     yielded = strains.max() - strains[top] > GOES_ON and loss >= LOSS
-    stiffness, bend = _slopes(strains[: top + 1], forces[: top + 1])
-    samples = max(1, round(_WINDOW / float(np.median(np.diff(pull.times)))))
-    smooth = np.convolve(pull.walls[:end], np.full(samples, 1 / samples), mode="same")
+    stiffness, bend = _slopes(strains[: top + 1], quiet[: top + 1])
+    walls = _mean_over(pull.walls[:end], _WINDOW / interval)
     return {
         PEAK: float(forces[peak]),
         AT_PEAK: float(strains[peak]),
@@ -150,23 +155,30 @@ def measured(pull: Pull) -> dict[str, float]:
         YIELD: float(strains[top]) if yielded else math.nan,
         DROP: loss if yielded else math.nan,
         WIDENING: float(pull.widths[:end].max() / pull.widths[0] - 1),
-        WALL: float(smooth.max()),
+        SLIP_WIDENING: float(pull.widths[top] / pull.widths[0] - 1),
+        WALL: float(walls.max()),
         IMBALANCE: float(np.sqrt(np.mean((forces - pull.held[:end]) ** 2))),
     }
 
 
-def first_drop(strains: Array, forces: Array) -> tuple[int, float]:
-    """The first maximum after which a tenth of the force is lost, or the end.
+def _mean_over(values: Array, samples: float) -> Array:
+    """Moving mean over a number of samples, over fewer at the ends."""
+    window = np.ones(max(1, round(samples)))
+    means: Array = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
+    return means
+
+
+def first_drop(forces: Array) -> tuple[int, float]:
+    """The first maximum after which a tenth of the force is lost, or the greatest one.
 
     Args:
-        strains: (n,) [-].
-        forces: (n,) [N]; slack and noise below a tenth of the peak are left out.
+        forces: (n,) [N]; what is lost below three tenths of the peak does not count.
 
     Returns:
         Its index, and the share of the force that is lost before the maximum is passed again [-].
     """
     highest = np.maximum.accumulate(forces)
-    lost = np.flatnonzero((forces < (1 - LOSS) * highest) & (highest > LOSS * forces.max()))
+    lost = np.flatnonzero((forces < (1 - LOSS) * highest) & (highest > _TAUT * forces.max()))
     if not len(lost):
         return int(np.argmax(forces)), 0.0
     top = int(np.argmax(forces[: lost[0]]))
@@ -178,7 +190,7 @@ def first_drop(strains: Array, forces: Array) -> tuple[int, float]:
 def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
     """Slope of force against strain [N], and that of the upper half of the forces over that of the lower [-]."""
     top = forces[-1]
-    ranges = ((0.1, 0.6), (0.1, 0.35), (0.35, 0.6))
+    ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
     slopes = []
     for low, high in ranges:
         inside = (forces > low * top) & (forces < high * top)
