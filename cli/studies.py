@@ -182,4 +182,12 @@ free-standing columns of U-shapes on a vibrating floor at Γ = 2 to 4: collapse 
 τ = (1/f) exp(Δ/Γ) against l/w, compared with Gravish et al. (PRL 108, 208001). 72 runs, seed by seed;
 columns that stand to the end give bounds. --quick takes minutes: lower and narrower columns.""",
     ),
+    "chain": Study(
+        analyse=partial(_analyse_reported, module="postprocess.chain"),
+        pictured={"variant": "baseline", "count": 2, "h_over_H": 0.8},
+        about="""\
+strain test of a chain of two or six robots between two walls, against the findings of Savoie et al. (Soft Matter
+2023): force, yield, width, fracture against confinement; and what friction, servos and strings, which the paper
+does not tell, matter. 90 runs, seed by seed. --quick takes minutes.""",
+    ),
 }

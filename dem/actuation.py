@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeGuard
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,11 +190,23 @@ class InternalOscillation(Part):
         return "theta_deg"
 
 
-Actuated = Actuate | ShapeChange | InternalOscillation
+@runtime_checkable
+class Actuated(Protocol):
+    """A phase in which motors move the barbs or hold them."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the phase [s]."""
+
+    def spelled_out(self, smarticle: Smarticle, motor: Motor) -> Actuate:
+        """The phase as the motion that it is short for."""
+
+    def own_key(self, key: str) -> str:
+        """The key of this phase that sets `key` of the spelled-out one."""
 
 
 def actuated(phase: object) -> TypeGuard[Actuated]:
-    """Whether the barbs move in a phase of a scene."""
+    """Whether motors are at work in a phase of a scene."""
     return isinstance(phase, Actuated)
 
 

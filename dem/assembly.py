@@ -33,12 +33,24 @@ class Assembly:
         yade: the simulation.
         particle: one smarticle.
         hinge_law: stiffness of the hinges; None where none will be needed.
+        planar: whether all motion is confined to the plane z = 0.
+        strengths: (N, 2) factors on what the motors can do [1]; None where all are alike.
     """
 
-    def __init__(self, yade: Yade, particle: Particle, hinge_law: HingeLaw | None) -> None:
+    def __init__(
+        self,
+        yade: Yade,
+        particle: Particle,
+        hinge_law: HingeLaw | None,
+        *,
+        planar: bool = False,
+        strengths: Array | None = None,
+    ) -> None:
         self._yade = yade
         self._particle = particle
         self._hinge_law = hinge_law
+        self._planar = planar
+        self._strengths = strengths
         self.hinges: Hinges | None = None
         """The hinges; None while welded."""
         self._spheres: list[list[int]] = []
@@ -92,6 +104,7 @@ class Assembly:
                     rotation=rotation.as_matrix(),
                     velocity=still,
                     angular_momentum=still,
+                    planar=self._planar,
                 )
             )
         new = len(poses.positions)
@@ -165,10 +178,11 @@ class Assembly:
                         rotation=rotation,
                         velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
                         angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
+                        planar=self._planar,
                     )
                 )
         self.hinges = Hinges(self._yade, self._hinge_law, nodes, state.angles)
-        self.hinges.make()
+        self.hinges.make(self._strengths)
 
     def weld(self) -> float:
         """Make every smarticle one rigid body of the shape that it has; nothing while welded already.
@@ -184,8 +198,11 @@ class Assembly:
         relative = state.link_velocities - state.velocities[:, None]
         own = self._angular_momenta().reshape(-1, LINKS, 3)
         momenta = (own + np.cross(arms, masses * relative)).sum(axis=1)
-        moments, axes = np.linalg.eigh(tensors)
-        axes[..., 0] *= np.linalg.det(axes)[:, None]
+        if self._planar:
+            moments, axes = tensors[:, [0, 1, 2], [0, 1, 2]], np.tile(np.eye(3), (state.count, 1, 1))
+        else:
+            moments, axes = np.linalg.eigh(tensors)
+            axes[..., 0] *= np.linalg.det(axes)[:, None]
         before = state.kinetic_energy
         spheres = state.spheres(self._particle) - state.positions[:, None]
         self.hinges.remove()
@@ -202,11 +219,24 @@ class Assembly:
                     rotation=axes[k],
                     velocity=state.velocities[k],
                     angular_momentum=momenta[k],
+                    planar=self._planar,
                 )
             )
         self._arms = np.einsum("nji,nkj->nki", axes, arms)
         self._turns = np.einsum("nji,nkjm->nkim", axes, state.link_rotations)
         return before - self.state().kinetic_energy
+
+    def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
+        """A point of a link while articulated: id of the body, and the point in the body's own frame (3,) [m].
+
+        Args:
+            smarticle: its number.
+            link: 0 barb 1, 1 middle link, 2 barb 2.
+            point: (3,) in the frame of the link [m].
+        """
+        number = LINKS * smarticle + link
+        arm = self._to_body[number] * self._yade.vector(*point)
+        return self._ids[number], np.array([arm[0], arm[1], arm[2]])
 
     def _clump(self, body: Body) -> None:
         number, to_body = clump(self._yade, body)
@@ -221,6 +251,9 @@ class Assembly:
 
     def _angular_momenta(self) -> Array:
         """(bodies, 3) about their own centres of mass, laboratory frame [kg m²/s]."""
+        if self._planar:
+            # YADE keeps no angular momentum of what it turns like a sphere.
+            return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
         return np.array([[m[0], m[1], m[2]] for m in (state.angMom for state in self._states)]).reshape(-1, 3)
 
     # -- memory ------------------------------------------------------------------------------------------------

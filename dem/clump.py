@@ -28,6 +28,7 @@ class Body:
         rotation: (3, 3) principal frame to laboratory frame.
         velocity: (3,) of the centre of mass [m/s].
         angular_momentum: (3,) about the centre of mass [kg m²/s].
+        planar: whether it only moves along x and y and turns about z, which is then its third principal axis.
     """
 
     members: Sequence[int]
@@ -38,6 +39,7 @@ class Body:
     rotation: Array
     velocity: Array
     angular_momentum: Array
+    planar: bool = False
 
 
 def clump(yade: Yade, body: Body) -> tuple[int, Any]:
@@ -59,7 +61,10 @@ def clump(yade: Yade, body: Body) -> tuple[int, Any]:
     ballast.shape = classes.Box()
     ballast.material = omega.bodies[body.members[0]].material
     ballast.state.mass = body.mass
-    ballast.state.inertia = vector(*body.inertia)
+    # Where it turns about the third axis alone, the other moments do not matter. All alike, the axes keep their order,
+    # and YADE's integration of spheres, which it falls back to where a rotation is blocked, is right.
+    inertia = np.full(3, body.inertia[2]) if body.planar else body.inertia
+    ballast.state.inertia = vector(*inertia)
     ballast_id = omega.bodies.append(ballast)
     clump_id = omega.bodies.clump([*body.members, ballast_id], discretization=0)
     omega.bodies.erase(ballast_id)
@@ -68,12 +73,14 @@ def clump(yade: Yade, body: Body) -> tuple[int, Any]:
     principal = state.ori
     x, y, z, w = Rotation.from_matrix(body.rotation).as_quat()
     turned = yade.quaternion(w, x, y, z)
-    spin = body.rotation @ ((body.rotation.T @ body.angular_momentum) / body.inertia)
+    spin = body.rotation @ ((body.rotation.T @ body.angular_momentum) / inertia)
     state.ori = turned * principal
     state.pos = vector(*body.position)
     state.vel = vector(*body.velocity)
     state.angVel = vector(*spin)
     state.angMom = vector(*body.angular_momentum)
+    if body.planar:
+        state.blockedDOFs = "zXY"
     arms = body.local @ body.rotation.T
     for member, arm in zip(body.members, arms, strict=True):
         own = omega.bodies[member].state

@@ -59,3 +59,13 @@ HOOK_COLUMNS: dict[str, tuple[str, str]] = {
 RELEASE_COLUMNS: dict[str, tuple[str, str]] = {
     "outside_count": ("1", "smarticles whose centre of mass is farther from the axis than the container's radius"),
 }
+# Only in scenes that strain a chain. Forces are means since the sample before, and NaN while no string is tied.
+STRAIN_COLUMNS: dict[str, tuple[str, str]] = {
+    "string_fixed_force_N": ("N", "force of the string that is held on the chain (x, y, z)"),
+    "string_pulled_force_N": ("N", "force of the string that is pulled on the chain (x, y, z)"),
+    "channel_lower_force_N": ("N", "force of the chain on the wall at lower y (x, y, z); 0 without walls"),
+    "channel_upper_force_N": ("N", "force of the chain on the wall at higher y (x, y, z); 0 without walls"),
+    "pulled_m": ("m", "how far the moved end of the string has gone"),
+    "chain_length_m": ("m", "distance along x of the two points where strings are tied"),
+    "chain_width_m": ("m", "extent of all links along y, with their thickness"),
+}

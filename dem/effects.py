@@ -13,6 +13,7 @@ from itertools import chain
 from dem.actuation import actuated
 from dem.actuation_checks import overshoot
 from dem.assembly import SMARTICLE_MATERIAL
+from dem.chain import Strain, chain_of
 from dem.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
@@ -20,6 +21,7 @@ from dem.columns import (
     LEDGER_COLUMNS,
     MOTOR_COLUMNS,
     RELEASE_COLUMNS,
+    STRAIN_COLUMNS,
 )
 from dem.container import WALL_MATERIAL
 from dem.hinges import HINGE_MATERIAL
@@ -120,6 +122,31 @@ def decide(scene: Scene) -> tuple[Decision, ...]:
 
 
 # -- whether a scene calls for it, and why -------------------------------------------------------------------------
+
+
+def _container(scene: Scene) -> tuple[bool, str]:
+    if scene.plane is not None:
+        return False, "key plane: a table, and walls if it says so"
+    return True, f"a wall {1e3 * scene.cylinder.height:.0f} mm high"
+
+
+def _plane(scene: Scene) -> tuple[bool, str]:
+    if scene.plane is None:
+        return False, "no key plane"
+    width, walls = scene.plane.width_m, "no walls"
+    if width is not None:
+        walls = f"two walls {1e3 * width:.3g} mm apart, h/H = {chain_of(scene).width / width:.3g}"
+    return True, f"smarticles move along x and y and turn about z; {walls}; the table carries them and does not rub"
+
+
+def _strings(scene: Scene) -> tuple[bool, str]:
+    pulls = [
+        f"phase {k} pulls at {1e3 * phase.speed_m_per_s:.3g} mm/s, tied at the {phase.tied_at}, "
+        f"{phase.string_stiffness_N_per_m:g} N/m each"
+        for k, phase in enumerate(scene.phases)
+        if isinstance(phase, Strain)
+    ]
+    return bool(pulls), ", ".join(pulls) or "no phase of type strain"
 
 
 def _gravity(scene: Scene) -> tuple[bool, str]:
@@ -238,22 +265,35 @@ def _every(interval: float | None, key: str, what: str) -> tuple[bool, str]:
 
 CONTACT = Effect(
     name="contact",
-    rule=lambda _: (True, "every scene has smarticles in a container"),
+    rule=lambda _: (True, "every scene has smarticles that touch each other and a floor"),
     adds=Adds(
         engines=("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator"),
         functors=(
             "Bo1_Sphere_Aabb",
-            "Bo1_Facet_Aabb",
             "Bo1_Wall_Aabb",
             "Ig2_Sphere_Sphere_ScGeom",
-            "Ig2_Facet_Sphere_ScGeom",
             "Ig2_Wall_Sphere_ScGeom",
             "Ip2_ViscElMat_ViscElMat_ViscElPhys",
             "Law2_ScGeom_ViscElPhys_Basic",
         ),
         materials=(SMARTICLE_MATERIAL, WALL_MATERIAL),
-        shapes=("Facet", "Wall", "Sphere", "Clump"),
+        shapes=("Wall", "Sphere", "Clump"),
     ),
+)
+CONTAINER = Effect(
+    name="container",
+    rule=_container,
+    adds=Adds(functors=("Bo1_Facet_Aabb", "Ig2_Facet_Sphere_ScGeom"), shapes=("Facet",)),
+)
+PLANE = Effect(
+    name="plane",
+    rule=_plane,
+    adds=Adds(python="three degrees of freedom blocked for each body; sums the forces on two walls in every step"),
+)
+STRINGS = Effect(
+    name="strings",
+    rule=_strings,
+    adds=Adds(series=tuple(STRAIN_COLUMNS), python="two forces in every step"),
 )
 # Numbers of the integrator and of the one contact law that YADE has for springs with dashpots: there is none without
 # friction or without dashpots, so that a scene that sets them to zero has the same sums with a zero in them.
@@ -350,6 +390,9 @@ CHECKPOINTS = Effect(
 
 EFFECTS = (
     CONTACT,
+    CONTAINER,
+    PLANE,
+    STRINGS,
     GRAVITY,
     FRICTION,
     RESTITUTION,

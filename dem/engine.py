@@ -7,7 +7,7 @@ process-wide singleton.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dem import effects
 from dem.account import Account
 from dem.assembly import Assembly
+from dem.chain import Tie
 from dem.construction import add_engines, add_materials
 from dem.container import Cylinder
 from dem.errors import RunError
@@ -27,8 +28,10 @@ from dem.library import load_yade
 from dem.motor import MotorLaw, Motors
 from dem.particle import Particle
 from dem.placement import Poses
+from dem.plane import Channel
 from dem.state import State
 from dem.strain import Strain, measure_strain
+from dem.strings import End, StringLaw, Strings
 from dem.timestep import ContactLaw
 
 Array = NDArray[np.float64]
@@ -49,6 +52,8 @@ class Engine:
         track_work: whether to add up the work of the moving container.
         dissipation_steps: every how many steps to sample what is dissipated; 0: never.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
+        channel: table and walls instead of the container; all motion is then confined to a plane.
+        strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
 
     Raises:
         RunError: YADE is not installed.
@@ -67,6 +72,8 @@ class Engine:
         track_work: bool = False,
         dissipation_steps: int = 0,
         hooks: tuple[Cross, Cross] | None = None,
+        channel: Channel | None = None,
+        strengths: Array | None = None,
     ) -> None:
         self._yade = load_yade()
         self._omega = self._yade.omega
@@ -81,20 +88,26 @@ class Engine:
         self._motor_law: MotorLaw | None = None
         if hinges is not None:
             hinge_law, self._motor_law = hinges
-        self._assembly = Assembly(self._yade, particle, hinge_law)
+        self._strengths = strengths
+        self._assembly = Assembly(
+            self._yade, particle, hinge_law, planar=channel is not None, strengths=self._strengths
+        )
         self._smarticle_seconds = 0.0
         # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
         self._loaded: tuple[int, float] | None = None
         called_for = {
             effects.CONTACT: True,
+            effects.CONTAINER: channel is None,
             effects.CONTAINER_MOTION: shaken,
             effects.ARTICULATION: hinges is not None,
             effects.HOOKS: hooks is not None,
         }
         adds = effects.Adds.together(effect.adds for effect, on in called_for.items() if on)
         add_materials(self._yade, adds, law)
-        self.fixtures = Fixtures(self._yade, cylinder, hooks)
-        """The container and the hooks."""
+        self.fixtures = Fixtures(self._yade, cylinder, hooks, channel)
+        """The container and the hooks, or the channel."""
+        self.strings: Strings | None = None
+        """Strings tied to smarticles at present."""
         self.account = Account(
             self._yade,
             self._assembly,
@@ -135,6 +148,7 @@ class Engine:
             "motors": None if self.motors is None else self.motors.memory,
             "smarticle_seconds": self._smarticle_seconds,
             "fixtures": self.fixtures.memory,
+            "strings": None if self.strings is None else self.strings.memory,
             "account": self.account.memory,
             "unbalanced": self.unbalanced_force(),
         }
@@ -150,10 +164,12 @@ class Engine:
         self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
         self.fixtures.restore(memory["fixtures"])
+        if memory["strings"] is not None:
+            self.strings = Strings.restored(self._yade, memory["strings"])
         self.account.restore(memory["account"])
         if memory["motors"] is not None:
             assert self._motor_law is not None  # a checkpoint belongs to its scene
-            self.motors = Motors(self._motor_law, np.zeros((self.count, 2)))
+            self.motors = Motors(self._motor_law, np.zeros((self.count, 2)), self._strengths)
             self.motors.restore(memory["motors"])
         self._bind()
         self._loaded = (self.steps, memory["unbalanced"])
@@ -183,12 +199,14 @@ class Engine:
         """
         if steps <= 0:
             return
-        step, target, hooked = self._omega.step, self.steps + steps, bool(self.fixtures.hooks)
+        step, target, felt = self._omega.step, self.steps + steps, bool(self.fixtures.felt)
         # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
+            if self.strings is not None:
+                self.strings.pull(self.time_step)
             self.account.step(number, step)
-            if hooked:
+            if felt:
                 self.fixtures.feel()
         if self._assembly.hinges is not None:
             self._assembly.hinges.moved()
@@ -249,7 +267,7 @@ class Engine:
         self._collider.doSort = True
         angles = self._hinges.angles()
         if self.motors is None:
-            self.motors = Motors(self._motor_law, angles)
+            self.motors = Motors(self._motor_law, angles, self._strengths)
         else:
             self.motors.engage(angles)
 
@@ -265,8 +283,34 @@ class Engine:
             interval: length of the period [s].
         """
         assert self.motors is not None  # only articulated smarticles are actuated
-        torques = self.motors.look(self._hinges.angles(), targets, interval, self.time_step)
+        rates = self._hinges.rates() if self.motors.law.damping else None
+        torques = self.motors.look(self._hinges.angles(), targets, interval, self.time_step, rates)
         self._hinges.set_torques(torques, self.time_step)
+
+    def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
+        """Tie a string to each of some points of articulated smarticles, taut, its other end outwards on the x-axis.
+
+        Args:
+            ties: the points.
+            law: what the strings have in common.
+            speeds: of their other ends, away from the origin [m/s].
+        """
+        state, ends = self.state(), []
+        for tie, speed in zip(ties, speeds, strict=True):
+            point = np.array([tie.along, 0.0, 0.0])
+            body, arm = self._assembly.anchor(tie.smarticle, tie.link, point)
+            place = state.link_positions[tie.smarticle, tie.link]
+            place = place + state.link_rotations[tie.smarticle, tie.link] @ point
+            away = math.copysign(1.0, place[0])
+            anchor = np.array([place[0] + away * math.sqrt(law.length**2 - place[1] ** 2), 0.0, 0.0])
+            ends.append(End(body=body, arm=arm.tolist(), anchor=anchor.tolist(), speed=away * speed))
+        self.strings = Strings(self._yade, law, ends)
+
+    def untie(self) -> None:
+        """Let go of all strings."""
+        if self.strings is not None:
+            self.strings.release()
+            self.strings = None
 
     @property
     def _hinges(self) -> Hinges:

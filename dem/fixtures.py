@@ -1,4 +1,4 @@
-"""What does not give way to smarticles: the container's floor and wall, and the hooks."""
+"""What does not give way to smarticles: the container's floor and wall, the hooks, or the walls of a channel."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dem.container import WALL_MATERIAL, Cylinder, add_container
 from dem.hooks import Cross
 from dem.library import Yade
+from dem.plane import Channel, add_channel
 
 Array = NDArray[np.float64]
 
@@ -23,19 +24,27 @@ class Fixtures:
         yade: the simulation.
         cylinder: the container; its floor is at z = 0 at the start.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
+        channel: table and walls instead of the container, for motion in a plane.
     """
 
-    def __init__(self, yade: Yade, cylinder: Cylinder, hooks: tuple[Cross, Cross] | None) -> None:
+    def __init__(
+        self, yade: Yade, cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None = None
+    ) -> None:
         self._yade = yade
         self._top = cylinder.height
-        self.container = add_container(yade, cylinder)
+        self._planar = channel is not None
+        self.container = add_container(yade, cylinder) if channel is None else add_channel(yade, channel)
         """Ids of the container's bodies that are there, the floor last."""
         self.hooks: tuple[tuple[int, int], ...] = tuple(_add_cross(yade, cross) for cross in hooks or ())
         """Ids of the bars of the lower and the upper hook; empty in scenes without."""
         self._upper_start = hooks[1].height if hooks else 0.0
+        # Bodies whose forces are added up step by step, together for each hook or wall of a channel.
+        self.felt: tuple[tuple[int, ...], ...] = self.hooks
+        if self._planar:
+            self.felt = tuple((wall,) for wall in self.container[:-1])
         self.moving: list[int] = []
         """Ids of the bodies that move at present, all at one velocity."""
-        self._sums = [yade.vector(0, 0, 0) for _ in self.hooks]
+        self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
 
     def bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
@@ -48,12 +57,12 @@ class Fixtures:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the loaded simulation."""
-        return {"moving": self.moving, "hook_sums": self.hook_sums.tolist()}
+        return {"moving": self.moving, "sums": self._totals.tolist()}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken."""
         self.moving = list(memory["moving"])
-        self._sums = [self._yade.vector(*row) for row in memory["hook_sums"]]
+        self._sums = [self._yade.vector(*row) for row in memory["sums"]]
 
     @property
     def bodies(self) -> list[int]:
@@ -117,10 +126,13 @@ class Fixtures:
         self._move(self.hooks[1], speed)
 
     def feel(self) -> None:
-        """Take note of the forces on the hooks in the step that was just made."""
+        """Take note of the forces on hooks or walls of a channel in the step that was just made."""
         force = self._yade.omega.forces.f
-        for k, (one, other) in enumerate(self.hooks):
-            self._sums[k] += force(one) + force(other)
+        for k, (first, *others) in enumerate(self.felt):
+            total = force(first)
+            for body in others:
+                total = total + force(body)
+            self._sums[k] += total
 
     @property
     def hook_sums(self) -> Array:
@@ -128,6 +140,15 @@ class Fixtures:
 
         A difference of two over the steps between them is a mean that misses no impact.
         """
+        return self._totals[: len(self.hooks)]
+
+    @property
+    def channel_sums(self) -> Array:
+        """(2, 3) the same for the lower and the upper wall of a channel; (0, 3) without walls."""
+        return self._totals[len(self.hooks) :]
+
+    @property
+    def _totals(self) -> Array:
         return np.array([[s[0], s[1], s[2]] for s in self._sums]).reshape(-1, 3)
 
     # -- what smarticles may do --------------------------------------------------------------------------------
@@ -135,13 +156,14 @@ class Fixtures:
     @property
     def enclosed(self) -> bool:
         """Whether nothing can leave the container: the wall is there, and begins below the floor."""
-        return self.walled and self.wall_bottom < float(self.floor.pos[2])
+        return not self._planar and self.walled and self.wall_bottom < float(self.floor.pos[2])
 
     @property
     def raised(self) -> float | None:
         """How far the pile may have been raised by a hook [m]; None where nothing holds it back any more.
 
-        That is when the wall is gone or lifted, or a hook was pulled out over it.
+        That is when the wall is gone or lifted, or a hook was pulled out over it; or in a plane, where walls hold but
+        the container's limits do not apply.
         """
         if not self.enclosed:
             return None

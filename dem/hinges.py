@@ -44,12 +44,16 @@ class HingeLaw:
         tilt_stiffness: against their leaving the common plane [N m/rad].
         shaft_stiffness: twist stiffness of the motor's shaft [N m/rad].
         torque_cap: torque at which a shaft slips [N m]; None: never.
+        shaft_damping: what the motors add to the shafts' stiffness [N m s/rad]; for the stable time step only.
+        damper_time: the dampers' time of relaxation where they are stiff [s]; at least a time step.
     """
 
     pin_stiffness: float
     tilt_stiffness: float
     shaft_stiffness: float
     torque_cap: float | None
+    shaft_damping: float = 0.0
+    damper_time: float = DAMPER_TIME
 
     @property
     def damper_stiffness(self) -> float:
@@ -59,7 +63,7 @@ class HingeLaw:
     @property
     def damper_viscosity(self) -> float:
         """Of the damper's dashpot [N s/m]."""
-        return max(DAMPER_VISCOSITY, self.damper_stiffness * DAMPER_TIME)
+        return max(DAMPER_VISCOSITY, self.damper_stiffness * self.damper_time)
 
 
 def hinge_nodes(boxes: Boxes, link: int) -> Array:
@@ -108,11 +112,16 @@ class Hinges:
         self._loaded: tuple[Array, Array] | None = None
         self._looks = 0
 
-    def make(self) -> None:
-        """Make the bonds, between links that are where they belong."""
-        for barb_centre, barb_end, middle_centre in self._hinges():
+    def make(self, strengths: Array | None = None) -> None:
+        """Make the bonds, between links that are where they belong.
+
+        Args:
+            strengths: (N, 2) factors on stiffness and cap of the shafts [1]; None: all are alike.
+        """
+        factors = np.ones_like(self._angles) if strengths is None else strengths
+        for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
-            self._shaft(barb_end, middle_centre)
+            self._shaft(barb_end, middle_centre, float(factor))
         self.bind()
 
     def bind(self) -> None:
@@ -148,17 +157,17 @@ class Hinges:
         phys.unp = 2 * NODE_RADIUS
         return bond
 
-    def _shaft(self, end: int, centre: int) -> None:
+    def _shaft(self, end: int, centre: int, strength: float) -> None:
         law = self._law
         bond = self._bond(end, centre, SHAFT_STIFFNESS)
         phys = bond.phys
         phys.unp = bond.geom.penetrationDepth
-        phys.momentRotationLaw, phys.ktw, phys.kr = True, law.shaft_stiffness, law.tilt_stiffness
+        phys.momentRotationLaw, phys.ktw, phys.kr = True, strength * law.shaft_stiffness, law.tilt_stiffness
         phys.ks, phys.shearAdhesion = law.damper_stiffness, 1e9
         if law.torque_cap is not None:
             # YADE states the cap as a multiple of the normal force; a small one is kept constant for it.
             phys.unp -= SHAFT_FORCE / SHAFT_STIFFNESS
-            phys.maxTwistPl = law.torque_cap / SHAFT_FORCE
+            phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
 
     def moved(self) -> None:
         """A step has been made: YADE knows the bonds' shape again."""
@@ -175,6 +184,13 @@ class Hinges:
     def angles(self) -> Array:
         """(N, 2) angles of the barbs [rad], from the twist of the shafts."""
         result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
+        return result
+
+    def rates(self) -> Array:
+        """(N, 2) how fast the barbs turn against their middle links [rad/s], half a step behind the angles."""
+        up = self._yade.vector(0, 0, 1)
+        turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
+        result: Array = -SENSE * np.array(turning).reshape(-1, 2)
         return result
 
     def set_torques(self, torques: Array, time_step: float) -> None:

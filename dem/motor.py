@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-Law = Literal["halt", "stall", "slip"]
+Law = Literal["halt", "stall", "slip", "servo"]
 _MEMORY = ("commands", "angles", "torques", "work", "begun", "halted")
 
 
@@ -25,13 +25,16 @@ class MotorLaw:
         stiffness: twist stiffness of the shaft between motor and barb [N m/rad].
         law: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever
             torque it takes; "stall": it does not move at all until its torque has fallen, the paper's rule to the
-            letter; "slip": a servo that gives way at τ_max.
+            letter; "slip": a spring that gives way at τ_max; "servo": the same with a damper beside the spring, the
+            torque as a whole limited.
+        damping: a servo's derivative gain [N m s/rad].
     """
 
     torque_limit: float
     speed_limit: float
     stiffness: float
     law: Law
+    damping: float = 0.0
 
 
 class Motors:
@@ -45,10 +48,14 @@ class Motors:
     Args:
         law: what all motors have in common.
         angles: (N, 2) angles at the start [rad].
+        strengths: (N, 2) factors on torque limit and stiffness [1]; None: all are alike.
     """
 
-    def __init__(self, law: MotorLaw, angles: Array) -> None:
+    def __init__(self, law: MotorLaw, angles: Array, strengths: Array | None = None) -> None:
         self.law = law
+        factor = 1.0 if strengths is None else strengths
+        self._stiffness = law.stiffness * factor
+        self._limit = law.torque_limit * factor
         self.commands: Array = angles.copy()
         """(N, 2) angles that the motors hold at present [rad]."""
         self.angles: Array = angles.copy()
@@ -60,14 +67,17 @@ class Motors:
         self.halted: NDArray[np.bool_] = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last look and did not."""
         self._begun: Array = angles.copy()
+        self._rates: Array = np.zeros_like(angles)
 
     def engage(self, angles: Array) -> None:
         """Take hold of barbs at (N, 2) angles [rad], without torque."""
         self.commands, self.angles, self._begun = angles.copy(), angles.copy(), angles.copy()
-        self.torques = np.zeros_like(angles)
+        self.torques, self._rates = np.zeros_like(angles), np.zeros_like(angles)
         self.halted = np.zeros(angles.shape, dtype=bool)
 
-    def look(self, angles: Array, targets: Array, interval: float, time_step: float) -> Array:
+    def look(
+        self, angles: Array, targets: Array, interval: float, time_step: float, rates: Array | None = None
+    ) -> Array:
         """What the motors do in the control period that begins now.
 
         Args:
@@ -75,6 +85,7 @@ class Motors:
             targets: (N, 2) angles at the end of the period according to the schedule [rad].
             interval: length of the period [s].
             time_step: dt of the integration [s].
+            rates: (N, 2) how fast the angles change [rad/s], which servos damp; None: not told.
 
         Returns:
             (N, 2) torques on the barbs [N m].
@@ -87,20 +98,24 @@ class Motors:
         self._begun = middle
         most = self.law.speed_limit * interval
         advance = np.clip(targets - self.commands, -most, most)
-        self.halted = np.abs(before) >= self.law.torque_limit
+        self.halted = np.abs(before) >= self._limit
         if self.law.law == "halt":
             self.halted &= advance * before > 0
-        if self.law.law != "slip":
+        if self.law.law in ("halt", "stall"):
             advance = np.where(self.halted, 0.0, advance)
         self.commands = self.commands + advance
         self.angles = angles
+        if rates is not None:
+            self._rates = rates
         self.torques = self._torque(angles)
         return self.torques
 
     def _torque(self, angles: Array) -> Array:
-        torque = self.law.stiffness * (self.commands - angles)
-        if self.law.law == "slip":
-            torque = np.clip(torque, -self.law.torque_limit, self.law.torque_limit)
+        torque = self._stiffness * (self.commands - angles)
+        if self.law.law == "servo":
+            torque = torque - self.law.damping * self._rates
+        if self.law.law in ("slip", "servo"):
+            torque = np.clip(torque, -self._limit, self._limit)
         result: Array = torque
         return result
 
@@ -108,7 +123,8 @@ class Motors:
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs."""
         arrays = (self.commands, self.angles, self.torques, self.work, self._begun, self.halted)
-        return dict(zip(_MEMORY, (array.tolist() for array in arrays), strict=True))
+        memory = dict(zip(_MEMORY, (array.tolist() for array in arrays), strict=True))
+        return memory | ({"rates": self._rates.tolist()} if self.law.law == "servo" else {})
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken."""
@@ -117,3 +133,5 @@ class Motors:
             np.array(memory[name], dtype=np.float64).reshape(shape) for name in _MEMORY[:-1]
         )
         self.halted = np.array(memory["halted"], dtype=bool).reshape(shape)
+        if self.law.law == "servo":
+            self._rates = np.array(memory["rates"], dtype=np.float64).reshape(shape)

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from dem.actuation import Actuate, InternalOscillation, ShapeChange
+from dem.chain import Arrange, Strain
 from dem.hooks import PullHook
 from dem.part import Duration, Length, Part, in_hinge_range, refuse_wrong_unit
 from dem.particle import Boxes
@@ -184,14 +185,33 @@ class Motor(Part):
         "at the lever w",
     )
     speed_limit_rad_per_s: float = Field(6.0, gt=0, description="ω, greatest speed of a motor [rad/s]")
-    law: Literal["halt", "stall", "slip"] = Field(
+    law: Literal["halt", "stall", "slip", "servo"] = Field(
         "halt",
         description="at τ_max or above: halt: the motor stops advancing towards the load and holds; stall: it does not "
-        "move in either direction, the paper's rule to the letter; slip: it gives way, a servo capped at τ_max",
+        "move in either direction, the paper's rule to the letter; slip: it gives way, a spring capped at τ_max; "
+        "servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped at τ_max",
     )
     stiffness_N_m_per_rad: float = Field(
-        3e-3, gt=0, description="twist stiffness of the shaft between motor and barb [N m/rad]"
+        3e-3, gt=0, description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]"
     )
+    damping_N_m_s_per_rad: float = Field(0.0, ge=0, description="a servo's derivative gain [N m s/rad]")
+    strength_spread: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="τ_max and stiffness of each motor are multiplied by a factor of its own, drawn from the scene's "
+        "seed, uniform within 1 ± this [1]",
+    )
+
+    @model_validator(mode="after")
+    def _damps_as_a_servo(self) -> Self:
+        if self.damping_N_m_s_per_rad and self.law != "servo":
+            msg = (
+                f"damping_N_m_s_per_rad: {self.damping_N_m_s_per_rad:g} N m s/rad, but law is {self.law}, which has "
+                "none; use law: servo"
+            )
+            raise ValueError(msg)
+        return self
 
 
 class Fidelity(Part):
@@ -320,7 +340,16 @@ def shake_amplitude(phase: Shake, gravity: float) -> float:
 
 
 Phase = Annotated[
-    Deposit | Relax | Shake | Actuate | ShapeChange | InternalOscillation | RemoveContainer | PullHook,
+    Deposit
+    | Relax
+    | Shake
+    | Actuate
+    | ShapeChange
+    | InternalOscillation
+    | RemoveContainer
+    | PullHook
+    | Arrange
+    | Strain,
     Field(discriminator="type"),
 ]
 

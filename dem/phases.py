@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dem.actuation import Drive, drive
+from dem.chain import Arrange, Chain, Strain, chain_of, parted
 from dem.engine import Engine
 from dem.errors import RunError
 from dem.hooks import PullHook
@@ -19,6 +20,7 @@ from dem.parts import Deposit, Relax, Settle, Shake, shake_amplitude
 from dem.placement import place_layer
 from dem.release import RemoveContainer
 from dem.scene import Scene, derive_seed
+from dem.strings import StringLaw
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down or a pile has settled
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
@@ -56,7 +58,12 @@ def begin(scene: Scene, index: int) -> Stage:
         return Removing(phase)
     if isinstance(phase, PullHook):
         return Pulling(phase)
-    return Actuating(drive(scene, index), scene.fidelity.control_interval_s)
+    return Arranging(chain_of(scene)) if isinstance(phase, Arrange) else _at_motors(scene, index)
+
+
+def _at_motors(scene: Scene, index: int) -> Stage:
+    phase, motors = scene.phases[index], (drive(scene, index), scene.fidelity.control_interval_s)
+    return Straining(*motors, phase, chain_of(scene)) if isinstance(phase, Strain) else Actuating(*motors)
 
 
 class Resting:
@@ -178,6 +185,46 @@ class Actuating:
         engine.actuate(self._drive.targets(time), self._interval)
         self.memory["look"] = look + 1
         return self._interval if look < self._looks else 0.0
+
+
+class Arranging:
+    """The chain is laid out, at once."""
+
+    def __init__(self, chain: Chain) -> None:
+        self._chain = chain
+        self.memory: Memory = {}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        engine.add(self._chain.poses())
+        return 0.0
+
+
+class Straining(Actuating):
+    """The motors hold while strings pull the chain apart, until it has parted or the end of the way."""
+
+    def __init__(self, schedule: Drive, interval: float, phase: Strain, chain: Chain) -> None:
+        super().__init__(schedule, interval)
+        self._phase = phase
+        self._chain = chain
+        self._looks_per_check = max(1, round(CHECK_INTERVAL / interval))
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        phase, diameter = self._phase, 2 * self._chain.particle.radius
+        if self.memory["look"] == 0:
+            engine.articulate()
+            law = StringLaw(
+                length=phase.string_length_m,
+                stiffness=phase.string_stiffness_N_per_m,
+                damping=phase.string_damping_N_s_per_m,
+            )
+            engine.tie(self._chain.ties(phase.tied_at), law, (0.0, phase.speed_m_per_s))
+        over = self.memory["look"] % self._looks_per_check == 0 and parted(engine.state(), diameter)
+        wait = 0.0 if over else super().proceed(engine)
+        if not wait:
+            engine.untie()
+        return wait
 
 
 class Pouring:

@@ -8,6 +8,7 @@ from typing import Any
 
 from dem.actuation import actuated
 from dem.actuation_checks import actuation_warnings
+from dem.chain import Arrange
 from dem.construction import in_order
 from dem.effects import Adds, Decision, decide
 from dem.parts import Deposit
@@ -52,6 +53,7 @@ class Plan:
     frames: int
     wall_s: float
     warnings: tuple[str, ...]
+    planar: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -59,9 +61,10 @@ class Plan:
 
     def to_text(self) -> str:
         """A table for the terminal."""
+        wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
-            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, wall {1e3 * self.container_height_m:.0f} mm high",
+            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)",
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
@@ -99,6 +102,8 @@ def plan(scene: Scene) -> Plan:
         if isinstance(phase, Deposit):
             estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
             phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
+        elif isinstance(phase, Arrange):
+            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0))
         else:
             estimate = phase.duration_s
             wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
@@ -119,4 +124,5 @@ def plan(scene: Scene) -> Plan:
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=actuation_warnings(scene),
+        planar=scene.plane is not None,
     )

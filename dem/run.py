@@ -6,7 +6,7 @@ import logging
 import math
 import platform
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -23,6 +23,7 @@ from dem.engine import Engine
 from dem.errors import InputError, RunError
 from dem.files import write_json, write_text
 from dem.frames import FrameWriter
+from dem.hinges import DAMPER_TIME
 from dem.hooks import PullHook
 from dem.library import yade_threads, yade_version
 from dem.motor import MotorLaw
@@ -233,7 +234,7 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) 
         "spheres_per_smarticle": len(particle.centres),
         "time_step_s": dt,
         "phases": [{"index": k, "type": phase.type} for k, phase in enumerate(scene.phases)],
-    }
+    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
@@ -245,10 +246,15 @@ def build_engine(scene: Scene, dt: float) -> Engine:
         gravity=scene.gravity_m_per_s2,
         time_step=dt,
         shaken=effects.CONTAINER_MOTION.called_for(scene),
-        hinges=(hinge_law(scene), motor_law(scene)) if effects.ARTICULATION.called_for(scene) else None,
+        # No damper may relax more than all of its force in a step.
+        hinges=(replace(hinge_law(scene), damper_time=max(DAMPER_TIME, dt)), motor_law(scene))
+        if effects.ARTICULATION.called_for(scene)
+        else None,
         track_work=effects.ENERGIES.called_for(scene),
         dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
         hooks=None if scene.hooks is None else scene.hooks.crosses,
+        channel=scene.channel,
+        strengths=scene.motor_strengths,
     )
 
 
@@ -259,6 +265,7 @@ def motor_law(scene: Scene) -> MotorLaw:
         speed_limit=scene.motor.speed_limit_rad_per_s,
         stiffness=scene.motor.stiffness_N_m_per_rad,
         law=scene.motor.law,
+        damping=scene.motor.damping_N_m_s_per_rad,
     )
 
 
@@ -266,7 +273,7 @@ def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) 
     """The recorder of a scene, with the watchdog's limits."""
     gravity, dt = scene.gravity_m_per_s2, engine.time_step
     # No one radius gives the volume of a mould of tiers.
-    radius = math.nan if scene.cylinder.upper else scene.container.radius_m
+    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
     raised = sum(phase.distance_m for phase in scene.phases if isinstance(phase, PullHook))
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + raised))
     shaking = max(
@@ -289,6 +296,7 @@ def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) 
             ledger=effects.ENERGY_ACCOUNT.called_for(scene),
             hooks=effects.HOOKS.called_for(scene),
             release=effects.WALL_REMOVAL.called_for(scene),
+            strained=effects.STRINGS.called_for(scene),
         ),
         frames=FrameWriter(out),
         watchdog=Watchdog(

@@ -14,17 +14,21 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from dem.actuation import actuated
 from dem.actuation_checks import check_actuation
+from dem.chain import check_chain
 from dem.container import Cylinder
 from dem.errors import InputError
 from dem.hooks import Hooks, check_hooks, with_hook_defaults, with_pull_defaults
 from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
-from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Motor, Phase, Recording, Smarticle
+from dem.parts import FIDELITIES, Contact, Container, Fidelity, Motor, Phase, Recording, Smarticle
+from dem.plane import Channel, Plane, check_plane
 from dem.release import check_release
 from dem.yaml_text import StrictLoader
 
@@ -40,6 +44,9 @@ class Scene(Part):
     smarticle: Smarticle = Field(default_factory=Smarticle, description="geometry and material of one smarticle")
     count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles [1]")
     container: Container = Field(default_factory=Container, description="the container")
+    plane: Plane | None = Field(
+        None, description="confine all motion to a plane, between two walls instead of in the container; default: not"
+    )
     hooks: Hooks | None = Field(None, description="hooks in the pile, for phases that pull one; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
@@ -78,13 +85,16 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        self._check_phases()
+        check_plane(self)
+        if self.plane is None:
+            self._check_phases()
+            self._check_container()
         self._check_section()
-        self._check_container()
         self._check_recording()
         check_actuation(self)
         check_release(self)
         check_hooks(self)
+        check_chain(self)
         return self
 
     def _check_phases(self) -> None:
@@ -155,11 +165,13 @@ class Scene(Part):
             )
             raise ValueError(msg)
         for number, phase in enumerate(self.phases):
-            if not isinstance(phase, Deposit) and phase.duration_s < series:
+            # How long a pour takes is not known, and laying out a chain takes no time.
+            duration = getattr(phase, "duration_s", math.inf)
+            if duration < series:
                 # A shape change has no key for its length; it is the sum of three.
                 key = ".duration_s" if "duration_s" in type(phase).model_fields else ""
                 msg = (
-                    f"phases.{number}{key}: {phase.duration_s:g} s is shorter than "
+                    f"phases.{number}{key}: {duration:g} s is shorter than "
                     f"recording.series_interval_s = {series:g} s; lengthen the phase or sample more often"
                 )
                 raise ValueError(msg)
@@ -217,9 +229,25 @@ class Scene(Part):
         paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
         return paper.mass * self.gravity_m_per_s2 * paper.middle_length
 
+    @cached_property
+    def motor_strengths(self) -> NDArray[np.float64] | None:
+        """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all are alike."""
+        spread = self.motor.strength_spread
+        if not spread:
+            return None
+        rng = np.random.default_rng(self.seed_for("strengths"))
+        return 1 + spread * rng.uniform(-1, 1, (self.count, 2))
+
+    @property
+    def channel(self) -> Channel | None:
+        """Table and walls as the engine builds them, in a scene that is confined to a plane."""
+        if self.plane is None:
+            return None
+        return Channel(width=self.plane.width_m, table=-self.smarticle.thickness_normal_m / 2)
+
     @property
     def actuates(self) -> bool:
-        """Whether a phase moves the barbs, so that there are hinges and motors."""
+        """Whether a phase moves the barbs or holds them, so that there are hinges and motors."""
         return any(actuated(phase) for phase in self.phases)
 
     @cached_property

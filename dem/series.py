@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.chain import extent
 from dem.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
@@ -20,6 +21,7 @@ from dem.columns import (
     LEDGER_COLUMNS,
     MOTOR_COLUMNS,
     RELEASE_COLUMNS,
+    STRAIN_COLUMNS,
 )
 from dem.engine import Engine
 from dem.files import write_whole
@@ -56,6 +58,7 @@ class SeriesWriter:
         ledger: whether the scene samples dissipation, and energy with it.
         hooks: whether the scene has hooks.
         release: whether the scene takes the container away.
+        strained: whether the scene strains a chain.
     """
 
     folder: Path
@@ -66,9 +69,11 @@ class SeriesWriter:
     ledger: bool = False
     hooks: bool = False
     release: bool = False
+    strained: bool = False
     _rows: dict[str, list[Any]] = field(default_factory=dict)
     _before: tuple[float, float, NDArray[np.float64]] | None = None
     _hooks_before: tuple[int, NDArray[np.float64]] | None = None
+    _strain_before: tuple[int, NDArray[np.float64]] | None = None
 
     def __post_init__(self) -> None:
         self._rows = {name: [] for name in self.described}
@@ -83,6 +88,7 @@ class SeriesWriter:
             (self.ledger, LEDGER_COLUMNS),
             (self.hooks, HOOK_COLUMNS),
             (self.release, RELEASE_COLUMNS),
+            (self.strained, STRAIN_COLUMNS),
         ):
             if wanted:
                 columns |= more
@@ -113,6 +119,11 @@ class SeriesWriter:
             more["outside_count"] = np.count_nonzero(outside)
             if not engine.fixtures.enclosed:
                 phi = math.nan  # a pile that spreads fills no cylinder
+        if self.strained:
+            more |= self._strain_row(engine, state)
+            # Nor does it tell strings, whose pull the smarticles received from elsewhere.
+            pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
+            container_force += np.nan_to_num(pulls)
         row = {
             "time_s": engine.time,
             "phase": phase,
@@ -159,13 +170,34 @@ class SeriesWriter:
         mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
         return mean
 
+    def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
+        strings, none = engine.strings, np.full(3, math.nan)
+        row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
+        row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
+        if not engine.count:
+            return row
+        row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
+        before, self._strain_before = self._strain_before, None
+        if strings is None:
+            return row
+        walls = engine.fixtures.channel_sums
+        sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
+        self._strain_before = (engine.steps, sums)
+        row["pulled_m"] = strings.pulled
+        row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
+        if before is not None and engine.steps > before[0]:
+            means = (sums - before[1]) / (engine.steps - before[0])
+            row |= dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
+        return row
+
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns."""
-        before, hooks = self._before, self._hooks_before
+        marks = {"hooks": self._hooks_before, "strain": self._strain_before}
+        before = self._before
         return {
             "before": None if before is None else [before[0], before[1], before[2].tolist()],
-            "hooks": None if hooks is None else [hooks[0], hooks[1].tolist()],
+            **{name: None if mark is None else [mark[0], mark[1].tolist()] for name, mark in marks.items()},
         }
 
     @property
@@ -177,8 +209,9 @@ class SeriesWriter:
         """Go on from where `memory` and `columns` were taken."""
         before = memory["before"]
         self._before = None if before is None else (before[0], before[1], np.array(before[2]))
-        hooks = memory["hooks"]
-        self._hooks_before = None if hooks is None else (hooks[0], np.array(hooks[1]))
+        self._hooks_before, self._strain_before = (
+            None if mark is None else (mark[0], np.array(mark[1])) for mark in (memory["hooks"], memory["strain"])
+        )
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def write(self) -> None:

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 # Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
 # smarticle's chain touches two of them; more act along different directions and do not add up in one mode.
 CONTACTS_AT_A_TIP = 2
+# Contacts of a sphere in a row with another row along it, as far as it is pressed in by less than a twentieth of the
+# square of the pitch, in diameters: the spheres beside the nearest one are touched, those beyond are not.
+CONTACTS_IN_A_ROW = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,12 +154,37 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
     ):
         stiffness = pins + contacts * law.normal_stiffness * shape
         damped = contacts * damping * shape
+        if hinges.shaft_damping:
+            damped = damped + hinges.shaft_damping * _twist_shape()
         steps.append(_stable_step(mass, stiffness, damped))
     # Links that roll about themselves all alike in a flat pile: surfaces rub against those above and below, and a link
     # has little inertia about itself. In series, the wall's dashpot is at most twice the other.
     roll = _roll_shape(particle)
     damping = max(law.normal_damping, law.wall_damping / 2) * law.tangential_damping
     steps.append(_stable_step(mass, pins + 4 * law.tangential_stiffness * roll, 4 * damping * roll))
+    return min(steps)
+
+
+def planar_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
+    """The same for smarticles that lie flat in a plane, where none lies on another.
+
+    The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
+    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it.
+
+    Args:
+        particle: one smarticle.
+        law: contact law.
+        hinges: stiffness of the hinges.
+    """
+    boxes = particle.boxes
+    mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)
+    twisted = hinges.shaft_damping * _twist_shape()
+    steps = []
+    for link, contacts, damping in ((0, 2 * CONTACTS_IN_A_ROW, law.normal_damping), (1, 1, law.wall_damping)):
+        across = boxes.link_rotations[link][:, 1][None, :]
+        shape = _push_shape(particle, np.flatnonzero(particle.links == link), across)
+        stiffness = pins + contacts * law.normal_stiffness * shape
+        steps.append(_stable_step(mass, stiffness, contacts * damping * shape + twisted))
     return min(steps)
 
 
@@ -208,10 +236,21 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
         tilt[:, 6 * barb + 3 : 6 * barb + 6], tilt[:, 9:12] = plane, -plane
         stiffness += law.pin_stiffness * apart.T @ apart
         stiffness += law.damper_stiffness * damped.T @ damped
-        twist = np.zeros((1, 6 * LINKS))
-        twist[0, 6 * barb + 5], twist[0, 11] = 1, -1
+        twist = _twist(barb)
         stiffness += law.tilt_stiffness * tilt.T @ tilt + law.shaft_stiffness * twist.T @ twist
     return stiffness
+
+
+def _twist(barb: int) -> Array:
+    """(1, 18): how much a barb turns against the middle link, about the normal."""
+    row = np.zeros((1, 6 * LINKS))
+    row[0, 6 * barb + 5], row[0, 11] = 1, -1
+    return row
+
+
+def _twist_shape() -> Array:
+    """(18, 18): the matrix of twist springs of 1 N m/rad at both hinges."""
+    return np.asarray(sum(_twist(barb).T @ _twist(barb) for barb in (0, 2)))
 
 
 def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
@@ -231,7 +270,8 @@ def hinge_law(scene: Scene) -> HingeLaw:
         # As if the pin were held at both faces of the links.
         tilt_stiffness=pin * (scene.smarticle.thickness_normal_m / 2) ** 2,
         shaft_stiffness=motor.stiffness_N_m_per_rad,
-        torque_cap=scene.torque_limit if motor.law == "slip" else None,
+        torque_cap=scene.torque_limit if motor.law in ("slip", "servo") else None,
+        shaft_damping=motor.damping_N_m_s_per_rad,
     )
 
 
@@ -239,6 +279,8 @@ def stable_step(scene: Scene) -> float:
     """Largest stable time step [s] of a scene, articulated where a phase actuates."""
     law = contact_law(scene)
     stable = stable_time_step(scene.particle, law)
+    if scene.actuates and scene.plane is not None:
+        return planar_stable_time_step(scene.particle, law, hinge_law(scene))
     if scene.actuates:
         stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
     return stable
@@ -261,4 +303,12 @@ def time_step(scene: Scene) -> float:
         raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
     whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
-    return whole / max(1, math.ceil(whole / wanted * (1 - 1e-12)))
+    steps = max(1, math.ceil(whole / wanted * (1 - 1e-12)))
+    if scene.actuates and scene.motor.law == "servo" and steps > 1:
+        # A damper that acts a period late drives vibrations that are faster than the period.
+        msg = (
+            f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
+            f"each; use at most {wanted:.3g} s"
+        )
+        raise InputError(msg)
+    return whole / steps

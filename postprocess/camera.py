@@ -86,6 +86,9 @@ class Look:
 def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
     """Points (n, 3) [mm] above the floor that must be in the picture; the floor is at z = 0."""
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
+    if run.planar:
+        thick = run.thickness_in_plane * MILLIMETRE
+        return np.concatenate([points - thick, points + thick, channel(points, run).reshape(-1, 3)])
     if surroundings.hooks is not None:
         # The upper one may be above the pile.
         upper = circle(surroundings.hooks.length / 2, surroundings.hooks.heights(frame.time)[1])
@@ -111,6 +114,15 @@ def wall_corners(top: float, run: RunManifest, surroundings: Surroundings) -> li
         return [*below, (radius, min(height, max(top, least)))]
     radius = run.container_radius * MILLIMETRE
     return [(radius, 0.0), (radius, top)]
+
+
+def channel(points: NDArray[np.float64], run: RunManifest) -> NDArray[np.float64]:
+    """(walls, 2, 3) [mm]: the two walls of a plane from above, as long as points (n, 3) [mm] reach; none without."""
+    if run.channel_width is None:
+        return np.empty((0, 2, 3))
+    half, top = run.channel_width * MILLIMETRE / 2, run.thickness_normal * MILLIMETRE
+    ends = points[:, 0].min(), points[:, 0].max()
+    return np.array([[[x, side * half, top] for x in ends] for side in (-1, 1)])
 
 
 def _wall_height(top: float, run: RunManifest) -> float:

@@ -63,6 +63,8 @@ class RunManifest:
         solid_volume: Volume of one smarticle, t1 t2 (w + 2l) [m³].
         container_radius: [m]; of the widest tier.
         container_tiers: Cylinders of different radii that stand on each other.
+        planar: Whether all motion is confined to a plane, without a container.
+        channel_width: Distance of the two walls in the plane [m]; None without.
         sphere_diameter: Diameter of the spheres that stand for a smarticle [m].
         spheres_per_smarticle: Number of those spheres.
         time_step: [s].
@@ -98,6 +100,8 @@ class RunManifest:
     phases: tuple[PhaseRecord, ...]
     status: str
     container_tiers: int = 1
+    planar: bool = False
+    channel_width: float | None = None
     cause: str | None = None
     end_time: float | None = None
     steps: int | None = None
@@ -105,7 +109,7 @@ class RunManifest:
 
     def walled(self, phase: int) -> bool:
         """Whether the container's wall is there in the phase of an index."""
-        return all(record.type != "remove-container" for record in self.phases[: phase + 1])
+        return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
         """Whether the pile fills one cylinder then, so that packing fractions have a meaning."""
@@ -219,6 +223,8 @@ def read_run(directory: Path | str) -> RunManifest:
         container_radius=run.number("container_radius_m", positive=True),
         # Runs of before there were tiers do not say.
         container_tiers=run.integer("container_tiers", least=1) if "container_tiers" in run.data else 1,
+        planar=run.data.get("planar") is True,
+        channel_width=run.number("channel_width_m", positive=True) if run.data.get("channel_width_m") else None,
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),

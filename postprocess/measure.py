@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -306,7 +307,7 @@ def _shape_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
     tangle = entanglement(frame.vertices)
     return {
         "smarticles [-]": frame.count,
-        "escaped [-]": _escaped(frame, manifest.container_radius),
+        "escaped [-]": math.nan if manifest.planar else _escaped(frame, manifest.container_radius),
         "com height [m]": levels.mean_com,
         "second-highest com height [m]": levels.second_highest_com,
         f"top {levels.percentile:g} % height [m]": levels.top,

@@ -21,7 +21,7 @@ from PIL import Image
 
 from dem.errors import InputError, RunError
 from postprocess import figures
-from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, circle, fitted_camera, wall_corners
+from postprocess.camera import FIELD_OF_VIEW, MILLIMETRE, Look, channel, circle, fitted_camera, wall_corners
 from postprocess.colouring import ColourScale
 from postprocess.entanglement import entanglement
 from postprocess.errors import UndefinedMeasureError
@@ -164,22 +164,11 @@ class Stage:
         plotter, axes = self._plotter, self._look.axes
         radius = self._run.container_radius * MILLIMETRE
         plotter.set_background("white")
-        floor = pv.Disc(inner=0, outer=radius, c_res=180)
-        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
-        corners = wall_corners(float(extent[:, 2].max()), self._run, self._surroundings)
-        rims = _back_rims(corners, axes[2])
-        if rims is None:
-            for outer, height in corners[1:]:
-                self._add_outline(pv.MultipleLines(circle(outer, height)))
+        if self._run.planar:
+            for wall in channel(extent, self._run):
+                self._add_outline(pv.MultipleLines(wall))
         else:
-            outline = _outline(rims)
-            self._wall = [
-                plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
-                self._add_outline(outline),
-            ]
-            if self._surroundings.removed is not None:
-                self._ghost = self._add_outline(outline, opacity=0.3)
-            self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
+            self._add_container(radius, float(extent[:, 2].max()))
         if self._surroundings.hooks is not None:
             mesh = _cross(self._surroundings.hooks)
             look = {"color": "#b3261e", "ambient": 0.25, "diffuse": 0.8, "render": False}
@@ -214,6 +203,25 @@ class Stage:
         if self._surroundings.hooks is not None:
             for hook, height in zip(self._hooks, self._surroundings.hooks.heights(frame.time), strict=True):
                 hook.position = (0.0, 0.0, MILLIMETRE * height)
+
+    def _add_container(self, radius: float, top: float) -> None:
+        plotter, forward = self._plotter, self._look.axes[2]
+        floor = pv.Disc(inner=0, outer=radius, c_res=180)
+        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
+        corners = wall_corners(top, self._run, self._surroundings)
+        rims = _back_rims(corners, forward)
+        if rims is None:
+            for outer, height in corners[1:]:
+                self._add_outline(pv.MultipleLines(circle(outer, height)))
+            return
+        outline = _outline(rims)
+        self._wall = [
+            plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
+            self._add_outline(outline),
+        ]
+        if self._surroundings.removed is not None:
+            self._ghost = self._add_outline(outline, opacity=0.3)
+        self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
 
     def _add_outline(self, lines: pv.PolyData, *, opacity: float = 1.0) -> Any:
         return self._plotter.add_mesh(

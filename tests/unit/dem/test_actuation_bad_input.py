@@ -206,7 +206,7 @@ MOTORS: list[tuple[dict[str, Any], str]] = [
     ({"motor__torque_limit_N_m": -1e-5}, "motor.torque_limit_N_m: input should be greater than 0, got -1e-05"),
     ({"motor__speed_limit_rad_per_s": 0}, "motor.speed_limit_rad_per_s: input should be greater than 0, got 0"),
     ({"motor__stiffness_N_m_per_rad": -1}, "motor.stiffness_N_m_per_rad: input should be greater than 0, got -1"),
-    ({"motor__law": "brake"}, "motor.law: input should be 'halt', 'stall' or 'slip', got 'brake'"),
+    ({"motor__law": "brake"}, "motor.law: input should be 'halt', 'stall', 'slip' or 'servo', got 'brake'"),
     ({"motor__torque_limit": 1}, "motor: unknown key 'torque_limit'; did you mean 'torque_limit_N_m'?"),
     (
         {"motor__torque_limit_N_m": "1e-5"},

@@ -8,7 +8,15 @@ from typing import Any
 
 import pytest
 
-from dem.columns import COLUMNS, ENERGY_COLUMNS, HOOK_COLUMNS, LEDGER_COLUMNS, MOTOR_COLUMNS, RELEASE_COLUMNS
+from dem.columns import (
+    COLUMNS,
+    ENERGY_COLUMNS,
+    HOOK_COLUMNS,
+    LEDGER_COLUMNS,
+    MOTOR_COLUMNS,
+    RELEASE_COLUMNS,
+    STRAIN_COLUMNS,
+)
 from dem.construction import ORDER
 from dem.effects import EFFECTS, Adds, decide
 from dem.plan import plan
@@ -18,7 +26,7 @@ MakeScene = Callable[..., Scene]
 DEPOSIT = {"type": "deposit"}
 ACTUATED = [DEPOSIT, {"type": "relax"}, {"type": "shape-change"}, {"type": "internal-oscillation", "theta_deg": 5}]
 PLAIN = {"phases": [DEPOSIT, {"type": "relax"}], "recording.checkpoint_interval_s": None}
-ALWAYS = {"contact", "gravity", "friction", "restitution", "series", "frames"}
+ALWAYS = {"contact", "container", "gravity", "friction", "restitution", "series", "frames"}
 
 # What of a scene turns an effect on, and what `smarticles plan` says about it then.
 CALLS: list[tuple[dict[str, Any], set[str], str]] = [
@@ -110,7 +118,7 @@ def test_shaking_comes_before_the_motion_that_it_drives(make_scene: MakeScene) -
 
 def test_every_column_belongs_to_one_effect() -> None:
     declared = [name for effect in EFFECTS for name in effect.adds.series]
-    tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS)
+    tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
     assert sorted(declared) == sorted(name for table in tables for name in table)
     assert len(set(declared)) == len(declared)
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)

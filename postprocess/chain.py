@@ -1,0 +1,161 @@
+"""The study `chain`: strain tests of a chain of robots between two walls against the findings of Savoie et al.
+
+Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical experiment".
+What is measured of a run is in `postprocess.chain_runs`, what the paper found and how it is judged in
+`postprocess.chain_findings`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+import pandas as pd
+
+from postprocess import chain_figures
+from postprocess.chain_findings import findings, sensitivity
+from postprocess.chain_runs import (
+    AT_PEAK,
+    CARRIES,
+    CONFINEMENT,
+    COUNT,
+    FRACTURE,
+    LOSS,
+    PEAK,
+    QUANTITIES,
+    SPEED,
+    STIFFNESS,
+    VARIANT,
+    WALL,
+    WIDENING,
+    YIELD,
+    chain_row,
+    points,
+)
+from postprocess.findings import CRITERION, Finding, findings_table
+from postprocess.manifest import RunManifest
+from postprocess.origin import Origin, Reference, make_folder
+from postprocess.procedures_runs import marked
+from postprocess.study_report import StudyReport
+from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats
+
+_STUDY = "chain"
+
+SAVOIE = Reference(
+    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
+    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
+)
+
+_SHOWN = {
+    PEAK: ("peak force [N]", ".3f"),
+    AT_PEAK: ("strain at the peak", ".3f"),
+    FRACTURE: ("strain at fracture", ".3f"),
+    YIELD: ("strain at the yield drop", ".3f"),
+    STIFFNESS: ("stiffness [N]", ".2f"),
+    WIDENING: ("widening", ".3f"),
+    WALL: ("wall force [N]", ".2f"),
+}
+
+
+def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, command: str) -> StudyReport:
+    """Measures the runs of the study and writes its tables and figures.
+
+    Runs that are not done, or cannot be read, are listed as missing. Files of an earlier analysis in the same folder
+    are replaced.
+
+    Args:
+        run_dirs: Run directories; any subset of the study.
+        output: Folder for the results; made if needed.
+        note: How these runs differ from the full study; stands in every footer.
+        command: Command line to state as the origin.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: No run is done, a run is given twice, or the output is no folder.
+    """
+    output = make_folder(output)
+    manifests, rows, missing = collect_runs(_STUDY, run_dirs, chain_row)
+    place = {run.directory: row for run, row in zip(manifests, rows, strict=True)}
+
+    def named(run: RunManifest) -> str:
+        row = place[run.directory]
+        return f"{row[VARIANT]} n {row[COUNT]} h/H {row[CONFINEMENT]}"
+
+    refuse_repeats(_STUDY, manifests, "point", named)
+    runs = pd.DataFrame(rows).sort_values([VARIANT, COUNT, CONFINEMENT, SEED], ignore_index=True)
+    means, found, changes = points(runs), findings(runs), sensitivity(runs)
+    origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=SAVOIE)
+    footer = origin.footer(
+        _told_trials(means),
+        "Force: of the pulled string, means over 1 ms. Strain: of the distance along x between the strings' ties. A "
+        f"chain holds while it carries {CARRIES:.0%} of its peak force. A yield drop loses {LOSS:.0%} of the force or "
+        "more. Trials differ in the strength of their servos, ±10 %.",
+        f"{CRITERION}.",
+    )
+    files = origin.write(
+        output,
+        footer,
+        tables={"runs": runs, "points": means, "sensitivity": changes, "findings": findings_table(found)},
+        text=("findings.md", _markdown(found, means, changes)),
+        draw=lambda: chain_figures.draw(
+            output, points=means, runs=runs, changes=changes, manifests=manifests, footer=footer[:-3] + footer[-2:]
+        ),
+    )
+    header, told = told_points(means)
+    return StudyReport(
+        header=header, rows=told, findings=found, told=("Means over trials ± standard error.",), files=files
+    )
+
+
+def _told_trials(means: pd.DataFrame) -> str:
+    groups = means.groupby(SPEED)[[VARIANT, COUNT]]
+    told = []
+    for speed, group in groups:
+        names = dict.fromkeys(f"{variant} n = {count}" for variant, count in group.itertuples(index=False))
+        told.append(f"{1e3 * float(str(speed)):g} mm/s: {', '.join(names)}")
+    trials = f"{means[SEEDS].min()} to {means[SEEDS].max()} trials per point"
+    return f"{trials}; {'; '.join(told)}."
+
+
+def told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the table of points for a person to read."""
+    rows = []
+    for _, point in means.iterrows():
+        row = [str(point[VARIANT]), str(point[COUNT]), f"{point[CONFINEMENT]:g}", f"{1e3 * point[SPEED]:g}"]
+        row.append(str(point[SEEDS]))
+        for quantity, (_, form) in _SHOWN.items():
+            value, error = point[quantity], point[marked(quantity, "SE")]
+            cell = "-" if math.isnan(value) else f"{value:{form}}"
+            row.append(f"{cell} ± {error:{form}}" if math.isfinite(error) else cell)
+        rows.append(row)
+    return ["variant", "n", "h/H", "mm/s", "trials", *(name for name, _ in _SHOWN.values())], rows
+
+
+def _markdown(found: Sequence[Finding], means: pd.DataFrame, changes: pd.DataFrame) -> list[str]:
+    lines = ["# The strain test of a chain of robots against the findings of Savoie et al.", ""]
+    lines += ["| finding in the paper | ours (± standard error) | verdict | found if |", "| --- " * 4 + "|"]
+    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in found]
+    header, rows = told_points(means)
+    lines += ["", "## Points", "", "Means over trials ± standard error.", ""]
+    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    if len(changes):
+        lines += ["", "## What the assumptions matter", ""]
+        lines += [
+            "Change against the baseline, in per cent ± 95 % half-width over pairs of runs with the same servos.",
+            "",
+        ]
+        names = [PEAK, FRACTURE, STIFFNESS]
+        lines += [f"| variant | {' | '.join(name.rpartition(' [')[0] for name in names)} |", "| --- " * 4 + "|"]
+        for variant, group in changes.groupby(VARIANT, sort=False):
+            cells = [
+                f"{row['change [%]']:+.1f} ± {row['change 95 % [%]']:.1f}"
+                for _, row in group.set_index("quantity").loc[names].iterrows()
+            ]
+            lines.append(f"| {variant} | {' | '.join(cells)} |")
+    lines += ["", "What the columns of `points.csv` are:", ""]
+    return lines + [f"- `{name}`: {meaning}" for name, meaning in QUANTITIES.items()]

@@ -1,0 +1,137 @@
+"""Chains in a plane: servos hold as they should, strings feel what they should, and nothing leaves the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import chain_cases
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.engine
+
+Simulate = Callable[..., dict[str, Any]]
+STIFFNESS, LIMIT = 0.1, 0.05  # N m/rad, N m
+
+
+def chain(**changes: Any) -> dict[str, Any]:
+    """Plain data of a chain of robots; keys are those of the scene, `motor` and others are merged."""
+    data: dict[str, Any] = {
+        "schema_version": 1,
+        "seed": 3,
+        "count": 2,
+        "smarticle": {
+            "middle_length_m": 0.0467,
+            "aspect_ratio": 1.0,
+            "thickness_normal_m": 0.021,
+            "thickness_in_plane_m": 0.0095,
+            "density_kg_per_m3": 1250,
+        },
+        "plane": {"width_m": 0.0895},
+        "contact": {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 0.92},
+        "motor": {
+            "law": "servo",
+            "torque_limit_N_m": LIMIT,
+            "stiffness_N_m_per_rad": STIFFNESS,
+            "damping_N_m_s_per_rad": 1e-3,
+        },
+        "fidelity": {
+            "base": "standard",
+            "diameter_m": 0.0095,
+            "pitch": 0.2,
+            "stiffness_N_per_m": 7000,
+            "control_interval_s": 1e-4,
+        },
+        "phases": [
+            {"type": "arrange", "gap_m": 0.00105},
+            {"type": "strain", "speed_m_per_s": 0.05, "distance_m": 0.02, "tied_at": "axis"},
+        ],
+        "recording": {"series_interval_s": 1e-3, "frame_interval_s": 0.1, "checkpoint_interval_s": None},
+    }
+    for key, value in changes.items():
+        data[key] = {**data[key], **value} if isinstance(value, dict) else value
+    return data
+
+
+def test_a_servo_yields_like_a_damped_spring_and_then_holds_at_its_limit(simulate: Simulate) -> None:
+    low, high, beyond = simulate(
+        chain_cases.pulled_apart, chain(plane={"width_m": None}), speed=0.05, moments=[0.2, 0.3, 0.62]
+    )
+    for found in (low, high):
+        expected = STIFFNESS * found["opened"] + 1e-3 * found["rate"]
+        # The inertia of barbs that speed up is the rest. Nothing would be zero, and no damping 4 % to 8 % less.
+        assert found["torque"] == pytest.approx(expected, rel=0.01)
+    assert 0.05 < low["opened"] < high["opened"] < LIMIT / STIFFNESS
+    assert beyond["opened"] > 1.2 * LIMIT / STIFFNESS
+    assert beyond["torque"] == pytest.approx(LIMIT, rel=0.01)
+    assert max(found["asymmetry"] for found in (low, high, beyond)) < 1e-6
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3])
+def test_a_servo_gives_no_energy(simulate: Simulate, damping: float) -> None:
+    data = chain(motor={"damping_N_m_s_per_rad": damping}, plane={"width_m": None})
+    free = simulate(chain_cases.swing, data, turn=-0.3, seconds=0.3)
+    energies, begun = free["energies"], free["begun"]
+    # Energies are read with velocities half a step late, at an angular frequency of some 200 /s.
+    assert energies[0] == pytest.approx(begun, rel=0.02)
+    assert energies.max() < 1.02 * begun
+    late = energies[-1000:]
+    if damping:
+        assert late.max() < 1e-3 * begun
+    else:
+        assert late.mean() == pytest.approx(begun, rel=0.02)
+    assert np.abs(free["momentum"]).max() < 1e-12
+    assert np.abs(free["angular_momentum"]).max() < 1e-9
+    assert free["gap"] < 1e-4
+
+
+def test_nothing_leaves_the_plane_and_a_chain_is_its_own_image_turned_by_half(simulate: Simulate) -> None:
+    pulled = simulate(chain_cases.strained, chain(), strain=0.15)
+    assert pulled["heights"] < 1e-12
+    assert pulled["tilts"] < 1e-12
+    assert pulled["turns"] == 0
+    # Barbs have opened by some degrees, and those of the one smarticle as those of the other.
+    assert (np.pi / 2 - pulled["angles"]).min() > 0.05
+    assert pulled["angles"][0] == pytest.approx(pulled["angles"][1], abs=2e-3)
+
+
+def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path: Path) -> None:
+    # Walls that the chain soon leans on, since it turns and widens a little.
+    data = chain(plane={"width_m": 0.0624})
+    data["phases"][1]["tied_at"] = "tip"
+    found = simulate(chain_cases.series, data, str(tmp_path / "run"))
+    walls = found["channel_lower_force_N"] + found["channel_upper_force_N"]
+    known = np.isfinite(walls[:, 0])
+    balance = found["container_force_N"][known, :2] - walls[known, :2]
+    assert np.abs(balance).max() < 1e-9
+    # The walls push inwards and rub, or this would prove nothing.
+    assert found["channel_lower_force_N"][known, 1].min() < -0.05
+    assert found["channel_upper_force_N"][known, 1].max() > 0.05
+    assert np.abs(walls[known, 0]).max() > 0.01
+    # At rest but for the pull, the strings' forces differ by the friction of the walls; means over 20 ms.
+    last = slice(-20, None)
+    pulls = (found["string_fixed_force_N"] + found["string_pulled_force_N"])[last, 0].mean()
+    assert pulls == pytest.approx(walls[last, 0].mean(), abs=0.01)
+    # The table carries the weight.
+    weight = 2 * 1250 * 0.021 * 0.0095 * 3 * 0.0467 * 9.81
+    assert found["container_force_N"][known, 2] == pytest.approx(-weight)
+
+
+def test_strings_and_servos_go_on_from_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
+    data = chain()
+    data["phases"][1]["distance_m"] = 0.01
+    whole = simulate(chain_cases.series, data, str(tmp_path / "whole"))
+    data["recording"]["checkpoint_interval_s"] = 0.05
+    loaded = simulate(chain_cases.series, data, str(tmp_path / "loaded"))
+    forces = [found["string_pulled_force_N"][5:, 0] for found in (whole, loaded)]
+    # Contacts are added up in another order after a checkpoint, and no more than that.
+    assert forces[0].max() > 0.1
+    assert forces[1] == pytest.approx(forces[0], abs=1e-6)
+
+
+def test_nothing_of_a_plane_exists_elsewhere(simulate: Simulate, scene_data: Callable[..., dict[str, Any]]) -> None:
+    assert simulate(chain_cases.bodies, scene_data()) == {"felt": 0, "container": 129, "strings": 0}
+    assert simulate(chain_cases.bodies, chain()) == {"felt": 2, "container": 3, "strings": 0}
+    assert simulate(chain_cases.bodies, chain(plane={"width_m": None})) == {"felt": 0, "container": 1, "strings": 0}
