@@ -82,7 +82,7 @@ The end of the output's name decides: .png is a picture; .gif, .webp and .mp4 ar
         metavar="WHAT",
         help="crossings (default; links of others through its plane), contacts, height, speed, id",
     )
-    render.add_argument("--view", default="front", metavar="VIEW", help="front (default), oblique, top")
+    render.add_argument("--view", metavar="VIEW", help="front (default; of motion in a plane: top), oblique, top")
     render.add_argument(
         "--size", type=positive_int, metavar="PIXELS", help="width and height; default: 1200, of a film 720"
     )

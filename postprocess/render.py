@@ -13,7 +13,7 @@ from dem.errors import InputError
 from postprocess import figures, film
 from postprocess.camera import Look, extent
 from postprocess.frames import FrameSequence, read_frames
-from postprocess.manifest import read_run
+from postprocess.manifest import RunManifest, read_run
 from postprocess.stage import Stage
 from postprocess.surroundings import read_surroundings
 
@@ -30,7 +30,7 @@ def render_run(
     time: float | None = None,
     color_by: str = "crossings",
     size: tuple[int, int] = (1200, 1200),
-    view: str = "front",
+    view: str | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Draws one frame of a run: every link as its real box, in a container cut open in front, with its hooks.
@@ -44,7 +44,7 @@ def render_run(
         time: Simulated time [s], the nearest frame is taken; the last one if not given.
         color_by: Key of `COLOURINGS`.
         size: Width and height [pixel].
-        view: Key of `VIEWS`.
+        view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         overwrite: Whether an existing file may be replaced.
 
     Returns:
@@ -59,8 +59,9 @@ def render_run(
         >>> render_run("runs/pile", color_by="height", view="oblique")  # doctest: +SKIP
     """
     output = _checked_output(directory, output, "render.png", (".png",), overwrite=overwrite)
-    look = Look.checked(color_by=color_by, size=size, view=view)
-    run, frames = read_run(directory), read_frames(directory)
+    run = read_run(directory)
+    look = Look.checked(color_by=color_by, size=size, view=view or _usual_view(run))
+    frames = read_frames(directory)
     frame = frames[_frame_at(frames, time)]
     values = look.colouring.values(frame)
     around = read_surroundings(run)
@@ -77,7 +78,7 @@ def render_film(
     *,
     color_by: str = "crossings",
     size: tuple[int, int] = (720, 720),
-    view: str = "front",
+    view: str | None = None,
     frames_per_second: float = 15.0,
     most_frames: int = _MOST_FILM_FRAMES,
     overwrite: bool = False,
@@ -91,7 +92,7 @@ def render_film(
             given.
         color_by: Key of `COLOURINGS`.
         size: Width and height [pixel]; for `.mp4` even numbers.
-        view: Key of `VIEWS`.
+        view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         frames_per_second: Of the film.
         most_frames: Longer runs are thinned evenly to so many frames.
         overwrite: Whether an existing file may be replaced.
@@ -104,7 +105,8 @@ def render_film(
             that exists, or as in `render_run`.
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS, overwrite=overwrite)
-    look = Look.checked(color_by=color_by, size=size, view=view)
+    run = read_run(directory)
+    look = Look.checked(color_by=color_by, size=size, view=view or _usual_view(run))
     if not (math.isfinite(frames_per_second) and frames_per_second > 0 and most_frames >= 2):
         msg = (
             "a film needs frames_per_second above 0 1/s and most_frames of at least 2: "
@@ -112,7 +114,7 @@ def render_film(
         )
         raise InputError(msg)
     film.check_film(output, size)
-    run, frames = read_run(directory), read_frames(directory)
+    frames = read_frames(directory)
     if len(frames) < 2:
         msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; use render_run"
         raise InputError(msg)
@@ -135,6 +137,10 @@ def render_film(
         samples = [picture(number) for number in sorted({0, len(shown) // 3, 2 * len(shown) // 3, len(shown) - 1})]
         film.write_film(temporary, map(picture, range(len(shown))), frames_per_second, samples)
     return output
+
+
+def _usual_view(run: RunManifest) -> str:
+    return "top" if run.planar else "front"
 
 
 def _checked_output(
