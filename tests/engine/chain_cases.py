@@ -22,7 +22,7 @@ TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 
 
 def build(scene: Scene) -> Engine:
-    return run._build_engine(scene, time_step(scene))
+    return run.build_engine(scene, time_step(scene))
 
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, Engine]:
