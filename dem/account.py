@@ -34,7 +34,7 @@ class Account:
         dissipation_steps: int,
     ) -> None:
         self.container_work = 0.0
-        """Work of moving fixtures on the smarticles since the start [J]."""
+        """Work of moving fixtures, and of strings, on the smarticles since the start [J]."""
         self.added = 0.0
         """Gravitational energy above z = 0 that smarticles had when they were added [J]."""
         self.dissipated = 0.0

@@ -37,7 +37,10 @@ MOTOR_COLUMNS: dict[str, tuple[str, str]] = {
 # Only in scenes that ask for energy.
 ENERGY_COLUMNS: dict[str, tuple[str, str]] = {
     "gravitational_energy_J": ("J", "of all smarticles above the floor's height at the start"),
-    "container_work_J": ("J", "work of the moving container on the smarticles since the start, without its own weight"),
+    "container_work_J": (
+        "J",
+        "work of the moving container, hook or strings on the smarticles since the start, without their own weight",
+    ),
 }
 
 # Only in scenes that sample dissipation.

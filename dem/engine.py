@@ -204,7 +204,7 @@ class Engine:
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
             if self.strings is not None:
-                self.strings.pull(self.time_step)
+                self.account.container_work += self.strings.pull(self.time_step)
             self.account.step(number, step)
             if felt:
                 self.fixtures.feel()

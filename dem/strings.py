@@ -78,24 +78,31 @@ class Strings:
         self._states = [bodies[end.body].state for end in self._ends]
         self._arms = [self._yade.vector(*end.arm) for end in self._ends]
 
-    def pull(self, time_step: float) -> None:
+    def pull(self, time_step: float) -> float:
         """Set the forces of the step that begins, and move the anchors on.
 
         Args:
             time_step: dt [s].
+
+        Returns:
+            Work of the strings on the links in the step [J], to first order in dt.
         """
+        work = 0.0
         forces, vector = self._yade.omega.forces, self._yade.vector
         for k, (end, state) in enumerate(zip(self._ends, self._states, strict=True)):
             arm = state.ori * self._arms[k]
             along = self._anchors[k] - state.pos - arm
             length = along.norm()
             along /= length
-            rate = along.dot(vector(end.speed, 0, 0) - state.vel - state.angVel.cross(arm))
+            motion = state.vel + state.angVel.cross(arm)
+            rate = along.dot(vector(end.speed, 0, 0) - motion)
             force = along * self._law.tension(length, rate)
             forces.setPermF(end.body, force)
             forces.setPermT(end.body, arm.cross(force))
             self._sums[k] += force
             self._anchors[k] += vector(end.speed * time_step, 0, 0)
+            work += force.dot(motion) * time_step
+        return work
 
     def release(self) -> None:
         """Let go."""
