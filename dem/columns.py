@@ -28,6 +28,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
 MOTOR_COLUMNS: dict[str, tuple[str, str]] = {
     "commanded_angle_rad": ("rad", "mean angle that the motors hold, barb 1 and barb 2"),
     "angle_rad": ("rad", "mean actual angle, barb 1 and barb 2"),
+    "schedule_error_rad": (
+        "rad",
+        "largest difference of the angle of the schedule and the commanded one; NaN while welded",
+    ),
     "tracking_error_rad": ("rad", "largest difference of commanded and actual angle; NaN while welded"),
     "motor_torque_N_m": ("N m", "root mean square torque of the motors; NaN while welded"),
     "halted_fraction": ("1", "share of motors that are halted by their torque; NaN while welded"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 Law = Literal["halt", "stall", "slip", "servo"]
-_MEMORY = ("commands", "angles", "torques", "work", "begun", "halted")
+_MEMORY = ("commands", "schedule", "angles", "torques", "work", "begun", "halted")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +58,8 @@ class Motors:
         self._limit = law.torque_limit * factor
         self.commands: Array = angles.copy()
         """(N, 2) angles that the motors hold at present [rad]."""
+        self.schedule: Array = angles.copy()
+        """(N, 2) angles that they were told at the last look [rad]; a motor that halts falls behind."""
         self.angles: Array = angles.copy()
         """(N, 2) actual angles at the last look [rad]."""
         self.torques: Array = np.zeros_like(angles)
@@ -71,7 +73,7 @@ class Motors:
 
     def engage(self, angles: Array) -> None:
         """Take hold of barbs at (N, 2) angles [rad], without torque."""
-        self.commands, self.angles, self._begun = angles.copy(), angles.copy(), angles.copy()
+        self.commands, self.schedule, self.angles, self._begun = (angles.copy() for _ in range(4))
         self.torques, self._rates = np.zeros_like(angles), np.zeros_like(angles)
         self.halted = np.zeros(angles.shape, dtype=bool)
 
@@ -103,7 +105,7 @@ class Motors:
             self.halted &= advance * before > 0
         if self.law.law in ("halt", "stall"):
             advance = np.where(self.halted, 0.0, advance)
-        self.commands = self.commands + advance
+        self.commands, self.schedule = self.commands + advance, targets
         self.angles = angles
         if rates is not None:
             self._rates = rates
@@ -122,14 +124,14 @@ class Motors:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs."""
-        arrays = (self.commands, self.angles, self.torques, self.work, self._begun, self.halted)
+        arrays = (self.commands, self.schedule, self.angles, self.torques, self.work, self._begun, self.halted)
         memory = dict(zip(_MEMORY, (array.tolist() for array in arrays), strict=True))
         return memory | ({"rates": self._rates.tolist()} if self.law.law == "servo" else {})
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken."""
         shape = self.commands.shape
-        self.commands, self.angles, self.torques, self.work, self._begun = (
+        self.commands, self.schedule, self.angles, self.torques, self.work, self._begun = (
             np.array(memory[name], dtype=np.float64).reshape(shape) for name in _MEMORY[:-1]
         )
         self.halted = np.array(memory["halted"], dtype=bool).reshape(shape)

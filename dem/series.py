@@ -243,15 +243,17 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
     if motors is None or not engine.articulated:
         unknown = math.nan
         held = angles if motors is None else _mean(motors.commands)
-        error = torque = halted = unknown
+        behind = error = torque = halted = unknown
     else:
         held = _mean(motors.commands)
+        behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
         error = np.abs(motors.commands - state.angles).max(initial=0.0)
         torque = math.sqrt(np.square(motors.torques).mean())
         halted = motors.halted.mean()
     return {
         "commanded_angle_rad": held,
         "angle_rad": angles,
+        "schedule_error_rad": behind,
         "tracking_error_rad": error,
         "motor_torque_N_m": torque,
         "halted_fraction": halted,

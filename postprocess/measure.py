@@ -51,6 +51,7 @@ _SERIES_COLUMNS = {
     "motor_work_J": "motor work",
     "commanded_angle_rad": "commanded angle",
     "angle_rad": "angle",
+    "schedule_error_rad": "schedule error",
     "tracking_error_rad": "tracking error",
     "motor_torque_N_m": "motor torque",
     "halted_fraction": "halted fraction",

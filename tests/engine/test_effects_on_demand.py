@@ -111,7 +111,7 @@ def test_the_scenes_of_this_proof_differ_in_what_they_are_made_of(simulate: Simu
         "checkpoint.previous.zip",
     }
     assert len(every["functors"]) == 13
-    assert len(every["series"] - plain["series"]) == 18
+    assert len(every["series"] - plain["series"]) == 19
 
 
 @pytest.mark.parametrize(

@@ -144,6 +144,7 @@ def test_a_pile_neither_jumps_nor_keeps_anything_stale(piles: dict[str, dict[str
 UNITS = {
     "commanded_angle_rad": "rad",
     "angle_rad": "rad",
+    "schedule_error_rad": "rad",
     "tracking_error_rad": "rad",
     "motor_torque_N_m": "N m",
     "halted_fraction": "1",
@@ -184,7 +185,7 @@ def test_a_scene_with_all_kinds_of_actuation_runs_through(
     welded = np.isin(rows["phase"], (1, 3, 5))
     for key in ("kinetic_energy_J", "gravitational_energy_J", "motor_work_J", "joint_gap_m"):
         assert np.isfinite(rows[key]).all(), key
-    for key in ("tracking_error_rad", "motor_torque_N_m", "halted_fraction"):
+    for key in ("schedule_error_rad", "tracking_error_rad", "motor_torque_N_m", "halted_fraction"):
         assert np.isfinite(rows[key][articulated]).all(), key
         assert np.isnan(rows[key][welded]).mean() > 0.9, key
     halted = rows["halted_fraction"][articulated]
@@ -194,6 +195,10 @@ def test_a_scene_with_all_kinds_of_actuation_runs_through(
     assert 0 < rows["joint_gap_m"].max() < 0.01 * cases.load(data).sphere_diameter
     # All energy that the links ever have is less than what they fell through.
     assert rows["kinetic_energy_J"][rows["phase"] > 0].max() < 0.5 * rows["gravitational_energy_J"].max()
+    # Where motors were halted they fell behind; told to hold the pace of the schedule they do not.
+    behind = rows["schedule_error_rad"][articulated]
+    assert behind[halted > 0].max() > np.radians(1)
+    assert behind.min() < np.radians(0.2)
     # The barbs did straighten (most of them, most of the way) and come back, and that cost work.
     straight, last = rows["angle_rad"][rows["phase"] == 4].min(), rows["angle_rad"][-1]
     assert straight < np.radians(40)

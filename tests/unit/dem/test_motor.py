@@ -56,6 +56,19 @@ def test_slow_schedule_is_followed_exactly_and_each_barb_its_own() -> None:
         assert (motors.torques == torques).all()
 
 
+def test_a_motor_that_halts_falls_behind_its_schedule_by_what_it_did_not_go() -> None:
+    motors = held(HALT, 0.0, 0.1, 40)
+    # It stopped at the first look that found τ_max, 1.6e-5 N m / 3e-3 N m/rad, in steps of 6 rad/s for one period.
+    stopped = math.ceil(1.6e-5 / 3e-3 / (6 * PERIOD)) * 6 * PERIOD
+    assert motors.schedule == pytest.approx(np.full((1, 2), 0.1))
+    assert motors.schedule - motors.commands == pytest.approx(np.full((1, 2), 0.1 - stopped), rel=1e-12)
+    again = Motors(HALT, np.zeros((1, 2)))
+    again.restore(motors.memory)
+    assert again.memory == motors.memory
+    motors.engage(np.full((1, 2), 0.3))
+    assert (motors.schedule == motors.commands).all()
+
+
 # -- the halting law ---------------------------------------------------------------------------------------------------
 
 

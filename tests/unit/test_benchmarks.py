@@ -1,0 +1,53 @@
+"""Benchmarks run for minutes; that their scenes are valid is known at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from benchmarks import effects, twins
+from dem.effects import EFFECTS, decide
+from dem.scene import parse_scene
+from dem.timestep import time_step
+
+PAIRS = effects.pairs(0.4, 2e-5)
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=[f"{k} {pair.effect}" for k, pair in enumerate(PAIRS)])
+def test_pairs_of_runs_are_valid_and_differ_by_their_effect(pair: effects.Pair) -> None:
+    scenes = [
+        parse_scene(effects.scene_data(changes, count=60, seed=1), source="benchmarks")
+        for changes in (pair.without, pair.with_)
+    ]
+    assert all(time_step(scene) > 0 for scene in scenes)
+    assert (scenes[0] == scenes[1]) == (pair.effect == "none")
+    assert [scene.phases[0].type for scene in scenes] == ["deposit", "deposit"]
+    durations = [scene.phases[effects.MEASURED].model_dump()["duration_s"] for scene in scenes]
+    assert durations == [0.4, 0.4]
+
+
+def test_every_effect_that_costs_anything_is_measured_in_a_pair() -> None:
+    switched: set[str] = set()
+    for pair in PAIRS:
+        on = [
+            {one.name for one in decide(parse_scene(effects.scene_data(data, count=60, seed=1), source="b")) if one.on}
+            for data in (pair.without, pair.with_)
+        ]
+        switched |= on[1] - on[0]
+    named = {name for pair in PAIRS for name in (pair.effect, *pair.effect.split(" and "))}
+    # Numbers of the contact law cost the same whatever they are; a pile without its wall is another pile.
+    left_out = {"contact", "gravity", "friction", "restitution", "wall removal"}
+    assert {effect.name for effect in EFFECTS} - left_out <= named
+    assert {"hooks", "energies", "energy account", "sphere glyphs", "checkpoints", "motors"} <= switched
+
+
+@pytest.mark.parametrize("kind", twins.twins(0.5))
+def test_twins_are_valid(kind: str) -> None:
+    def scene(changes: Mapping[str, Any]) -> dict[str, Any]:
+        return twins.scene_data(1, *changes["phases"], **{k: v for k, v in changes.items() if k != "phases"})
+
+    one, other = (parse_scene(scene(changes), source="benchmarks") for changes in twins.twins(0.5)[kind])
+    assert one != other
+    assert time_step(one) == time_step(other)
