@@ -1,4 +1,4 @@
-"""Where steps above the stable one begin to chatter and to blow up: `python -m stability.onset`.
+"""Where steps above the stable one begin to chatter and to blow up.
 
 A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
 four times the stable one of `dem.timestep`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes from
@@ -8,12 +8,10 @@ smarticles begin. A scene and seed that is in the table already is skipped.
 
 from __future__ import annotations
 
-import argparse
 import math
 import multiprocessing
-import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +32,10 @@ from stability.scenes import scene, shape_change
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
 SETTLE, WATCH = 0.25, 0.05  # s
-CHATTER = 3e-3  # m/s, root mean square; smarticles at rest have 1e-15, those that roll out 1e-3 after SETTLE
+# m/s, root mean square. A stack at rest has 1e-6 at most; what still rolls or topples at half the stable step is not
+# at rest, and tells nothing of chatter.
+QUIET, CHATTER = 1e-4, 1e-3
+WHAT = ("chatter", "blow-up")
 BLOW_UP = 1.0  # energy from nowhere over that of lifting all smarticles by one sphere diameter
 
 
@@ -182,48 +183,49 @@ def climb(name: str, seed: int) -> list[dict[str, Any]]:
 
 
 def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Per scene: the lowest factors that chatter and that blow up, least and most over the seeds; inf: none did."""
+    """Per scene: the lowest factors that chatter and that blow up, least and most over the seeds.
+
+    inf: none did; NaN: what is not at rest at half the stable step cannot tell.
+    """
     rows = []
     for name, of_scene in runs.groupby("scene", sort=False):
         row: dict[str, Any] = {"scene": name, "stable step [s]": of_scene["stable step [s]"].iloc[0]}
         row["seeds"] = of_scene["seed"].nunique()
+        speed, factor = of_scene["speed at rest, root mean square [m/s]"], of_scene["factor [1]"]
         blown = of_scene["energy from nowhere over lifting by d [1]"] > BLOW_UP
-        loud = blown | (of_scene["speed at rest, root mean square [m/s]"] > CHATTER)
-        below = of_scene["factor [1]"] <= 0.9
-        row["speed at 0.9 [m/s]"] = of_scene.loc[below, "speed at rest, root mean square [m/s]"].max()
-        for what, found in (("chatter", loud), ("blow-up", blown)):
-            first = [rows_["factor [1]"].min() for _, rows_ in of_scene[found].groupby("seed")]
+        row["speed at rest at 0.9 or less, most [m/s]"] = speed[factor <= 0.9].max()
+        row["energy from nowhere at 0.9 or less over lifting by d, most [1]"] = of_scene.loc[
+            factor <= 0.9, "energy from nowhere over lifting by d [1]"
+        ].max()
+        rests = not (speed[factor == min(FACTORS)] > QUIET).any()
+        for what, found in (("chatter", blown | (speed > CHATTER)), ("blow-up", blown)):
+            first = [of_seed["factor [1]"].min() for _, of_seed in of_scene[found].groupby("seed")]
             first += [math.inf] * (row["seeds"] - len(first))
-            row |= {f"{what} from, least [1]": min(first), f"{what} from, most [1]": max(first)}
+            told = what == "blow-up" or rests
+            row[f"{what} from, least [1]"] = min(first) if told else math.nan
+            row[f"{what} from, most [1]"] = max(first) if told else math.nan
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def main() -> None:
-    """Run what is not in the table yet, and write both tables."""
-    parser = argparse.ArgumentParser(prog="python -m stability.onset", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("results/stability"), help="folder of the tables")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="seeds of every scene")
-    arguments = parser.parse_args()
-    os.environ["OMP_NUM_THREADS"] = "1"
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    path, commit = arguments.out / "onset_runs.csv", _git_revision()
+def run_onset(out: Path, seeds: Sequence[int]) -> None:
+    """Run what is not in the table of runs yet, and write both tables.
+
+    Args:
+        out: folder of the tables.
+        seeds: of every scene.
+    """
+    path, commit = out / "onset_runs.csv", _git_revision()
     runs = pd.read_csv(path) if path.exists() else pd.DataFrame()
-    for seed in arguments.seeds:
+    for seed in seeds:
         for name in SETTINGS:
             if len(runs) and ((runs["scene"] == name) & (runs["seed"] == seed)).any():
                 continue
             with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-                rows = pd.DataFrame(pool.submit(climb_of, name, seed).result()).assign(commit=commit)
+                rows = pd.DataFrame(pool.submit(climb, name, seed).result()).assign(commit=commit)
             runs = pd.concat([runs, rows], ignore_index=True)
             runs.to_csv(path, index=False, float_format="%.4g")
             table = onsets(runs)
-            table.to_csv(arguments.out / "onset.csv", index=False, float_format="%.4g")
-            row = table[table["scene"] == name].iloc[0]
-            print(f"seed {seed}: {name}: chatters from {row.iloc[4]:g}, blows up from {row.iloc[6]:g}", flush=True)
-
-
-if __name__ == "__main__":
-    from stability.onset import climb as climb_of  # a worker finds it by this name, not in __main__
-
-    main()
+            table.to_csv(out / "onset.csv", index=False, float_format="%.4g")
+            chatter, blow_up = table.loc[table["scene"] == name, [f"{w} from, least [1]" for w in WHAT]].iloc[0]
+            print(f"seed {seed}: {name}: chatters from {chatter:g}, blows up from {blow_up:g}", flush=True)
