@@ -53,7 +53,7 @@ def _cases() -> list[Case]:
             f"drop at 10 m/s, {'articulated' if hinged else 'welded'}",
             violence.drop,
             {"articulated": hinged, "time": 0.1},
-            {"time": 0.5},
+            {"time": 0.45},
         )
         for hinged in (False, True)
     ]
