@@ -85,6 +85,12 @@ CASES = (
         for restitution in (0.7, 0.3)
     ),
     Case(
+        name="oblique, sliding, e = 0.7, dashpot and step of a scene",
+        about="the same with 22 steps in a contact, as in a scene: longer than the dashpot acts",
+        theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
+        measure=partial(impact.sliding_impact, 0.7, dashpot=0.9, steps=22),
+    ),
+    Case(
         name="oblique, sticking",
         about="a ball at 45°, ks = 2/7 kn: its slip is turned around",
         theory="a mass 2/7 m on the tangential spring for half a period; Chung and Ooi (2011)",
