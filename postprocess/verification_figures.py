@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from numpy.typing import NDArray
 
-_WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 3.0
+_WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 3.5
 _LOOKS = (
     ("o", figures.BLUE),
     ("s", figures.ORANGE),
@@ -107,7 +107,7 @@ def draw_clumps(path: Path, *, clumps: pd.DataFrame, footer: Sequence[str]) -> l
         ("depth at rest, theory [m]", "depth at rest measured [m]", 1e9, "depth under its own weight [nm]"),
     )
     with figures.style():
-        figure = figures.blank_figure(_WIDTH, _HEIGHT - 0.4)
+        figure = figures.blank_figure(_WIDTH, _HEIGHT - 0.9)
         for axes, (theory, measured, unit, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
             axes.plot(contacts, table[theory] * unit, color=figures.GREY, linewidth=0.8, label="theory: n in parallel")
             for rows, shape, colour in ((1, "o", figures.BLUE), (2, "s", figures.ORANGE)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from verification import clumps, floor, free, hinge, impact
+from verification import clumps, floor, free, hinge, impact, oblique
 from verification.answer import Case, Ladder
 
 DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
@@ -67,28 +67,34 @@ CASES = (
         name="oblique, sliding, elastic",
         about="a ball at 82° from the normal, μ = 0.4",
         theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
-        measure=partial(impact.sliding_impact, 1.0, dashpot=0.9),
+        measure=partial(oblique.sliding_impact, 1.0, dashpot=0.9),
     ),
     Case(
         name="oblique, sliding, e = 0.7",
         about="the same, without a tangential dashpot",
         theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
-        measure=partial(impact.sliding_impact, 0.7, dashpot=0.0),
+        measure=partial(oblique.sliding_impact, 0.7, dashpot=0.0),
     ),
     *(
         Case(
             name=f"oblique, sliding, e = {restitution:g}, dashpot of a scene",
             about="the same, with cs/cn = 0.9: the dashpot acts without limit until the spring has reached Coulomb's",
             theory=f"μ(1 + e)mv + (cs s − μ cn v/2) μ cn v/(ks s − μ kn v); {OBLIQUE}, and YADE's law",
-            measure=partial(impact.sliding_impact, restitution, dashpot=0.9),
+            measure=partial(oblique.sliding_impact, restitution, dashpot=0.9),
         )
         for restitution in (0.7, 0.3)
+    ),
+    Case(
+        name="oblique, sliding, e = 0.7, dashpot and step of a scene",
+        about="the same with 22 steps in a contact, as in a scene: longer than the dashpot acts",
+        theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
+        measure=partial(oblique.sliding_impact, 0.7, dashpot=0.9, steps=22),
     ),
     Case(
         name="oblique, sticking",
         about="a ball at 45°, ks = 2/7 kn: its slip is turned around",
         theory="a mass 2/7 m on the tangential spring for half a period; Chung and Ooi (2011)",
-        measure=impact.sticking_impact,
+        measure=oblique.sticking_impact,
     ),
     *(
         Case(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import FLAT, add, advance_watched, load, pour
+from cases import load, pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine import Engine
@@ -15,6 +15,7 @@ from dem.phases import begin
 from dem.scene import Scene
 from dem.series import SeriesWriter
 from dem.timestep import contact_law, time_step
+from verification.bench import FLAT, add, advance_watched
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
