@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postprocess import figures
-from postprocess.collapse_law import (
-    ACTIVATION,
-    AT_LEAST,
-    CENSORED,
-    HALF_WIDTH,
-)
+from postprocess.collapse_law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
 from postprocess.collapse_reference import ACCELERATIONS, read_collapse_reference
 from postprocess.collapse_runs import DEFINITION, GAMMA, LOG, WATCHED
 from postprocess.column import COM, CORE, REMAINING, column_history, vibration
@@ -91,9 +86,13 @@ def _draw_heights(
         axes.set_ylim(0, 1.09)
     for axes in grid[len(aspects) :]:
         axes.set_visible(False)
-    grid[0].legend(loc="upper right")
-    figure.supxlabel("time since the vibration began [s]", fontsize=8)
-    figure.supylabel(r"height remaining $h/h_0$ [-]", fontsize=8)
+    for axes in grid[max(len(aspects) - columns, 0) : len(aspects)]:
+        axes.set_xlabel("time since the vibration began [s]", fontsize=7)
+        axes.tick_params(labelbottom=True)
+    for axes in grid[::columns]:
+        axes.set_ylabel(r"height remaining $h/h_0$ [-]", fontsize=7)
+    fullest = max(grid, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
+    fullest.legend(loc="upper right")
     told = (
         f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed. Broken line: 1/e, which a "
         "stretched exponential to 0 crosses at τ whatever its exponent."
@@ -128,7 +127,7 @@ def _draw_law(path: Path, levels: pd.DataFrame, activations: pd.DataFrame, foote
             axes,
             1 / seen[GAMMA] + place,
             seen[LOG],
-            seen["ln(f tau) 95 % [-]"],
+            seen[LOG_HALF_WIDTH],
             look=look,
             label=rf"$l/w$ = {aspect:g}",
         )

@@ -21,6 +21,7 @@ from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 
 ACTIVATION, HALF_WIDTH, ERROR = "Delta [-]", "Delta 95 % [-]", "Delta SE [-]"
+LOG_ERROR, LOG_HALF_WIDTH = "ln(f tau) SE [-]", "ln(f tau) 95 % [-]"
 AT_LEAST, CENSORED, USED = "Delta at least [-]", "runs with a bound [-]", "Gamma used [g]"
 REFERENCE, DEVIATION, DEVIATION_HALF_WIDTH = "Delta Gravish [-]", "deviation [%]", "deviation 95 % [%]"
 
@@ -46,8 +47,8 @@ def levels(rows: pd.DataFrame) -> pd.DataFrame:
                 SEEDS: len(group),
                 CENSORED: int((~seen).sum()),
                 LOG: mean.value,
-                "ln(f tau) SE [-]": mean.standard_error if whole else math.nan,
-                "ln(f tau) 95 % [-]": mean.half_width if whole else math.nan,
+                LOG_ERROR: mean.standard_error if whole else math.nan,
+                LOG_HALF_WIDTH: mean.half_width if whole else math.nan,
                 DELTA: gamma * mean.value,
             }
         )

@@ -131,7 +131,7 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
     """A whole run directory; returns it."""
     run = run or SyntheticRun()
     directory.mkdir(parents=True, exist_ok=True)
-    _write_manifest(directory, run)
+    write_manifest(directory, run)
     _write_scene(directory, run)
     (directory / "frames").mkdir(exist_ok=True)
     entries, rows, timed, start = [], [], [], 0.0
@@ -176,7 +176,7 @@ def _plain(entry: tuple[float, str]) -> tuple[float, str]:
     return float(entry[0]), entry[1]
 
 
-def _write_manifest(directory: Path, run: SyntheticRun) -> None:
+def write_manifest(directory: Path, run: SyntheticRun) -> None:
     manifest = {
         "format": 1,
         "name": run.name,
