@@ -65,6 +65,7 @@ class SyntheticRun:
             "shake": self.shake_time,
             "shape-change": 3.0,
             "internal-oscillation": self.oscillate_time,
+            "remove-container": 2.0,
         }
 
     def shares(self) -> NDArray[np.float64]:
