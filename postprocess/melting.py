@@ -106,8 +106,9 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     footer = origin.footer(
         f"{sizes}; {told_seeds(runs, counts, 'point')}.",
         f"Clusters: centrelines within {TOUCHING:g} sphere diameters, or links through planes. Sloughed: centre of "
-        f"mass farther than {OUTSIDE:g} w outside where the wall was. Tilt: of the line to the centre of mass from the "
-        "floor below where it was before. Toppled: centre of mass beyond the radius that held 95 % before.",
+        f"mass farther from the pile's middle (median) than the wall was, by {OUTSIDE:g} w. Tilt: of the line to the "
+        "centre of mass from the floor below where it was before. Toppled: centre of mass beyond the radius that held "
+        "95 % before.",
         f"{told_bars(counts, 'point')}.",
         f"{CRITERION}.",
     )

@@ -37,7 +37,8 @@ FREE: Mapping[str, str] = MappingProxyType(
         HEIGHT: "height of the centre of mass over that before the wall went",
         TOP_KEPT: "the same for the height below which 95 % of the material lies",
         SPREAD: "the same for the radius about the centre of mass that holds 95 % of it",
-        SLOUGHED: "share of the smarticles whose centre of mass is farther than w/2 outside where the wall was",
+        SLOUGHED: "share of the smarticles whose centre of mass is farther from the pile's middle than the wall was "
+        "by w/2",
         TILT: "angle from the vertical of the line to the centre of mass from where it stood above the floor",
         OFFSET: "how far the centre of mass moved sideways, over the radius of 95 % before",
     }

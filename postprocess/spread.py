@@ -27,7 +27,8 @@ centrelines come nearer still. A twentieth more keeps contacts that open and clo
 OUTSIDE = 0.5
 """How far beyond the wall that was, in w, a centre of mass must be to have come off the pile [-].
 
-A smarticle reaches about w/2 from its centre of mass: it then lies as a whole where no smarticle was."""
+A smarticle reaches about w/2 from its centre of mass: it then lies as a whole where no smarticle was. Distances are
+from the middle of the pile, wherever that is by now: a pile that fell over as a whole has shed nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +40,7 @@ class FreePile:
         entangled: Share of them in the largest cluster joined by entanglement [-].
         radius_half: Radius about the vertical through the centre of mass that holds half of the material [m].
         radius_most: The same for 95 % [m].
-        sloughed: Share of the smarticles that lie outside where the wall was, see `OUTSIDE` [-].
+        sloughed: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-].
         tilt: Angle of the pile from the vertical [degree], see `tilt`.
         offset: How far the centre of mass is from the vertical through the foot [m].
     """
@@ -83,7 +84,7 @@ def free_pile(
         entangled=entanglement_clusters(vertices).largest,
         radius_half=spread_radius(vertices, share=0.5),
         radius_most=spread_radius(vertices, share=0.95),
-        sloughed=share_outside(vertices, run.container_radius + OUTSIDE * run.middle_length),
+        sloughed=share_outside(vertices, run.container_radius + OUTSIDE * run.middle_length, axis=middle(vertices)),
         tilt=math.degrees(tilt(vertices, foot=foot, floor_z=floor_z)),
         offset=math.hypot(centre[0] - foot[0], centre[1] - foot[1]),
     )
@@ -166,6 +167,19 @@ def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, floa
         msg = "a share of smarticles needs at least 1 of them: got 0"
         raise UndefinedMeasureError(msg)
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
+
+
+def middle(vertices: ArrayLike) -> tuple[float, float]:
+    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
+    return float(x), float(y)
 
 
 def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:

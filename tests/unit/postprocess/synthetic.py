@@ -66,6 +66,7 @@ class SyntheticRun:
             "shape-change": 3.0,
             "internal-oscillation": self.oscillate_time,
             "pull-hook": 2.0,
+            "remove-container": 2.0,
         }
 
     def shares(self) -> NDArray[np.float64]:

@@ -105,6 +105,8 @@ def test_what_lies_beyond_the_former_wall_came_off():
     assert share_outside(pile, edge) == 0.25
     found = free_pile(pile, RUN)
     assert found.sloughed == 0.25
+    # A pile that moved as a whole has lost nothing.
+    assert free_pile(pile + np.array([0.1, 0.05, 0.0]), RUN).sloughed == 0.25
     assert (found.touching, found.entangled) == (0.25, 0.25)
     assert found.radius_half < found.radius_most
 
