@@ -31,7 +31,7 @@ from dem.placement import Poses
 from dem.plane import Channel
 from dem.state import State
 from dem.strain import Strain, measure_strain
-from dem.strings import End, StringLaw, Strings
+from dem.strings import StringLaw, Strings, tied
 from dem.timestep import ContactLaw
 
 Array = NDArray[np.float64]
@@ -288,22 +288,8 @@ class Engine:
         self._hinges.set_torques(torques, self.time_step)
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie a string to each of some points of articulated smarticles, taut, its other end outwards on the x-axis.
-
-        Args:
-            ties: the points.
-            law: what the strings have in common.
-            speeds: of their other ends, away from the origin [m/s].
-        """
-        state, ends = self.state(), []
-        for tie, speed in zip(ties, speeds, strict=True):
-            point = np.array([tie.along, 0.0, 0.0])
-            body, arm = self._assembly.anchor(tie.smarticle, tie.link, point)
-            place = state.link_positions[tie.smarticle, tie.link]
-            place = place + state.link_rotations[tie.smarticle, tie.link] @ point
-            away = math.copysign(1.0, place[0])
-            anchor = np.array([place[0] + away * math.sqrt(law.length**2 - place[1] ** 2), 0.0, 0.0])
-            ends.append(End(body=body, arm=arm.tolist(), anchor=anchor.tolist(), speed=away * speed))
+        """Tie a string to each of some points of articulated smarticles, see `dem.strings.tied`."""
+        ends = tied(self.state(), self._assembly, ties, law, speeds)
         self.strings = Strings(self._yade, law, ends)
 
     def untie(self) -> None:

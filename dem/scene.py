@@ -25,6 +25,7 @@ from dem.chain import check_chain
 from dem.container import Cylinder
 from dem.errors import InputError
 from dem.hooks import Hooks, check_hooks, with_hook_defaults, with_pull_defaults
+from dem.overrides import apply_override
 from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.parts import FIDELITIES, Contact, Container, Fidelity, Motor, Phase, Recording, Smarticle
@@ -317,7 +318,7 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
         msg = f"{path}: not valid YAML: {' '.join(str(error).split())}"
         raise InputError(msg) from None
     for override in overrides if isinstance(data, Mapping) else ():
-        _apply(data, override)
+        apply_override(data, override)
     return parse_scene(data, source=str(path))
 
 
@@ -344,40 +345,6 @@ def json_schema() -> dict[str, Any]:
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
     return schema
-
-
-def _apply(data: Any, override: str) -> None:
-    key, separator, text = override.partition("=")
-    if not separator or not key:
-        msg = f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2"
-        raise InputError(msg)
-    try:
-        value = yaml.load(text, Loader=StrictLoader)
-    except (yaml.YAMLError, ValueError):
-        msg = f"--set {override}: the value is not valid YAML"
-        raise InputError(msg) from None
-    *parents, last = key.split(".")
-    here = data
-    for part in parents:
-        here = _child(here, part, override)
-    if isinstance(here, dict):
-        here[last] = value
-    elif isinstance(here, list) and last.isdigit() and int(last) < len(here):
-        here[int(last)] = value
-    else:
-        msg = f"--set {override}: there is no {last!r} to set; lists are numbered from 0"
-        raise InputError(msg)
-
-
-def _child(here: Any, part: str, override: str) -> Any:
-    if isinstance(here, dict):
-        if isinstance(here.get(part), str) and part == "fidelity":
-            here[part] = {"base": here[part]}
-        return here.setdefault(part, {})
-    if isinstance(here, list) and part.isdigit() and int(part) < len(here):
-        return here[int(part)]
-    msg = f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0"
-    raise InputError(msg)
 
 
 def _first_line(error: ValidationError, data: Any) -> str:

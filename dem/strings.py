@@ -6,6 +6,7 @@ the tied links are and how fast they move, as YADE's contact laws do, and so hav
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,7 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.assembly import Assembly
+from dem.chain import Tie
 from dem.library import Yade
+from dem.state import State
 
 Array = NDArray[np.float64]
 
@@ -149,3 +153,25 @@ class Strings:
         strings._anchors = [yade.vector(*anchor) for anchor in memory["anchors"]]
         strings._sums = [yade.vector(*total) for total in memory["sums"]]
         return strings
+
+
+def tied(state: State, assembly: Assembly, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> list[End]:
+    """Strings from some points of articulated smarticles, taut, their other ends outwards on the x-axis.
+
+    Args:
+        state: the smarticles.
+        assembly: their bodies.
+        ties: the points.
+        law: what the strings have in common.
+        speeds: of their other ends, away from the origin [m/s].
+    """
+    ends = []
+    for tie, speed in zip(ties, speeds, strict=True):
+        point = np.array([tie.along, 0.0, 0.0])
+        body, arm = assembly.anchor(tie.smarticle, tie.link, point)
+        place = state.link_positions[tie.smarticle, tie.link]
+        place = place + state.link_rotations[tie.smarticle, tie.link] @ point
+        away = math.copysign(1.0, place[0])
+        anchor = np.array([place[0] + away * math.sqrt(law.length**2 - place[1] ** 2), 0.0, 0.0])
+        ends.append(End(body=body, arm=arm.tolist(), anchor=anchor.tolist(), speed=away * speed))
+    return ends
