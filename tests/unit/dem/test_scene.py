@@ -175,6 +175,7 @@ def test_every_field_says_what_it_is_and_in_which_unit() -> None:
     }
     assert {"Motor", "Actuate", "ShapeChange", "InternalOscillation", "Sequence", "Sine"} <= {m.__name__ for m in seen}
     units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N/m", "m/s", "m/s²", "rad/s", "N m", "N m/rad"}
+    units |= {"N s/m", "N m s/rad"}
     numbers = 0
     for model in seen:
         for name, field in model.model_fields.items():
@@ -193,7 +194,7 @@ def test_every_field_says_what_it_is_and_in_which_unit() -> None:
 def test_names_and_units_agree() -> None:
     suffixes = {"_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s", "_N_m": "N m"}
     suffixes |= {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
-    suffixes |= {"_hz": "Hz", "_m": "m", "_s": "s"}
+    suffixes |= {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad", "_hz": "Hz", "_m": "m", "_s": "s"}
     checked = set()
     for model in models(Scene):
         for name, field in model.model_fields.items():

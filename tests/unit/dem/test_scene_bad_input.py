@@ -133,7 +133,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (
         {"phases.1.type": "rest"},
         "phases.1: type: 'rest' is not known; known: 'deposit', 'relax', 'shake', 'actuate', 'shape-change', "
-        "'internal-oscillation', 'remove-container', 'pull-hook'",
+        "'internal-oscillation', 'remove-container', 'pull-hook', 'arrange', 'strain'",
     ),
     (
         {"phases.1": {"duration_s": 1}},
