@@ -59,7 +59,8 @@ def activations(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per definition and aspect ratio: Δ, the slope of ln(fτ) against 1/Γ through the origin.
 
     The slope is taken seed by seed over the accelerations at which every run collapsed; its mean over seeds has the
-    error. Where there is no such acceleration Δ is empty, and there is only what it is at least.
+    error. A seed that lacks a run at one of them does not count, since it would have another slope where the law does
+    not hold. Where there is no such acceleration Δ is empty, and there is only what it is at least.
 
     Args:
         rows: See `levels`.
@@ -69,15 +70,15 @@ def activations(rows: pd.DataFrame) -> pd.DataFrame:
     for (definition, aspect), group in rows.groupby([DEFINITION, ASPECT], sort=False):
         own = every[(every[DEFINITION] == definition) & (every[ASPECT] == aspect)]
         used = own.loc[own[CENSORED] == 0, GAMMA].tolist()
-        part = group[group[GAMMA].isin(used)]
-        mean = mean_over_seeds([slope_through_origin(1 / one[GAMMA], one[LOG]) for _, one in part.groupby(SEED)])
+        seeds = [one for _, one in group[group[GAMMA].isin(used)].groupby(SEED) if len(one) == len(used)]
+        mean = mean_over_seeds([slope_through_origin(1 / one[GAMMA], one[LOG]) for one in seeds])
         bounds = own.loc[own[CENSORED] > 0, DELTA]
         gravish = reference_delta(float(aspect))
         found.append(
             {
                 DEFINITION: definition,
                 ASPECT: aspect,
-                SEEDS: group[SEED].nunique(),
+                SEEDS: len(seeds),
                 ACTIVATION: mean.value,
                 ERROR: mean.standard_error,
                 HALF_WIDTH: mean.half_width,
