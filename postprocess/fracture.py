@@ -20,7 +20,9 @@ from postprocess.fracture_runs import (
     ABOVE,
     ACCOUNT,
     CAME_FREE,
+    HELD,
     LEFT,
+    NET,
     PEAK,
     PEAK_RAISED,
     QUANTITIES,
@@ -137,7 +139,11 @@ def _markdown(found: Sequence[Finding], header: Sequence[str], rows: Sequence[Se
         "Of how the force depends on θ or on l/w by itself the paper's text says nothing; it has figures.",
         "",
     ]
-    lines += ["## Points", "", "Means over seeds ± standard error; forces over n W_s.", ""]
+    lines += [
+        "What goes from hook to hook shows on the lower one, where a smarticle may be hooked into both; the peak less "
+    ]
+    lines[-1] += "that is what pile and container take."
+    lines += ["", "## Points", "", "Means over seeds ± standard error; forces over n W_s.", ""]
     lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     lines += ["", "What the columns of `points.csv` are:", ""]
@@ -156,6 +162,8 @@ def _told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         PEAK: ("peak", ".3f", 1.0),
         narrow: (f"over {WINDOW / 2:g} s", ".3f", 1.0),
         wide: (f"over {2 * WINDOW:g} s", ".3f", 1.0),
+        HELD: ("lower hook at it", ".3f", 1.0),
+        NET: ("peak less lower hook", ".3f", 1.0),
         PEAK_RAISED: ("raised at it [mm]", ".1f", 1e3),
         WORK: ("work / n W_s w", ".3f", 1.0),
         LEFT: ("load at the end", ".3f", 1.0),

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
-from postprocess.fracture_runs import PEAK, PEAK_RAISED
+from postprocess.fracture_runs import NET, PEAK, PEAK_RAISED
 from postprocess.procedures_effects import of_procedure, paired
 from postprocess.procedures_runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.seeds import slope_within
@@ -57,9 +57,11 @@ def _shape_change_strongest(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
     ours, verdict = _compared(part, PEAK, SHAPE, (EXTERNAL, INTERNAL), 1)
     static = told(paired(part, PEAK, SHAPE, STATIC), 3)
+    net, _ = _compared(part, NET, SHAPE, (EXTERNAL, INTERNAL, STATIC), 1)
     return Finding(
         paper=f"Shape change has the highest peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
-        ours=f"peak of shape-change {ours}; beside the criterion: less static {static}",
+        ours=f"peak of shape-change {ours}; beside the criterion: less static {static}; peak less the lower "
+        f"hook's force {net}",
         verdict=verdict,
         criterion=f"peak force above those of external and of internal oscillation at θ = {AMPLITUDE:g}°, seed by seed",
     )
@@ -69,9 +71,11 @@ def _internal_weakest(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
     ours, verdict = _compared(part, PEAK, INTERNAL, (EXTERNAL, SHAPE), -1)
     static = told(paired(part, PEAK, INTERNAL, STATIC), 3)
+    net, _ = _compared(part, NET, INTERNAL, (EXTERNAL, SHAPE, STATIC), -1)
     return Finding(
         paper=f"Internal oscillation has the least peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
-        ours=f"peak of internal {ours}; beside the criterion: less static {static}",
+        ours=f"peak of internal {ours}; beside the criterion: less static {static}; peak less the lower "
+        f"hook's force {net}",
         verdict=verdict,
         criterion=f"peak force at θ = {AMPLITUDE:g}° below that of external oscillation and of shape change, by seed",
     )

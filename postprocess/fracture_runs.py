@@ -18,7 +18,7 @@ from postprocess.geometry import centres_of_mass
 from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
-from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, peak, read_pull, weight_of_one
+from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, held_at, peak, read_pull, weight_of_one
 from postprocess.scene_file import read_phases
 from postprocess.series import Series, read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, duration
@@ -31,6 +31,7 @@ WINDOWS: Mapping[float, str] = MappingProxyType(
     }
 )
 """The peak over other windows than `WINDOW`: window [s] and column."""
+HELD, NET = "lower hook force at the peak over n W_s [-]", "peak force less lower hook's over n W_s [-]"
 WORK, LEFT, BEFORE = "work over n W_s w [-]", "load at the end over n W_s [-]", "load before the pull over n W_s [-]"
 CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
 ABOVE, ACCOUNT = "smarticles above the hook [-]", "work less that of the engine's account [-]"
@@ -38,6 +39,8 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         PEAK: f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s",
         **{column: f"the same over {window:g} s" for window, column in WINDOWS.items()},
+        HELD: "upwards on the lower hook at the peak, over n W_s: what goes from hook to hook",
+        NET: f"largest mean over {WINDOW:g} s of the force on the upper hook less that on the lower, over n W_s",
         PEAK_TIME: "time since the pull began at which the peak is",
         PEAK_RAISED: "how far the hook had been raised then",
         WORK: "∫ F dz over the whole pull, over n W_s w",
@@ -122,6 +125,8 @@ def _of_pull(run: RunManifest, pull: Pull) -> dict[str, float]:
     return {
         PEAK: highest.force / total,
         **{column: peak(pull, window).force / total for window, column in WINDOWS.items()},
+        HELD: held_at(pull, highest.time) / total,
+        NET: peak(pull.net).force / total,
         PEAK_TIME: highest.time,
         PEAK_RAISED: highest.raised,
         WORK: pull.work / total / run.middle_length,

@@ -8,7 +8,7 @@ one sample scatters: a peak is the largest mean over a window.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +42,7 @@ class Pull:
         edges: (n + 1,) times since the pull began, of samples and of the one before them [s].
         raised: (n + 1,) how far the hook has been raised there [m].
         force: (n,) needed to raise it, mean between two samples [N].
+        held: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook.
         before: The same force before the pull [N]: what rested on the hook; negative where it was held up.
         engine_work: Work of the hook on the smarticles by the engine's own account [J]; NaN where not recorded.
     """
@@ -49,6 +50,7 @@ class Pull:
     edges: NDArray[np.float64] = field(repr=False)
     raised: NDArray[np.float64] = field(repr=False)
     force: NDArray[np.float64] = field(repr=False)
+    held: NDArray[np.float64] = field(repr=False)
     before: float
     engine_work: float
 
@@ -62,6 +64,11 @@ class Pull:
     def work(self) -> float:
         """∫ F dz over the whole pull [J]; a hook that came free adds nothing from then on."""
         return float(self.force @ np.diff(self.raised))
+
+    @property
+    def net(self) -> Pull:
+        """The same history with the force that does not go on to the other hook: that of pile and container."""
+        return replace(self, force=self.force - self.held)
 
     @property
     def left(self) -> float:
@@ -110,6 +117,7 @@ def read_pull(run: RunManifest, series: Series, phase: int) -> Pull:
         edges=series.time[span] - series.time[span[0]],
         raised=height[span] - height[span[0]],
         force=force[inside],
+        held=series["hook_lower_force_N"][inside, 2],
         before=float(resting.mean()) if len(resting) else math.nan,
         engine_work=math.nan if work is None else float(work[span[-1]] - work[span[0]]),
     )
@@ -144,6 +152,12 @@ def peak(pull: Pull, window: float = WINDOW) -> Peak:
     return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
 
 
+def held_at(pull: Pull, time: float, window: float = WINDOW) -> float:
+    """Mean over a window about a time, since the pull began [s], of the force on the other hook [N]."""
+    times, means = moving_mean(replace(pull, force=pull.held), window)
+    return float(np.interp(time, times, means))
+
+
 def freed(pull: Pull, window: float = WINDOW) -> float:
     """Time from which the windowed force stays below `FREE` of its peak [s]; NaN if it does not come to that."""
     times, means = moving_mean(pull, window)
@@ -165,6 +179,7 @@ def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, floa
         "hook peak force over n W_s [-]": highest.force / weight / run.count,
         "hook peak time [s]": highest.time,
         "hook peak raised [m]": highest.raised,
+        "lower hook force at the peak over n W_s [-]": held_at(pull, highest.time) / weight / run.count,
         "hook work [J]": pull.work,
         "hook free time [s]": freed(pull),
         "hook load at the end [smarticles]": pull.left / weight,

@@ -13,6 +13,7 @@ GRAVITY = 9.81
 SPEED = W  # of the hook: w per second
 LOWER, UPPER = 0.005, 0.010
 INTERVAL = 0.004
+HELD = 0.25  # share of the force that goes on to the lower hook
 AFTER_REST = ("deposit", "relax", "pull-hook")
 
 
@@ -38,13 +39,14 @@ def write_hooked_run(
     upper = np.zeros((len(times), 3))
     # A sample is the mean since the one before: taken in the middle between them.
     upper[:, 2] = -np.where(since > 0, force(since - INTERVAL / 2), weight(run))
+    lower = -HELD * np.where(since[:, None] > 0, upper, 0.0)
     raised = SPEED * since
     work = np.cumsum(-upper[:, 2] * np.diff(raised, prepend=0.0))
     columns = {
         "time_s": (times, "s"),
         "phase": (phase, "1"),
         "hook_upper_force_N": (upper, "N"),
-        "hook_lower_force_N": (np.zeros_like(upper), "N"),
+        "hook_lower_force_N": (lower, "N"),
         "hook_upper_z_m": (UPPER + run.floor_z + raised, "m"),
         "container_z_m": (np.full(len(times), run.floor_z), "m"),
         "container_work_J": (work, "J"),

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from hooked import AFTER_REST, UPPER, weight, write_hooked_run
+from hooked import HELD as GOES_ON
 from PIL import Image
 from synthetic import SyntheticRun, W
 
@@ -21,7 +22,9 @@ from postprocess.fracture_runs import (
     BEFORE,
     CAME_FREE,
     FREE_TIME,
+    HELD,
     LEFT,
+    NET,
     PEAK,
     PEAK_RAISED,
     PEAK_TIME,
@@ -84,6 +87,7 @@ def test_measures_are_those_put_in(study):
         for window, column in WINDOWS.items():
             # A window is rounded to whole samples, which have no finer structure.
             assert row[column] == pytest.approx(top * blunt[window], rel=5e-3)
+        assert (row[HELD], row[NET]) == pytest.approx((GOES_ON * row[PEAK], (1 - GOES_ON) * row[PEAK]), rel=1e-3)
         assert row[PEAK_TIME] == pytest.approx(APEX, abs=0.005)
         assert row[PEAK_RAISED] == pytest.approx(APEX * W, abs=0.005 * W)
         assert row[WORK] == pytest.approx(top * BASE, rel=1e-3)
@@ -187,6 +191,7 @@ def sample(procedure, seed, peak, crossings, *, theta=math.nan, aspect=0.7, rais
         PROCEDURE: procedure,
         SEED: seed,
         PEAK: peak,
+        NET: peak,
         CROSSINGS: crossings,
         THETA: theta,
         ASPECT: aspect,

@@ -5,14 +5,25 @@ import math
 import h5py
 import numpy as np
 import pytest
-from hooked import AFTER_REST, INTERVAL, SPEED, weight, write_hooked_run
+from hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 from synthetic import SyntheticRun, write_run
 
 from cli.main import main
 from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.measure import summarise_run
-from postprocess.pull import END, FREE, WINDOW, freed, moving_mean, peak, pull_columns, read_pull, weight_of_one
+from postprocess.pull import (
+    END,
+    FREE,
+    WINDOW,
+    freed,
+    held_at,
+    moving_mean,
+    peak,
+    pull_columns,
+    read_pull,
+    weight_of_one,
+)
 from postprocess.series import read_series
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
@@ -49,6 +60,14 @@ def test_a_triangle_has_its_peak_and_its_area(pulled):
     # The midpoint rule is exact but for the three kinks.
     assert pull.work == pytest.approx(HEIGHT * BASE * SPEED, rel=1e-4)
     assert pull.raised[[0, -1]] == pytest.approx([0, DISTANCE])
+
+
+def test_what_goes_to_the_lower_hook_is_told_apart(pulled):
+    pull = pulled(triangle)
+    highest = peak(pull)
+    assert held_at(pull, highest.time) == pytest.approx(HELD * highest.force)
+    assert peak(pull.net).force == pytest.approx((1 - HELD) * highest.force)
+    assert pull.net.work == pytest.approx((1 - HELD) * pull.work)
 
 
 def test_the_work_of_a_constant_force_is_force_times_distance(pulled):
