@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validate bench test lint types unit engine format lock clean
+.PHONY: help setup demo validate bench stability test lint types unit engine format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -25,6 +25,11 @@ validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 
 bench: setup ## measure speed (tens of minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
+stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
+	OMP_NUM_THREADS=1 $(BIN)/python -m stability onset
+	OMP_NUM_THREADS=1 $(BIN)/python -m stability figure
+	OMP_NUM_THREADS=1 $(BIN)/python -m stability cases
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
 	$(PYTEST) -m "not validation"
