@@ -55,8 +55,10 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
         _widens(base),
         _rises(inside, PEAK, f"Peak force rises about linearly with confinement, {wide} as in the paper"),
         _rises(inside, FRACTURE, f"Strain at fracture rises about linearly with confinement, {wide} as in the paper"),
-        _rises(base, PEAK, f"The same for the peak force over our range, h/H {whole}"),
-        _rises(base, FRACTURE, f"The same for the strain at fracture over our range, h/H {whole}"),
+        _rises(base, PEAK, f"Peak force rises with confinement, linearly or not, over our range, h/H {whole}"),
+        _rises(
+            base, FRACTURE, f"Strain at fracture rises with confinement, linearly or not, over our range, h/H {whole}"
+        ),
         _more(base),
     )
 
