@@ -139,11 +139,10 @@ def test_the_account_of_energy_closes_while_a_mould_goes(
     work, dissipated = gained["container_work"], gained["dissipated_energy"]
     # Sampled dissipation misses a few thousandths of itself; without the wall's work a third would be missing.
     assert np.abs(gained["energy_residual"]).max() < 0.02 * dissipated[-1]
+    # The pile slumps: with the mould still there it would lose nothing.
+    assert dissipated[-1] > 0.03 * found["gravitational_energy_J"][start]
     if speed is None:
         assert work[-1] == 0
         assert -gained["gravitational_energy"][-1] == pytest.approx(dissipated[-1], rel=0.05)
     else:
         assert work[-1] > 0.1 * dissipated[-1]
-    weight = 20 * 7850 * 1.27e-3 * 0.5e-3 * 0.0117 * 2.4 * G
-    # No contact with the mould is left: the floor alone carries the pile, straight down.
-    assert found["container_force_N"][-5:].mean(axis=0) == pytest.approx([0, 0, -weight], abs=0.02 * weight)
