@@ -33,18 +33,19 @@ if TYPE_CHECKING:
 
 _TIME_LABEL = "time since the hook began to rise [s]"
 _FORCE_LABEL = r"force on the hook $F/(n W_\mathrm{s})$ [-]"
+_NET_LABEL = r"upper less lower hook, $F/(n W_\mathrm{s})$ [-]"
 _PEAK_LABEL = r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]"
 _CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ before the pull [-]"
 _THETA_LABEL, _ASPECT_LABEL = r"amplitude $\theta$ [degree]", r"aspect ratio $l/w$ [-]"
 _LABELS = {
     SHAPE: "shape change",
-    EXTERNAL: "external oscillation",
-    INTERNAL: rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°",
+    EXTERNAL: "external",
+    INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
     STATIC: "static",
 }
 _COLOURS = {SHAPE: figures.ORANGE, EXTERNAL: figures.BLUE, INTERNAL: figures.SKY, STATIC: figures.GREY}
 _MARKERS = {SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"}
-_HISTORIES = f"Line: mean over seeds of means over {WINDOW:g} s; band: lowest to highest seed."
+_HISTORIES = f"Line: mean over seeds of means over {WINDOW:g} s; band: lowest to highest seed; in brackets: seeds."
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,6 +83,8 @@ def draw(
     at_aspect, at_amplitude = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
     with figures.style():
         written = _draw_forces(output / "force_time", _procedures(), runs, by_name, [at_aspect, *footer])
+        below = [f"{at_aspect} Without what goes from hook to hook.", *footer]
+        written += _draw_forces(output / "net_time", _procedures(), runs, by_name, below, net=True)
         if len(amplitudes) > 1:
             below = [f"Internal oscillation, {at_aspect}", *footer]
             written += _draw_forces(output / "force_time_theta", amplitudes, runs, by_name, below)
@@ -141,6 +144,8 @@ def _draw_forces(
     runs: pd.DataFrame,
     by_name: Mapping[str, RunManifest],
     footer: Sequence[str],
+    *,
+    net: bool = False,
 ) -> list[Path]:
     figure, axes = figures.new_figure(height=2.8)
     drawn = 0
@@ -148,18 +153,16 @@ def _draw_forces(
         names = line.part(runs)["run"]
         histories = [
             History(times=times, values=force, active=0.0)
-            for times, force in (force_history(by_name[n]) for n in names)
+            for times, force in (force_history(by_name[name], net=net) for name in names)
         ]
         if histories:
-            seeds = "1 seed" if len(histories) == 1 else f"{len(histories)} seeds"
-            label = f"{line.label} ({seeds})"
-            draw_history(axes, histories, WINDOW, colour=line.colour, label=label)
+            draw_history(axes, histories, WINDOW, colour=line.colour, label=f"{line.label} ({len(histories)})")
             drawn += 1
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
     axes.set_xlim(left=0)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    axes.set_ylim(bottom=min(0.0, float(axes.dataLim.y0)))
     axes.set_xlabel(_TIME_LABEL)
-    axes.set_ylabel(_FORCE_LABEL)
+    axes.set_ylabel(_NET_LABEL if net else _FORCE_LABEL)
     _legend_above(axes, drawn)
     return finished(figure, path, [f"{_HISTORIES} Broken line: weight of all smarticles.", *footer])
 

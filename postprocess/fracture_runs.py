@@ -145,11 +145,15 @@ def _above(run: RunManifest, series: Series, phase: int) -> int:
     return int((centres_of_mass(frame.vertices)[:, 2] > hook).sum())
 
 
-def force_history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def force_history(run: RunManifest, *, net: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times since the pull began, (n,) [s], and force over n W_s, (n,) [-], mean between two samples.
+
+    Args:
+        run: A run.
+        net: Whether to leave out what goes on to the lower hook.
 
     Raises:
         InputError: There is no series of it.
     """
     pull = read_pull(run, read_series(run.directory), pull_phase(run).index)
-    return pull.times, pull.force / run.count / weight_of_one(run)
+    return pull.times, (pull.net if net else pull).force / run.count / weight_of_one(run)

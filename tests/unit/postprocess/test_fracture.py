@@ -138,7 +138,15 @@ def test_findings_are_judged_by_the_runs(study):
 
 
 def test_every_figure_is_drawn(study):
-    names = ("force_time", "force_time_theta", "force_time_aspect", "peak_theta", "peak_aspect", "peak_crossings")
+    names = (
+        "force_time",
+        "net_time",
+        "force_time_theta",
+        "force_time_aspect",
+        "peak_theta",
+        "peak_aspect",
+        "peak_crossings",
+    )
     for name in names:
         path = study[1].files[f"{name}.png"]
         image = np.asarray(Image.open(path).convert("L"))
