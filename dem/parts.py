@@ -376,7 +376,7 @@ class Recording(Part):
         None,
         gt=0,
         description="time between samples of what contacts dissipate [s], which closes the account of energies; null: "
-        "none. A sample costs about as much as five steps; 2e-4 s is dense enough",
+        "none. A sample costs 10 µs per contact, as much as some twenty steps of a small pile; 2e-4 s is dense enough",
     )
     checkpoint_interval_s: float | None = Field(
         0.4,

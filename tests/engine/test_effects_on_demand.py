@@ -275,6 +275,14 @@ def test_what_changes_the_order_of_sums_begins_with_their_last_bits(
         assert other[name][first] == pytest.approx(values[first], abs=1e-10 * np.nanmax(np.abs(values))), name
 
 
+def test_a_run_says_of_motors_that_one_look_takes_far_beyond_their_limit(
+    run: Callable[[dict[str, Any]], Path],
+) -> None:
+    logs = [run(data(HOLD, motor=motor)) / "log.txt" for motor in ({"speed_limit_rad_per_s": 60}, {})]
+    warned = ["WARNING motor.torque_limit_N_m: τ_max" in log.read_text() for log in logs]
+    assert warned == [True, False]
+
+
 # -- found on the way ----------------------------------------------------------------------------------------------
 
 
