@@ -76,6 +76,7 @@ class Recorder:
             state,
             floor=engine.floor,
             time=time,
+            spheres=state.spheres(engine.particle),
             raised=engine.fixtures.raised,
             gaps=engine.joint_gaps() if engine.articulated else None,
         )
