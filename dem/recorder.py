@@ -82,6 +82,7 @@ class Recorder:
             state,
             floor=engine.floor,
             time=time,
+            spheres=state.spheres(engine.particle),
             raised=engine.fixtures.raised,
             gaps=engine.joint_gaps() if engine.articulated else None,
         )

@@ -40,8 +40,8 @@ from dem.watchdog import Watchdog
 FORMAT = 1
 GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
 SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
-# Sphere diameters: a centre on the other's surface. Beyond it a contact's direction soon turns round, and pushes bodies
-# on through each other; shaking at Γ = 10, draft, reaches 0.26.
+# Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
+# slip through each other; shaking at Γ = 10, draft, reaches 0.4.
 DEPTH_LIMIT = 0.5
 # Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
 # results resolves.

@@ -23,7 +23,8 @@ class Watchdog:
     """Limits that no smarticle may pass.
 
     Args:
-        cylinder: the container; a centre of mass beyond its wall has escaped, one above it has been thrown out.
+        cylinder: the container; who has a sphere's centre beyond its wall or under its floor has escaped, whose centre
+            of mass is above it has been thrown out.
         speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
         gap: [m]; a hinge whose links are farther apart is broken.
         depth: [m]; contacts that overlap by more no longer keep bodies apart.
@@ -39,12 +40,21 @@ class Watchdog:
     _ceiling: float = math.inf
 
     def check(
-        self, state: State, *, floor: float, time: float, raised: float | None = 0.0, gaps: Array | None = None
+        self,
+        state: State,
+        *,
+        floor: float,
+        time: float,
+        spheres: Array | None = None,
+        raised: float | None = 0.0,
+        gaps: Array | None = None,
     ) -> None:
         """Look at all smarticles once.
 
         Args:
             state: the smarticles.
+            spheres: (N, S, 3) centres of their spheres [m]; None: their centres of mass stand for them. Contacts with
+                wall and floor do not tell: from the centre on YADE takes them for shallower the deeper they are.
             floor: height of the floor [m].
             time: simulated time [s].
             raised: how far a hook may have raised smarticles [m]; None: nothing holds them, so that none escapes.
@@ -73,11 +83,16 @@ class Watchdog:
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
                 f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
             )
-        radii, height = np.full(state.count, math.inf), math.inf
+        points = positions[:, None] if spheres is None else spheres
+        above = points[..., 2] - floor
+        outside: NDArray[np.bool_] = np.less(above, 0)
+        height = math.inf
         if raised is not None:
-            radii, height = self.cylinder.radii(heights - raised), self.cylinder.height + raised
-        outside = (np.hypot(positions[:, 0], positions[:, 1]) > radii) | (heights < 0)
-        refuse(outside, time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
+            height = self.cylinder.height
+            corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
+            outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
+            height += raised
+        refuse(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
         refuse(
             heights > height,
             time,

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem.errors import RunError
 from stability.check import Check, above, below, near, says
@@ -47,6 +48,21 @@ def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:
         above("height at the end [m]", float(engine.state().positions[0, 2]), particle.radius),
         below("largest joint gap [d]", max(gaps) / d, 1.0 if articulated else 1e-9),
         below("joint gap at the end [d]", gaps[-1] / d, 0.01),
+    ]
+
+
+def tip(out: Path, *, speed: float) -> list[Check]:
+    """A barb's tip hits the floor so fast that a sphere's centre passes it, from where on YADE's floor pushes less."""
+    _, engine, recorder = watched(scene(count=1), out)
+    add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
+    push(engine, 0, velocity=(0, 0, -speed))
+    said, first = None, energy(engine)
+    while not said and engine.time < 0.05:
+        engine.advance(2)
+        said = look(engine, recorder)
+    return [
+        says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+        below("energy before over that of the start [1]", energy(engine) / first, 1.001),
     ]
 
 

@@ -118,6 +118,18 @@ def test_deep_contacts_are_named() -> None:
     )
 
 
+@pytest.mark.parametrize("where", [(0.0, 0.0, -1e-6), (0.0235, 0.0, 0.05)])
+def test_a_single_sphere_that_is_outside_is_seen(where: tuple[float, float, float]) -> None:
+    state = healthy()
+    spheres = np.repeat(state.positions[:, None], 7, axis=1)
+    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    spheres[2, 3] = [0.05, 0.0, 0.1001]  # over the rim: allowed for a barb
+    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    spheres[2, 3] = where
+    with pytest.raises(RunError, match=r"1 smarticle\(s\) \(2\): left through the wall or the floor"):
+        WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+
+
 def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
     """Energy less work [J] and what springs hold [J], look by look."""
     for energy, elastic in energies:
