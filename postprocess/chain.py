@@ -153,7 +153,8 @@ def _markdown(found: Sequence[Finding], means: pd.DataFrame, changes: pd.DataFra
         lines += [f"| variant | {' | '.join(name.rpartition(' [')[0] for name in names)} |", "| --- " * 4 + "|"]
         for variant, group in changes.groupby(VARIANT, sort=False):
             cells = [
-                f"{row['change [%]']:+.1f} ± {row['change 95 % [%]']:.1f}"
+                f"{row['change [%]']:+.1f}"
+                + (f" ± {row['change 95 % [%]']:.1f}" if math.isfinite(row["change 95 % [%]"]) else "")
                 for _, row in group.set_index("quantity").loc[names].iterrows()
             ]
             lines.append(f"| {variant} | {' | '.join(cells)} |")
