@@ -97,9 +97,8 @@ def _draw_times(
                 draw_history(axes, seeds, width, colour=COLOURS[procedure], label=LABELS[procedure])
         axes.set_ylabel(label)
         # At least so much of the axis, lest a change of one smarticle look like a fall.
-        low, high = axes.get_ylim()
         least, most = _RANGES[quantity]
-        axes.set_ylim(min(low, least), max(high, most))
+        axes.set_ylim(min(axes.dataLim.y0, least), max(axes.dataLim.y1, most))
     for axes in grid[1]:
         axes.set_xlabel("time since the wall went [s]")
     handles, labels = grid[0, 0].get_legend_handles_labels()
