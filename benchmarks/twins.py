@@ -9,6 +9,7 @@ the scatter between seeds. Nothing here is timed.
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -74,12 +75,12 @@ def packing(series: Columns) -> float:
     return float(phi[len(phi) // 2 :].mean())
 
 
-def parting(one: Columns, other: Columns) -> tuple[float, float]:
+def parting(one: Columns, other: Columns) -> tuple[float, float] | None:
     """When two runs part and how far.
 
     Returns:
         Time after the beginning of their last phase [s], and the relative difference of the kinetic energy then [1];
-        NaN where they do not part.
+        None where they do not part.
     """
     samples = min(len(one["time_s"]), len(other["time_s"]))
     for k in range(samples):
@@ -87,20 +88,20 @@ def parting(one: Columns, other: Columns) -> tuple[float, float]:
             begun = one["time_s"][one["phase"] == one["phase"][-1]][0]
             difference = abs(other["kinetic_energy_J"][k] / one["kinetic_energy_J"][k] - 1)
             return float(one["time_s"][k] - begun), float(difference)
-    return float("nan"), float("nan")
+    return None
 
 
 def row(name: str, found: Sequence[tuple[Columns, Columns]]) -> dict[str, Any]:
     """One row of the table, over seeds."""
-    parted = [parting(one, other) for one, other in found]
+    parted = [each for one, other in found if (each := parting(one, other)) is not None]
     packed = np.array([[packing(one), packing(other)] for one, other in found])
     apart = np.diff(packed, axis=1)
     return {
         "effect": name,
         "seeds [-]": len(found),
-        "runs that part [-]": np.isfinite([time for time, _ in parted]).sum(),
-        "earliest, after the phase began [s]": np.nanmin([t for t, _ in parted], initial=np.inf),
-        "kinetic energy apart by then [-]": np.nanmax([d for _, d in parted], initial=0.0),
+        "runs that part [-]": len(parted),
+        "earliest, after the phase began [s]": min((time for time, _ in parted), default=math.nan),
+        "kinetic energy apart by then [-]": max((difference for _, difference in parted), default=math.nan),
         "phi with less without, mean [-]": apart.mean(),
         "phi with less without, largest [-]": np.abs(apart).max(),
         "phi, scatter between seeds [-]": packed[:, 0].std(ddof=1),
