@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validate bench stability test lint types unit engine format lock clean
+.PHONY: help setup demo validate verify bench stability test lint types unit engine format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -23,8 +23,13 @@ demo: setup ## quick comparison with Gravish et al. 2012, figures included (4 mi
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-bench: setup ## measure speed (tens of minutes)
+verify: setup ## known answers against theory, and orders of convergence (2 min)
+	$(BIN)/smarticles verify --out out/verify-$(STAMP)
+
+bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.effects
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
 	OMP_NUM_THREADS=1 $(BIN)/python -m stability onset
