@@ -304,7 +304,8 @@ def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) 
             speed=SPEED_MARGIN * max(fall, shaking, moved),
             gap=GAP_LIMIT * scene.sphere_diameter,
             depth=DEPTH_LIMIT * scene.sphere_diameter,
-            energy=RISE_LIMIT * scene.sphere_diameter * scene.count * scene.smarticle.boxes.mass * gravity,
+            # Without gravity there is no such measure.
+            energy=RISE_LIMIT * scene.sphere_diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
         ),
         progress=progress,
         series_steps=series_steps,

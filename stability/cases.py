@@ -84,6 +84,7 @@ def _cases() -> list[Case]:
         for ratio in (0.0, 0.05, 2.0)
     ]
     cases += [
+        Case("rods that may roll", extremes.rods, {"count": 40, "radius": 0.0117}),
         Case("N = 1", extremes.one),
         Case("N = 2000", extremes.many, None, {"count": 2000, "per_layer": 500, "radius": 0.15}),
         *(

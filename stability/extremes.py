@@ -30,6 +30,14 @@ def barbs(out: Path, *, ratio: float, count: int) -> list[Check]:
     return run.sound(rest=0.05) + weight_on_floor(run, 0.02)
 
 
+def rods(out: Path, *, count: int, radius: float) -> list[Check]:
+    """Bars without barbs, little inertia about themselves, in a narrow container."""
+    data = scene(RELAX, count=count, smarticle={"aspect_ratio": 0}, container={"radius_m": radius})
+    data["phases"][0]["settle"] = {"timeout_s": 1}
+    run = whole(data, out)
+    return [*run.sound(rest=0.1), *weight_on_floor(run, 0.05)]
+
+
 def one(out: Path) -> list[Check]:
     """N = 1, poured, actuated, welded."""
     run = whole(scene(swing(0.1), RELAX, count=1), out)
