@@ -27,8 +27,8 @@ from postprocess.seeds import mean_over_seeds
 FULL = 0.7
 """A tier is filled if the pile has more than this share of its volume [-].
 
-Of a plain cylinder of r = 1.2 w, a pour has 0.74 ± 0.02 by this measure (three seeds, up to 3/4 of its height): the ball
-dips in between smarticles at the wall."""
+Of a plain cylinder of r = 1.2 w, a pour has 0.74 ± 0.02 by this measure (three seeds, up to 3/4 of its height): the
+ball dips in between smarticles at the wall."""
 
 
 def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
