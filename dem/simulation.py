@@ -77,7 +77,9 @@ class Simulation:
                 self._run_phase()
         finally:
             signal.signal(signal.SIGUSR1, before)
-        self.recorder.watch(self.engine)
+        if self.checkpointed != self.engine.time:
+            # What was just loaded has been looked at, and knows its contacts from the next step on.
+            self.recorder.watch(self.engine)
         self.recorder.series.write()
         return self._performed
 
