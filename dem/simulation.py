@@ -57,7 +57,6 @@ class Simulation:
     _began: float = field(default_factory=time.monotonic)
     _cpu_spent: float = 0.0
     _cpu_began: float = field(default_factory=time.process_time)
-    _checked: int = -1
     _stop_requested: bool = False
 
     def run(self) -> list[dict[str, Any]]:
@@ -78,7 +77,8 @@ class Simulation:
                 self._run_phase()
         finally:
             signal.signal(signal.SIGUSR1, before)
-        if self.engine.steps != self._checked:
+        if self.checkpointed != self.engine.time:
+            # What was just loaded has been looked at, and knows its contacts from the next step on.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
         return self._performed
@@ -137,10 +137,8 @@ class Simulation:
 
     def _checkpoint(self) -> None:
         saved = self.folder / ".engine.partial.yade"
-        # A checkpoint is good: the watchdog has looked at it. Nor could it look again after the reload, before the next
-        # step: YADE does not save how deep contacts are.
+        # A checkpoint is good: the watchdog has looked at it.
         self.recorder.watch(self.engine)
-        self._checked = self.engine.steps
         self._check_space()
         try:
             memory = self.engine.save(saved)
@@ -188,7 +186,6 @@ class Simulation:
             self.engine.load(saved, state["engine"])
         finally:
             saved.unlink(missing_ok=True)
-        self._checked = self.engine.steps
         self.checkpointed = self.engine.time
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]

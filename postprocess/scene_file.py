@@ -31,15 +31,22 @@ class Settings:
     place: str = ""
     values: Mapping[str, Any]
 
-    def number(self, key: str) -> float:
+    def number(self, key: str, *, positive: bool = False) -> float:
         """A number.
 
+        Args:
+            key: Its key.
+            positive: Whether it must be above 0.
+
         Raises:
-            InputError: The scene does not say it, or it is no finite number.
+            InputError: The scene does not say it, or it is no such number.
         """
         value = self.values.get(key)
+        kind = "a finite number above 0" if positive else "a finite number"
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            refuse("scene", self.path, f"{self.place}{key} must be a finite number: got {value!r}", _REMEDY)
+            refuse("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
+        if positive and value <= 0:
+            refuse("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
         return float(value)
 
     def part(self, key: str) -> Settings | None:
@@ -144,7 +151,7 @@ def read_tiers(directory: Path | str) -> tuple[Cylinder, ...]:
     container = read_scene(directory).part("container")
     found, bottom = [], 0.0
     for tier in container.parts("tiers") if container is not None else ():
-        top = bottom + tier.number("height_m")
-        found.append(Cylinder(radius=tier.number("radius_m"), bottom=bottom, top=top))
+        top = bottom + tier.number("height_m", positive=True)
+        found.append(Cylinder(radius=tier.number("radius_m", positive=True), bottom=bottom, top=top))
         bottom = top
     return tuple(found)

@@ -86,6 +86,7 @@ def _cases() -> list[Case]:
     cases += [
         Case("rods that may roll", extremes.rods, {"count": 40, "radius": 0.0117}),
         Case("N = 1", extremes.one),
+        Case("checkpoint at the last step", extremes.checkpoint_last),
         Case("N = 2000", extremes.many, None, {"count": 2000, "per_layer": 500, "radius": 0.15}),
         *(
             Case(f"friction {value:g}", extremes.friction, {"value": value, "count": 6}, {"count": 100})

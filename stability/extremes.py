@@ -52,6 +52,13 @@ def one(out: Path) -> list[Check]:
     return checks
 
 
+def checkpoint_last(out: Path) -> list[Check]:
+    """A run whose last step is that of a checkpoint: what was just loaded has no contacts to look at yet."""
+    recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
+    run = whole(scene(RELAX, count=2, recording=recording), out)
+    return [*run.sound(), *weight_on_floor(run, 0.02)]
+
+
 def many(out: Path, *, count: int, per_layer: int, radius: float) -> list[Check]:
     """Very many in a wide container."""
     run = whole(scene(RELAX, count=count, per_layer=per_layer, container={"radius_m": radius}), out)

@@ -114,5 +114,5 @@ def test_runs_of_other_moulds_are_refused(runs, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="runs of different mould must not be averaged"):
         analyse([runs[0], other], tmp_path / "out", **ORIGIN)
     bad = write_released(tmp_path / "bad", "static", **kept, tiers=[{"radius_m": 0.01, "height_m": -1}])
-    with pytest.raises(InputError, match=r"container.tiers.0 must have radius_m and height_m > 0"):
+    with pytest.raises(InputError, match=r"container.tiers.0.height_m must be a finite number above 0: got -1"):
         read_tiers(bad)
