@@ -37,8 +37,8 @@ def test_every_effect_that_costs_anything_is_measured_in_a_pair() -> None:
         ]
         switched |= on[1] - on[0]
     named = {name for pair in PAIRS for name in (pair.effect, *pair.effect.split(" and "))}
-    # Numbers of the contact law cost the same whatever they are; a pile without its wall is another pile, and a chain in
-    # a plane no pile at all.
+    # Numbers of the contact law cost the same whatever they are; a pile without its wall is another pile, and a chain
+    # in a plane no pile at all.
     left_out = {"contact", "gravity", "friction", "restitution", "wall removal", "container", "plane", "strings"}
     assert {effect.name for effect in EFFECTS} - left_out <= named
     assert {"hooks", "energies", "energy account", "sphere glyphs", "checkpoints", "motors"} <= switched
