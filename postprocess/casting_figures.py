@@ -112,7 +112,8 @@ def _draw_places(axes: Axes, points: pd.DataFrame, columns: Sequence[str]) -> No
         # Side by side, to keep error bars apart.
         x = np.arange(len(columns)) + 0.16 * (k - 1)
         draw_means(axes, x, values, errors, look={**look, "linestyle": "none"}, label=_LABELS[procedure])
-    axes.set_ylim(0, 1.05)
+    # Error bars of a share may reach beyond 0 and 1; they are shown whole.
+    axes.set_ylim(min(1.05 * axes.dataLim.y0, 0.0), max(1.02 * axes.dataLim.y1, 1.05))
     axes.set_xlim(-0.5, len(columns) - 0.5)
 
 
