@@ -16,7 +16,7 @@ import numpy as np
 
 from dem.engine import Engine
 from dem.placement import place_layer
-from dem.run import _build_engine
+from dem.run import build_engine
 from dem.scene import Scene, parse_scene
 from dem.timestep import time_step
 
@@ -52,7 +52,7 @@ def plain_scene(count: int) -> Scene:
 def engine_with(count: int) -> Engine:
     """Smarticles that have come to rest on the floor."""
     scene = plain_scene(count)
-    engine = _build_engine(scene, time_step(scene))
+    engine = build_engine(scene, time_step(scene))
     engine.add(
         place_layer(
             scene.particle,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import dem.run
@@ -11,6 +12,9 @@ from dem.assembly import SMARTICLE_MATERIAL
 from dem.container import WALL_MATERIAL
 from dem.engine import Engine
 from dem.errors import RunError
+from dem.recorder import Recorder
+from dem.rundir import FAILED
+from dem.scene import Scene
 from dem.timestep import stable_step
 from stability.check import Check, below, says
 from stability.hand import fastest, look, lying, watched
@@ -78,7 +82,7 @@ def _put(engine: Engine, what: str) -> None:
         body.pos = vector(*places[what])
 
 
-def _resting(out: Path, count: int) -> tuple[Engine, dem.run.Recorder]:
+def _resting(out: Path, count: int) -> tuple[Engine, Recorder]:
     """Smarticles in a low stack that has come to rest, and a recorder that has seen it."""
     described, engine, recorder = watched(scene(count=count), out)
     for k in range(count):
@@ -142,9 +146,10 @@ def wrong_step(out: Path, *, factor: float, count: int, seconds: float) -> list[
     ]
 
 
-def _too_long(described: dem.run.Scene, factor: float) -> float:
+def _too_long(described: Scene, factor: float) -> float:
     control = described.fidelity.control_interval_s
-    return control / max(1, math.floor(control / (factor * stable_step(described))))
+    step: float = control / max(1, math.floor(control / (factor * stable_step(described))))
+    return step
 
 
 def late(out: Path) -> list[Check]:
@@ -159,8 +164,7 @@ def late(out: Path) -> list[Check]:
 
     with patch.object(Engine, "advance", spoilt):
         run = whole(data, out)
-    failed = dem.run.FAILED
-    text = (out / failed).read_text(encoding="utf-8") if (out / failed).exists() else None
+    text = (out / FAILED).read_text(encoding="utf-8") if (out / FAILED).exists() else None
     return [
         says(run.text, "1 smarticle(s) (2): a speed above", "(last good checkpoint: t = 0.5000 s)"),
         says(text, '"status": "failed"', '"checkpoint_s": 0.'),
@@ -169,7 +173,7 @@ def late(out: Path) -> list[Check]:
 
 def cost(out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
     """What all looks of the watchdog take of the processor time of a whole run."""
-    phases = {
+    phases: dict[str, dict[str, Any]] = {
         "at rest": {"type": "relax"},
         "shaken": {"type": "shake", "frequency_hz": 30, "peak_acceleration_g": 2},
         "swinging": {"type": "internal-oscillation", "theta_deg": 10},

@@ -81,7 +81,8 @@ class Watched:
 
     def during(self, phase: int) -> np.ndarray:
         """Which samples belong to a phase."""
-        return self.series["phase"] == phase
+        during: np.ndarray = self.series["phase"] == phase
+        return during
 
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
         """What holds of every run that ended right.

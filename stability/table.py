@@ -98,4 +98,4 @@ def run_cases(out: Path, *, form: Size, only: Sequence[str], again: bool) -> boo
             print(f"       {row['what is checked']}: {row['measured']}, to be {row['limit']}", flush=True)
     bad = table[(table["verdict"] == "BAD") & table["case"].isin(chosen)]
     print(f"{table['case'].nunique()} cases in {path}; of those asked for {bad['case'].nunique()} are BAD")
-    return bad.empty
+    return bool(bad.empty)

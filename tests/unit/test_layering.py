@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("cli", "dem", "postprocess", "templates", "verification")
+PACKAGES = ("cli", "dem", "postprocess", "stability", "templates", "verification")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
@@ -89,6 +89,11 @@ def test_verification_knows_the_simulator_and_draws_nothing() -> None:
     for path in of("verification"):
         found = names(path)
         assert not among(found, "yade", "pyvista", "vtk", "matplotlib", "postprocess", "templates", "cli"), path
+
+
+def test_stability_knows_the_simulator_and_its_bench() -> None:
+    for path in of("stability"):
+        assert not among(names(path), "yade", "pyvista", "vtk", "postprocess", "templates", "cli"), path
 
 
 def test_templates_know_only_the_scene() -> None:
