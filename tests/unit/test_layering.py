@@ -93,7 +93,9 @@ def test_verification_knows_the_simulator_and_draws_nothing() -> None:
 
 def test_stability_knows_the_simulator_and_its_bench() -> None:
     for path in of("stability"):
-        assert not among(names(path), "yade", "pyvista", "vtk", "postprocess", "templates", "cli"), path
+        # Its figure is drawn from a table, in a process of its own.
+        allowed = {"postprocess.figures"} if path.name == "figure.py" else set()
+        assert not among(names(path), "yade", "pyvista", "vtk", "postprocess", "templates", "cli") - allowed, path
 
 
 def test_templates_know_only_the_scene() -> None:
