@@ -50,7 +50,7 @@ def measure_strain(yade: Yade, assembly: Assembly, law: ContactLaw, limit: float
             if not contact.geom.penetrationDepth <= limit:
                 number = map(assembly.smarticle_of.get, (contact.id1, contact.id2))
                 deep[[k for k in number if k is not None]] = True
-    normal = law.normal_stiffness / 2 * float((np.maximum(depths, 0.0) ** 2).sum())
+    normal = law.normal_stiffness / 2 * float((np.fmax(depths, 0.0) ** 2).sum())
     # Friction bounds what tangential springs hold by what normal ones do.
     friction = max(law.friction, law.wall_friction)
     tangential = friction**2 * law.normal_stiffness / law.tangential_stiffness * normal
