@@ -299,6 +299,13 @@ class Engine:
             self.strings = None
 
     @property
+    def motor_work(self) -> float:
+        """Work of all motors on the links since the start, up to now [J]."""
+        if self.motors is None:
+            return 0.0
+        return self.motors.work_until(self._hinges.angles()) if self.articulated else float(self.motors.work.sum())
+
+    @property
     def _hinges(self) -> Hinges:
         assert self._assembly.hinges is not None
         return self._assembly.hinges

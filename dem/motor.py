@@ -96,7 +96,7 @@ class Motors:
         # A torque that is set now acts from the middle of the step on: the leapfrog scheme changes velocities there. In
         # between the torque is linear in the angle, so that the trapezium is exact.
         middle = angles + (angles - self.angles) * (time_step / interval / 2)
-        self.work += (self._torque(self._begun) + self._torque(middle)) / 2 * (middle - self._begun)
+        self.work += self._work_since_look(middle)
         self._begun = middle
         most = self.law.speed_limit * interval
         advance = np.clip(targets - self.commands, -most, most)
@@ -111,6 +111,14 @@ class Motors:
             self._rates = rates
         self.torques = self._torque(angles)
         return self.torques
+
+    def work_until(self, angles: Array) -> float:
+        """Work of all motors since the start, up to (N, 2) angles that the barbs have between two looks [J]."""
+        return float((self.work + self._work_since_look(angles)).sum())
+
+    def _work_since_look(self, angles: Array) -> Array:
+        work: Array = (self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun)
+        return work
 
     def _torque(self, angles: Array) -> Array:
         torque = self._stiffness * (self.commands - angles)

@@ -88,7 +88,7 @@ class Recorder:
         )
         strain = engine.strain(watchdog.depth)
         watchdog.check_depths(strain, time=time)
-        given = engine.account.given + (0.0 if engine.motors is None else float(engine.motors.work.sum()))
+        given = engine.account.given + engine.motor_work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
         watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
 

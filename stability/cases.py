@@ -58,6 +58,7 @@ def _cases() -> list[Case]:
         for hinged in (False, True)
     ]
     cases += [
+        Case("articulated smarticles land", violence.landing, {"time": 0.2}),
         Case("tip through the floor", violence.tip, {"speed": 2.0}),
         Case("deep overlap", violence.overlap, {"time": 0.1}, {"time": 0.5}),
         Case("deep overlap, thrown out", violence.thrown_by_overlap, {"time": 0.1}),

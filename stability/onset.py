@@ -167,9 +167,9 @@ def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, flo
             if engine.articulated:
                 engine.actuate(held, interval)
             engine.advance(round(interval / dt))
-        state, work = engine.state(), 0.0 if engine.motors is None else float(engine.motors.work.sum())
+        state = engine.state()
         total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())
-        yield engine.time, state.kinetic_energy, total - work
+        yield engine.time, state.kinetic_energy, total - engine.motor_work
 
 
 def climb(name: str, seed: int) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from dem.errors import RunError
 from stability.check import Check, above, below, near, says
 from stability.hand import TILTED, energy, fastest, look, lying, watched
-from stability.runs import whole
+from stability.runs import Noting, whole
 from stability.scenes import scene, shape_change
 from verification.bench import add, push
 
@@ -63,6 +63,28 @@ def tip(out: Path, *, speed: float) -> list[Check]:
     return [
         says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
         below("energy before over that of the start [1]", energy(engine) / first, 1.001),
+    ]
+
+
+def landing(out: Path, *, time: float) -> list[Check]:
+    """Articulated smarticles fall in a heap, their motors taking ten times τ_max for a moment: no false alarm."""
+    described, engine, recorder = watched(scene(shape_change(1.5), count=4), out)
+    limits = recorder.watchdog
+    recorder.watchdog = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
+    Noting.nearest = {}
+    for k in range(4):
+        add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
+    engine.articulate()
+    held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
+    while not said and engine.time < time:
+        engine.actuate(held, interval)
+        engine.advance(round(interval / engine.time_step))
+        hardest = max(hardest, float(np.abs(engine.motors.torques).max()) / described.torque_limit)
+        said = look(engine, recorder)
+    return [
+        Check("the watchdog says", said or "nothing", "nothing", said is None),
+        above("largest torque over τ_max [1]", hardest, 3.0),
+        below("energy from nowhere over the watchdog's limit [1]", Noting.nearest["energy"], 0.25),
     ]
 
 
