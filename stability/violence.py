@@ -75,6 +75,7 @@ def landing(out: Path, *, time: float) -> list[Check]:
     for k in range(4):
         add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
     engine.articulate()
+    assert engine.motors is not None  # articulated smarticles have them
     held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
     while not said and engine.time < time:
         engine.actuate(held, interval)
