@@ -28,6 +28,7 @@ from postprocess.accuracy_runs import (
     VERDICT,
     Rung,
     accuracy_row,
+    measured,
     work_precision,
 )
 from postprocess.manifest import RunManifest
@@ -53,7 +54,7 @@ TABLE = "work_precision"
 """Name of the table, without suffix."""
 
 _STUDY = "accuracy"
-_FORMS = {"phi_0": ".4f", "phi_f": ".4f", "height": ".2e", "crossings": ".2f"}
+_FORMS = {"phi_0": ".4f", "phi_f": ".4f", "height": ".2e", "crossings": ".2f", "hook_force": ".2f"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,15 +150,17 @@ def _named(table: pd.DataFrame) -> Reference:
 def told_rungs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of work and precision for a person to read."""
     header = ["knob", "value", "seeds", "cpu s per s", "± SE"]
-    for symbol in SYMBOLS.values():
-        header += [symbol, "error %"]
+    names = measured(table)
+    for name in names:
+        header += [SYMBOLS[name], "error %"]
     more = {RESIDUAL: "energy residual", GAP: "joint gap [m]"}
     shown = {column: label for column, label in more.items() if table[column].notna().any()}
     rows = []
     for _, row in table.iterrows():
         cells = [str(row[KNOB]), label(row), str(row[SEEDS])]
         cells += [_number(row[COST], ".3g"), _number(row[marked(COST, "SE")], ".2g")]
-        for name, column in COMPARED.items():
+        for name in names:
+            column = COMPARED[name]
             value, error, form = row[column], row[marked(column, "SE")], _FORMS[name]
             cells.append(_number(value, form) + (f" ± {error:{form}}" if math.isfinite(error) else ""))
             cells.append("reference" if row[VERDICT] == IS_REFERENCE else told_error(row, name))

@@ -152,7 +152,8 @@ def told_error(row: pd.Series, name: str) -> str:
 
 def told_errors(row: pd.Series) -> str:
     """All errors of a rung."""
-    return ", ".join(f"{symbol} {told_error(row, name)} %" for name, symbol in SYMBOLS.items())
+    errors = {name: told_error(row, name) for name in SYMBOLS}
+    return ", ".join(f"{SYMBOLS[name]} {error} %" for name, error in errors.items() if error != "-")
 
 
 def told_closing(advice: Sequence[Advice], table: pd.DataFrame) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from postprocess import figures
-from postprocess.accuracy_runs import COMPARED, COST, IS_REFERENCE, KNOB, VERDICT
+from postprocess.accuracy_runs import COST, IS_REFERENCE, KNOB, VERDICT, measured
 from postprocess.procedures_runs import marked
 from postprocess.study_figures import draw_means, finished, marker
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 4.6
 _COLUMNS = 2
 _SYMBOLS = {"phi_0": r"$\phi_0$", "phi_f": r"$\phi_\mathrm{f}$", "height": "$h_0$", "crossings": r"$\langle N\rangle$"}
+_SYMBOLS |= {"hook_force": r"$F_\mathrm{peak}$"}
 _LOOKS = (
     ("o", figures.BLUE),
     ("s", figures.ORANGE),
@@ -48,8 +49,11 @@ def draw(path: Path, *, table: pd.DataFrame, footer: Sequence[str]) -> list[Path
     """
     with figures.style():
         figure = figures.blank_figure(_WIDTH, _HEIGHT)
-        panels = list(figure.subplots(math.ceil(len(COMPARED) / _COLUMNS), _COLUMNS, sharex=True).flat)
-        for axes, name in zip(panels, COMPARED, strict=True):
+        names = measured(table)
+        panels = list(figure.subplots(math.ceil(len(names) / _COLUMNS), _COLUMNS, sharex=True).flat)
+        for axes in panels[len(names) :]:
+            axes.remove()
+        for axes, name in zip(panels, names, strict=False):
             _draw_panel(axes, name, table)
         shown = {
             label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)

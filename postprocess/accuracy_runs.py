@@ -18,6 +18,7 @@ from dem.errors import InputError
 from postprocess.manifest import RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import marked
+from postprocess.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
 from postprocess.series import read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, VARIANT, duration, variant_of
@@ -43,15 +44,18 @@ COMPARED: Mapping[str, str] = MappingProxyType(
         "phi_f": f"phi_f {DEFINITION} [-]",
         "height": "com height [m]",
         "crossings": "crossings [-]",
+        "hook_force": "peak hook force over n W_s [-]",
     }
 )
-"""What errors are told of: its name, and its column in the table of runs.
+"""What errors are told of where runs have it: its name, and its column in the table of runs.
 
 A packing fraction hangs on one smarticle near the top; the height of the centre of mass, before the first activity, is
 a mean over all of them and scatters half as much.
 """
 
-SYMBOLS: Mapping[str, str] = MappingProxyType({"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩"})
+SYMBOLS: Mapping[str, str] = MappingProxyType(
+    {"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩", "hook_force": "F_peak"}
+)
 
 RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "reference", "unknown"
 """Verdicts: an error beyond its seed-to-seed band; none that is; the reference itself; no band, or no runs."""
@@ -121,6 +125,7 @@ def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str,
         f"phi_f {DEFINITION} SE in run [-]": after[f"{phi} SE [-]"],
         COMPARED["height"]: before["com height [m]"],
         COMPARED["crossings"]: after["crossings mean [-]"],
+        COMPARED["hook_force"]: _peak_force(run),
         **_of_series(run),
         "escaped at the end [-]": after["escaped [-]"],
         "frames averaged [-]": int(table["frames averaged"].min()),
@@ -131,6 +136,22 @@ def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str,
 
 def _or_nan(number: float | None) -> float:
     return math.nan if number is None else number
+
+
+def _peak_force(run: RunManifest) -> float:
+    """Of the first hook that is pulled, over the weight of all smarticles [-]; NaN where none is."""
+    pulled = [phase.index for phase in run.phases if phase.type == PULL]
+    if not pulled or not (run.directory / "series.h5").exists():
+        return math.nan
+    series = read_series(run.directory)
+    if not has_pull(series, pulled[0]):
+        return math.nan
+    return peak(read_pull(run, series, pulled[0])).force / (run.count * weight_of_one(run))
+
+
+def measured(table: pd.DataFrame) -> tuple[str, ...]:
+    """Keys of `COMPARED` that any run of a table of work and precision has, a pile always."""
+    return tuple(name for name, column in COMPARED.items() if name != "hook_force" or table[column].notna().any())
 
 
 def _of_series(run: RunManifest) -> dict[str, float]:

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from hooked import weight, write_hooked_run
 from PIL import Image
 from synthetic import SyntheticRun, write_run
 
@@ -53,6 +54,7 @@ def table_of(phi_f, rungs=STEPS, *, phi_0=None):
             **{COMPARED["phi_0"]: (phi_0 or {}).get(setting, 0.1) + 1e-3 * seed, COMPARED["phi_f"]: value},
             COMPARED["height"]: 3e-3 + 1e-4 * seed,
             COMPARED["crossings"]: 3.0 + 0.1 * seed,
+            COMPARED["hook_force"]: math.nan,
         }
         for setting, values in phi_f.items()
         for seed, value in enumerate(values, start=1)
@@ -277,6 +279,28 @@ def test_a_ladder_with_one_seed_is_drawn_without_a_band(ladder, tmp_path):
     assert "seed-to-seed band, 95 %" not in report.files["accuracy.svg"].read_text()
     assert report.closing.startswith("Nothing can be recommended yet")
     assert report.table[EXPECTED].isna().all()
+
+
+def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path):
+    # In units of the weight of one smarticle: constant forces, so that the peak is known.
+    phases = ("deposit", "relax", "shake", "pull-hook")
+    directories = []
+    for setting, load in {"base": 3.0, "quarter": 2.0}.items():
+        for seed in (1, 2):
+            made = run(phases=phases, seed=seed, packing=(0.1,) * 4)
+            force = weight(made) * (load + 0.1 * seed)
+            directories.append(
+                write_hooked_run(
+                    tmp_path / f"{setting}_seed{seed}", made, lambda time, force=force: np.full_like(time, force)
+                )
+            )
+    report = analyse_accuracy(directories, tmp_path / "out", rungs=STEPS, **ORIGIN)
+    table = report.table.set_index(VARIANT)
+    assert table.loc["base", COMPARED["hook_force"]] == pytest.approx(3.15 / run().count)
+    assert table.loc["base", "hook_force error [%]"] == pytest.approx(100 * (3.15 / 2.15 - 1))
+    assert table.loc["base", "hook_force resolved"]
+    assert "F_peak" in (tmp_path / "out" / "accuracy.md").read_text()
+    assert "nan" not in report.closing
 
 
 @pytest.mark.parametrize(
