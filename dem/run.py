@@ -48,7 +48,7 @@ DEPTH_LIMIT = 0.5
 RISE_LIMIT = 0.5
 # Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
 # step, so steps are the measure.
-WATCH_STEPS = 300
+WATCH_STEPS = 500
 
 
 @dataclass(frozen=True)
