@@ -78,9 +78,9 @@ The end of the output's name decides: .png is a picture; .gif, .webp and .mp4 ar
     render.add_argument("--time", type=float, metavar="S", help="simulated time [s]; default: end")
     render.add_argument(
         "--color-by",
-        default="crossings",
         metavar="WHAT",
-        help="crossings (default; links of others through its plane), contacts, height, speed, id",
+        help="crossings (default; links of others through its plane), contacts, height, speed, id (default of motion "
+        "in a plane)",
     )
     render.add_argument("--view", metavar="VIEW", help="front (default; of motion in a plane: top), oblique, top")
     render.add_argument(

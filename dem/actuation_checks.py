@@ -46,10 +46,10 @@ def check_actuation(scene: Scene) -> None:
 
 
 def overshoot(scene: Scene) -> float:
-    """Torque over τ_max that one look of a motor can add before the motor notices and halts [1]; 0 for law slip."""
+    """Torque over τ_max that one look of a motor can add before it notices and halts [1]; 0 where it is capped."""
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
-    return 0.0 if motor.law == "slip" else added / scene.torque_limit
+    return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
 
 
 def actuation_warnings(scene: Scene) -> tuple[str, ...]:

@@ -43,6 +43,8 @@ def strings(scene: Scene) -> Call:
 
 def gravity(scene: Scene) -> Call:
     """Weight."""
+    if scene.plane is not None:
+        return scene.gravity_m_per_s2 > 0, "the table carries it, and nothing moves along it"
     return scene.gravity_m_per_s2 > 0, f"g = {scene.gravity_m_per_s2:g} m/s²"
 
 

@@ -177,6 +177,13 @@ def check_chain(scene: Scene) -> None:
             f"{mouth - d:.4g} m; use a smaller gap or thinner links"
         )
         raise ValueError(msg)
+    for index, phase in enumerate(scene.phases):
+        if isinstance(phase, Strain) and phase.string_length_m < chain.width:
+            msg = (
+                f"phases.{index}.string_length_m: {phase.string_length_m:g} m does not reach the axis from a barb of a "
+                f"chain that is h = {chain.width:.4g} m wide; use at least {chain.width:.4g} m"
+            )
+            raise ValueError(msg)
     width = scene.plane.width_m
     if width is None:
         return

@@ -72,9 +72,9 @@ class Plan:
         for phase in self.phases:
             guess = "" if phase.duration_s is not None else "≈ "
             label = f"{phase.index} {phase.type}"
-            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{f'{phase.wall_s:.0f} s':>22}")
+            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_told(phase.wall_s):>22}")
         lines += [
-            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{f'{self.wall_s:.0f} s':>22}",
+            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_told(self.wall_s):>22}",
             "(one core; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why, and what it adds",
@@ -85,6 +85,11 @@ class Plan:
         lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+
+def _told(wall: float) -> str:
+    """A wall time for a person: tenths of seconds where seconds would say nothing."""
+    return f"{wall:.1f} s" if wall < 10 else f"{wall:.0f} s"
 
 
 def plan(scene: Scene) -> Plan:

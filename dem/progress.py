@@ -54,7 +54,8 @@ class Progress:
 
     def warn(self, message: str) -> None:
         """Tell the person at the terminal at once."""
-        sys.stderr.write(f"\r\x1b[Ksmarticles: warning: {message}\n")
+        start = "\r\x1b[K" if self.show else ""
+        sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
+from dem.chain import Strain
 from dem.errors import InputError
 from dem.hinges import HingeLaw
 from dem.particle import LINKS, Boxes, Particle
@@ -173,16 +174,20 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
     return min(steps)
 
 
-def planar_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
+def planar_stable_time_step(
+    particle: Particle, law: ContactLaw, hinges: HingeLaw, strings: Sequence[tuple[float, float]] = ()
+) -> float:
     """The same for smarticles that lie flat in a plane, where none lies on another.
 
     The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
-    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it.
+    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it;
+    and a barb with a string at its tip.
 
     Args:
         particle: one smarticle.
         law: contact law.
         hinges: stiffness of the hinges.
+        strings: stiffness [N/m] and damping [N s/m] of each.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)
@@ -193,6 +198,9 @@ def planar_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
         shape = _push_shape(particle, np.flatnonzero(particle.links == link), across)
         stiffness = pins + contacts * law.normal_stiffness * shape
         steps.append(_stable_step(mass, stiffness, contacts * damping * shape + twisted))
+    tip = _velocity_of(boxes, 0, boxes.vertices[0])[:2]
+    for pulled, damping in strings:
+        steps.append(_stable_step(mass, pins + pulled * tip.T @ tip, damping * tip.T @ tip + twisted))
     return min(steps)
 
 
@@ -288,7 +296,12 @@ def stable_step(scene: Scene) -> float:
     law = contact_law(scene)
     stable = stable_time_step(scene.particle, law)
     if scene.actuates and scene.plane is not None:
-        return planar_stable_time_step(scene.particle, law, hinge_law(scene))
+        strings = [
+            (phase.string_stiffness_N_per_m, phase.string_damping_N_s_per_m)
+            for phase in scene.phases
+            if isinstance(phase, Strain)
+        ]
+        return planar_stable_time_step(scene.particle, law, hinge_law(scene), strings)
     if scene.actuates:
         stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
     return stable
@@ -316,7 +329,7 @@ def time_step(scene: Scene) -> float:
         # A damper that acts a period late drives vibrations that are faster than the period.
         msg = (
             f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
-            f"each; use at most {wanted:.3g} s"
+            f"each; use at most {wanted:.3g} s, or softer contacts, servos and strings"
         )
         raise InputError(msg)
     return whole / steps

@@ -28,7 +28,7 @@ def render_run(
     *,
     output: Path | str | None = None,
     time: float | None = None,
-    color_by: str = "crossings",
+    color_by: str | None = None,
     size: tuple[int, int] = (1200, 1200),
     view: str | None = None,
     overwrite: bool = False,
@@ -42,7 +42,7 @@ def render_run(
         directory: A run directory with at least one frame; the run need not be done.
         output: File to write, `.png`; `render.png` in the run directory if not given.
         time: Simulated time [s], the nearest frame is taken; the last one if not given.
-        color_by: Key of `COLOURINGS`.
+        color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
         size: Width and height [pixel].
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         overwrite: Whether an existing file may be replaced.
@@ -60,7 +60,7 @@ def render_run(
     """
     output = _checked_output(directory, output, "render.png", (".png",), overwrite=overwrite)
     run = read_run(directory)
-    look = Look.checked(color_by=color_by, size=size, view=view or _usual_view(run))
+    look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
     frames = read_frames(directory)
     frame = frames[_frame_at(frames, time)]
     values = look.colouring.values(frame)
@@ -76,7 +76,7 @@ def render_film(
     directory: Path | str,
     output: Path | str | None = None,
     *,
-    color_by: str = "crossings",
+    color_by: str | None = None,
     size: tuple[int, int] = (720, 720),
     view: str | None = None,
     frames_per_second: float = 15.0,
@@ -90,7 +90,7 @@ def render_film(
         output: File to write: `.gif` or `.webp`, which need nothing further, or `.mp4`, which
             needs the packages imageio and imageio-ffmpeg; `film.gif` in the run directory if not
             given.
-        color_by: Key of `COLOURINGS`.
+        color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
         size: Width and height [pixel]; for `.mp4` even numbers.
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         frames_per_second: Of the film.
@@ -106,7 +106,7 @@ def render_film(
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS, overwrite=overwrite)
     run = read_run(directory)
-    look = Look.checked(color_by=color_by, size=size, view=view or _usual_view(run))
+    look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
     if not (math.isfinite(frames_per_second) and frames_per_second > 0 and most_frames >= 2):
         msg = (
             "a film needs frames_per_second above 0 1/s and most_frames of at least 2: "
@@ -137,6 +137,10 @@ def render_film(
         samples = [picture(number) for number in sorted({0, len(shown) // 3, 2 * len(shown) // 3, len(shown) - 1})]
         film.write_film(temporary, map(picture, range(len(shown))), frames_per_second, samples)
     return output
+
+
+def _usual_colour(run: RunManifest) -> str:
+    return "id" if run.planar else "crossings"
 
 
 def _usual_view(run: RunManifest) -> str:

@@ -251,6 +251,9 @@ class Stage:
         run = self._run
         count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
         phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
+        title = run.name, f"l/w = {run.aspect_ratio:g}   N = {count}   t = {frame.time:.3f} s ({phase})"
+        if run.planar:
+            return (*title, "")  # neither packing nor crossings have a meaning there
         packing = "φ undefined"
         with suppress(UndefinedMeasureError):
             if run.fills_cylinder(frame.phase):
@@ -263,11 +266,7 @@ class Stage:
                 packing = f"φ = {phi.value:.3f} (definition {phi.definition})"
         mean = entanglement(frame.vertices).mean
         crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "⟨N⟩ undefined"
-        return (
-            run.name,
-            f"l/w = {run.aspect_ratio:g}   N = {count}   t = {frame.time:.3f} s ({phase})",
-            f"{packing}   {crossings}",
-        )
+        return (*title, f"{packing}   {crossings}")
 
     def _composed(self, panel: NDArray[np.uint8], caption: tuple[str, str, str]) -> Image.Image:
         """The drawn panel with its caption and colour bar."""

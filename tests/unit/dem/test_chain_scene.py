@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from dem.actuation_checks import overshoot
 from dem.chain import chain_of, parted
 from dem.errors import InputError
 from dem.motor import MotorLaw, Motors
@@ -15,7 +16,7 @@ from dem.plan import plan
 from dem.scene import Scene, dump_scene, parse_scene
 from dem.state import State
 from dem.strings import StringLaw
-from dem.timestep import time_step
+from dem.timestep import stable_step, time_step
 
 
 def chain(**changes: Any) -> Scene:
@@ -103,6 +104,10 @@ def test_a_chain_has_parted_when_a_line_separates_two_neighbours() -> None:
         ({"plane__width_m": 0.062}, "plane.width_m: H = 0.062 m leaves no room for a chain that is h = 0.062 m wide"),
         ({"plane__width_m": 0.16}, "is beyond the stroke of the servos: the chain gets no wider than 0.1401 m"),
         ({"plane": None}, "phases.0: arrange needs motion confined to a plane; add the key plane"),
+        (
+            {"phases__1__string_length_m": 0.001},
+            "phases.1.string_length_m: 0.001 m does not reach the axis from a barb of a",
+        ),
         ({"count": 1}, "count: 1 is no chain; use at least 2"),
         ({"phases__1": {"type": "shake"}}, "phases.1: shake has no meaning in a plane; use arrange, strain, relax"),
         ({"phases__0": {"type": "relax"}}, "phases.0: relax; a run in a plane starts with one 'arrange'"),
@@ -127,6 +132,24 @@ def test_a_servo_must_look_at_every_step() -> None:
     assert time_step(chain()) == pytest.approx(1e-4)
     with pytest.raises(InputError, match=r"fidelity.control_interval_s: 0.0005 s is 5 time steps, but a servo"):
         time_step(chain(fidelity__control_interval_s=5e-4))
+
+
+def test_a_stiff_string_shortens_the_stable_step() -> None:
+    # A string whose mode is far above all others rules alone: the step goes as the square root of its softness.
+    usual, steps = stable_step(chain()), []
+    for stiffness in (1e9, 4e9):
+        steps.append(
+            stable_step(chain(phases__1__string_stiffness_N_per_m=stiffness, phases__1__string_damping_N_s_per_m=0))
+        )
+    assert steps[0] < usual / 30
+    assert steps[0] / steps[1] == pytest.approx(2, rel=1e-3)
+    assert stable_step(chain(phases__1__string_damping_N_s_per_m=1e6)) < usual / 1e3
+    with pytest.raises(InputError, match="or softer contacts, servos and strings"):
+        time_step(chain(phases__1__string_stiffness_N_per_m=1e9))
+
+
+def test_a_servo_is_capped_and_so_not_warned_of() -> None:
+    assert overshoot(chain(motor__torque_limit_N_m=1e-9)) == 0
 
 
 def test_strengths_are_drawn_from_the_seed_within_the_spread() -> None:
