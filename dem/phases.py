@@ -100,8 +100,9 @@ class Shaking:
         if self._freed and engine.fixtures.walled:
             edge = engine.fixtures.wall_bottom - engine.floor
             msg = (
-                f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was not "
-                "clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its speed_m_per_s"
+                f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
+                "not clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its "
+                "speed_m_per_s"
             )
             raise RunError(msg)
         self.memory["begun"] = True
