@@ -99,6 +99,6 @@ def test_a_column_collapses_and_the_account_of_energies_closes(
 
 def test_a_wall_that_hangs_in_the_pile_is_told(simulate: Simulate, scene_data: SceneData) -> None:
     assert simulate(base_cases.shake_under_a_hanging_wall, scene_data()) == (
-        "the wall is still around the pile, its edge 0.00066 m over the floor that is to be shaken: it was not clear of "
-        "the pile when remove-container ended; lengthen that phase's duration_s or raise its speed_m_per_s"
+        "the wall is still around the pile, its edge 0.00066 m over the floor that is to be shaken: it was not clear "
+        "of the pile when remove-container ended; lengthen that phase's duration_s or raise its speed_m_per_s"
     )
