@@ -18,9 +18,8 @@ class Account:
         yade: the simulation.
         assembly: the smarticles.
         fixtures: what moves and does work.
-        time_step: dt [s].
         works: whether to add up the work of moving fixtures.
-        dissipation_steps: every how many steps to sample what is dissipated; 0: never.
+        dissipation_interval: time between samples of what is dissipated [s]; None: never.
     """
 
     def __init__(
@@ -29,9 +28,8 @@ class Account:
         assembly: Assembly,
         fixtures: Fixtures,
         *,
-        time_step: float,
         works: bool,
-        dissipation_steps: int,
+        dissipation_interval: float | None,
     ) -> None:
         self.container_work = 0.0
         """Work of moving fixtures, and of strings, on the smarticles since the start [J]."""
@@ -41,10 +39,15 @@ class Account:
         """Energy dissipated since the start, by contacts, hinges and welding [J]; sampled, see `dem.dissipation`."""
         self._assembly = assembly
         self._fixtures = fixtures
-        self._time_step = time_step
         self._works = works
-        self._every = dissipation_steps
+        self._interval = dissipation_interval
+        self._time_step, self._every = 0.0, 0
         self._meter = Meter(yade, assembly)
+
+    def count_in(self, time_step: float) -> None:
+        """Take steps of a length [s] from now on."""
+        self._time_step = time_step
+        self._every = max(1, round(self._interval / time_step)) if self._interval else 0
 
     def step(self, number: int, advance: Callable[[], None]) -> None:
         """Make one step and add up what is due.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError
 
-FORMAT = 3
+FORMAT = 4
 CURRENT, PREVIOUS = "checkpoint.zip", "checkpoint.previous.zip"
 _ENGINE, _STATE, _SERIES = "engine.yade", "state.json", "series.npz"
 

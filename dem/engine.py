@@ -45,12 +45,12 @@ class Engine:
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
         gravity: g, downwards [m/s²].
-        time_step: dt [s].
+        time_step: dt [s], until another is set.
         shaken: whether the container will move; the engine that moves it exists only then.
         hinges: stiffness of the hinges and what all motors have in common; None where smarticles stay welded: then
             nothing of a hinge exists.
         track_work: whether to add up the work of the moving container.
-        dissipation_steps: every how many steps to sample what is dissipated; 0: never.
+        dissipation_interval: time between samples of what is dissipated [s]; None: never.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
@@ -70,7 +70,7 @@ class Engine:
         shaken: bool,
         hinges: tuple[HingeLaw, MotorLaw] | None = None,
         track_work: bool = False,
-        dissipation_steps: int = 0,
+        dissipation_interval: float | None = None,
         hooks: tuple[Cross, Cross] | None = None,
         channel: Channel | None = None,
         strengths: Array | None = None,
@@ -80,7 +80,6 @@ class Engine:
         self._law = law
         self.particle = particle
         self.cylinder = cylinder
-        self.time_step = time_step
         self.gravity = gravity
         self.motors: Motors | None = None
         """The motors of all smarticles; None before the first articulation."""
@@ -112,9 +111,8 @@ class Engine:
             self._yade,
             self._assembly,
             self.fixtures,
-            time_step=time_step,
             works=track_work,
-            dissipation_steps=dissipation_steps,
+            dissipation_interval=dissipation_interval,
         )
         """Work and dissipation since the start."""
         add_engines(
@@ -125,7 +123,7 @@ class Engine:
             gravity=gravity,
             radius=particle.radius,
         )
-        self._omega.dt = time_step
+        self.set_time_step(time_step)
         self._bind()
 
     def _bind(self) -> None:
@@ -180,6 +178,15 @@ class Engine:
         self.account.added += self.particle.boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
 
     # -- time --------------------------------------------------------------------------------------------------
+
+    def set_time_step(self, time_step: float) -> None:
+        """Take steps of another length [s] from now on.
+
+        Velocities belong to the middles of steps: a change of the length by Δ puts them in error by Δ/2 times the
+        acceleration at this moment, next to nothing in a pile at rest.
+        """
+        self.time_step = self._omega.dt = time_step
+        self.account.count_in(time_step)
 
     @property
     def time(self) -> float:

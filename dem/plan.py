@@ -13,7 +13,7 @@ from dem.construction import in_order
 from dem.effects import Adds, Decision, decide
 from dem.parts import Deposit
 from dem.scene import Scene
-from dem.timestep import stable_step, time_step
+from dem.timestep import stable_step, time_steps
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
@@ -27,13 +27,14 @@ LAYER_SECONDS = 0.1
 
 @dataclass(frozen=True)
 class PlannedPhase:
-    """One phase: its duration (None where a criterion ends it, then `estimate_s` is a guess) and its cost."""
+    """One phase: its duration (None where a criterion ends it, then `estimate_s` is a guess), cost and time step."""
 
     index: int
     type: str
     duration_s: float | None
     estimate_s: float
     wall_s: float
+    time_step_s: float
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Plan:
         lines = [
             f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
             f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
-            f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)",
+            self._steps_to_text(),
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
         ]
@@ -86,6 +87,11 @@ class Plan:
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
+    def _steps_to_text(self) -> str:
+        first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
+        told = f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
+        return f"{told} from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else told
+
 
 def _told(wall: float) -> str:
     """A wall time for a person: tenths of seconds where seconds would say nothing."""
@@ -98,21 +104,21 @@ def plan(scene: Scene) -> Plan:
     Raises:
         InputError: the scene's time step is above the stable one.
     """
-    dt = time_step(scene)
+    steps = time_steps(scene)
     particle = scene.particle
     spheres = len(particle.centres)
-    rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
     phases = []
-    for index, phase in enumerate(scene.phases):
+    for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
+        rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
         if isinstance(phase, Deposit):
             estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
-            phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
+            phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate, dt))
         elif isinstance(phase, Arrange):
-            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0))
+            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0, dt))
         else:
             estimate = phase.duration_s
             wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
-            phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall))
+            phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
     return Plan(
@@ -120,7 +126,7 @@ def plan(scene: Scene) -> Plan:
         count=scene.count,
         spheres_per_smarticle=spheres,
         sphere_diameter_m=particle.chain.diameter,
-        time_step_s=dt,
+        time_step_s=min(steps),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
         phases=tuple(phases),

@@ -15,33 +15,40 @@ from dem.series import SeriesWriter
 from dem.state import State
 from dem.watchdog import Watchdog
 
+# Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
+# step, so steps are the measure.
+WATCH_STEPS = 500
+
 
 @dataclass
 class Recorder:
-    """Records at fixed intervals, counted in steps.
+    """Records at fixed intervals of time; what is rarer than a sample of the series is counted in samples.
 
     Args:
         series: writes the series.
         frames: writes the frames.
         watchdog: looks at the state now and then, at every checkpoint and at the end.
         progress: told at every sample.
-        series_steps: steps between samples.
-        frame_steps: steps between frames; a whole multiple of `series_steps`.
-        watch_steps: steps between the watchdog's looks; a whole multiple of `series_steps`.
+        interval: time between samples [s].
+        frame_every: samples between frames.
+        watch_every: samples between the watchdog's looks; None: as many as have `WATCH_STEPS` steps, about.
         spheres: writes the spheres as points; None: nobody does.
-        sphere_steps: steps between these; a whole multiple of `series_steps`.
+        sphere_every: samples between these.
     """
 
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
     progress: Progress
-    series_steps: int
-    frame_steps: int
-    watch_steps: int
+    interval: float
+    frame_every: int
+    watch_every: int | None = None
     spheres: FrameWriter | None = None
-    sphere_steps: int = 0
+    sphere_every: int = 1
+    samples: int = 0
+    """Taken so far."""
     next_step: int = 0
+    """When the next one is due."""
 
     def record(self, engine: Engine, phase: int) -> None:
         """Take what is due at this step; the state is read once for all.
@@ -51,7 +58,7 @@ class Recorder:
         """
         state = engine.state()
         phi = self.series.sample(engine, state, phase)
-        if engine.count and engine.steps % self.frame_steps == 0:
+        if engine.count and self.samples % self.frame_every == 0:
             mesh = frame_mesh(
                 state,
                 contacts=engine.contacts(),
@@ -63,13 +70,18 @@ class Recorder:
             )
             self.frames.write(mesh, engine.time)
             self.series.write()
-        if self.spheres is not None and engine.count and engine.steps % self.sphere_steps == 0:
+        if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last picture of a run that fails is worth having.
-        if engine.steps % self.watch_steps == 0:
+        if self.samples % (self.watch_every or max(1, round(WATCH_STEPS * engine.time_step / self.interval))) == 0:
             self.watch(engine, state)
         self.progress.update(time=engine.time, phi=phi, count=engine.count)
-        self.next_step = engine.steps + self.series_steps
+        self.samples += 1
+        self.schedule(engine)
+
+    def schedule(self, engine: Engine) -> None:
+        """Find the step that is nearest to the time of the next sample; to be called when the time step changes."""
+        self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
         """Let the watchdog look at everything.
@@ -96,11 +108,17 @@ class Recorder:
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns of the series."""
         spheres = {} if self.spheres is None else {"spheres": self.spheres.times}
-        return {"next_step": self.next_step, "frames": self.frames.times, **spheres, "series": self.series.memory}
+        return {
+            "samples": self.samples,
+            "next_step": self.next_step,
+            "frames": self.frames.times,
+            **spheres,
+            "series": self.series.memory,
+        }
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
-        self.next_step = memory["next_step"]
+        self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
         self.series.restore(memory["series"], columns)
         self.series.write()

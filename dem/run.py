@@ -6,6 +6,7 @@ import logging
 import math
 import platform
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -34,7 +35,7 @@ from dem.rundir import DONE, FAILED, MANIFEST, SCENE, claimed, log_of, mark_done
 from dem.scene import Scene, dump_scene, scene_hash
 from dem.series import SeriesWriter
 from dem.simulation import Simulation, StopRequestedError
-from dem.timestep import contact_law, hinge_law, time_step
+from dem.timestep import contact_law, hinge_law, time_steps
 from dem.watchdog import Watchdog
 
 FORMAT = 1
@@ -46,9 +47,6 @@ DEPTH_LIMIT = 0.5
 # Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
 # results resolves.
 RISE_LIMIT = 0.5
-# Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
-# step, so steps are the measure.
-WATCH_STEPS = 500
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
-    dt = time_step(scene)
+    steps = time_steps(scene)
     yade = yade_version()
     with claimed(out, resume=resume):
         if resume and (out / DONE).exists():
@@ -95,13 +93,13 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(out / MANIFEST, manifest(scene, dt=dt, command=command, yade=yade, threads=yade_threads()))
+            write_json(out / MANIFEST, manifest(scene, steps=steps, command=command, yade=yade, threads=yade_threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, dt=dt, yade=yade, progress=progress, resume=resume)
+            return _run(scene, out, log, steps=steps, yade=yade, progress=progress, resume=resume)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -115,20 +113,27 @@ def _check_scene(scene: Scene, out: Path) -> None:
 
 
 def _run(
-    scene: Scene, out: Path, log: logging.Logger, *, dt: float, yade: str, progress: bool, resume: bool
+    scene: Scene,
+    out: Path,
+    log: logging.Logger,
+    *,
+    steps: Sequence[float],
+    yade: str,
+    progress: bool,
+    resume: bool,
 ) -> RunOutcome:
     bar = Progress(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
-        engine = build_engine(scene, dt)
+        engine = build_engine(scene, min(steps))
         simulation = Simulation(
             scene=scene,
             engine=engine,
-            recorder=build_recorder(scene, engine, out, bar),
+            recorder=build_recorder(scene, out, bar),
             folder=out,
             log=log,
             yade=yade,
-            checkpoint_steps=round((scene.recording.checkpoint_interval_s or 0.0) / dt),
+            time_steps=steps,
         )
         for warning in actuation_warnings(scene):
             log.warning("%s", warning)
@@ -207,8 +212,16 @@ def _keep_series(simulation: Simulation | None) -> None:
         return
 
 
-def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) -> dict[str, Any]:
-    """The content of `run.json`: what made the run, and the numbers that measures need."""
+def manifest(scene: Scene, *, steps: Sequence[float], command: str, yade: str, threads: int) -> dict[str, Any]:
+    """The content of `run.json`: what made the run, and the numbers that measures need.
+
+    Args:
+        scene: what is run.
+        steps: time step of each phase [s].
+        command: the command line.
+        yade: version of YADE.
+        threads: of YADE.
+    """
     particle, boxes = scene.particle, scene.smarticle.boxes
     return {
         "format": FORMAT,
@@ -232,13 +245,16 @@ def manifest(scene: Scene, *, dt: float, command: str, yade: str, threads: int) 
         "container_tiers": 1 + len(scene.cylinder.upper),
         "sphere_diameter_m": particle.chain.diameter,
         "spheres_per_smarticle": len(particle.centres),
-        "time_step_s": dt,
-        "phases": [{"index": k, "type": phase.type} for k, phase in enumerate(scene.phases)],
+        "time_step_s": min(steps),
+        "phases": [
+            {"index": k, "type": phase.type, "time_step_s": dt}
+            for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
+        ],
     } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """The engine of a scene, with time step `dt` [s], which is not checked."""
+    """The engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
     return Engine(
         particle=scene.particle,
         cylinder=scene.cylinder,
@@ -251,7 +267,7 @@ def build_engine(scene: Scene, dt: float) -> Engine:
         if effects.ARTICULATION.called_for(scene)
         else None,
         track_work=effects.ENERGIES.called_for(scene),
-        dissipation_steps=max(1, round(interval / dt)) if (interval := scene.recording.dissipation_interval_s) else 0,
+        dissipation_interval=scene.recording.dissipation_interval_s,
         hooks=None if scene.hooks is None else scene.hooks.crosses,
         channel=scene.channel,
         strengths=scene.motor_strengths,
@@ -269,9 +285,9 @@ def motor_law(scene: Scene) -> MotorLaw:
     )
 
 
-def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) -> Recorder:
+def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
     """The recorder of a scene, with the watchdog's limits."""
-    gravity, dt = scene.gravity_m_per_s2, engine.time_step
+    gravity, recording = scene.gravity_m_per_s2, scene.recording
     # No one radius gives the volume of a mould of tiers.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
     raised = sum(phase.distance_m for phase in scene.phases if isinstance(phase, PullHook))
@@ -284,7 +300,6 @@ def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) 
         ),
         default=0.0,
     )
-    series_steps = round(scene.recording.series_interval_s / dt)
     moved = max((getattr(phase, "speed_m_per_s", None) or 0.0 for phase in scene.phases), default=0.0)
     return Recorder(
         series=SeriesWriter(
@@ -308,11 +323,10 @@ def build_recorder(scene: Scene, engine: Engine, out: Path, progress: Progress) 
             energy=RISE_LIMIT * scene.sphere_diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
         ),
         progress=progress,
-        series_steps=series_steps,
-        frame_steps=round(scene.recording.frame_interval_s / dt),
-        watch_steps=series_steps * max(1, round(WATCH_STEPS / series_steps)),
+        interval=recording.series_interval_s,
+        frame_every=round(recording.frame_interval_s / recording.series_interval_s),
         spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
-        sphere_steps=round((scene.recording.sphere_interval_s or 0.0) / dt),
+        sphere_every=round((recording.sphere_interval_s or 0.0) / recording.series_interval_s),
     )
 
 

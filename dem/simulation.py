@@ -6,7 +6,7 @@ import logging
 import shutil
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
@@ -37,7 +37,7 @@ class Simulation:
         folder: the run directory.
         log: its log.
         yade: version of YADE, stored in the checkpoints.
-        checkpoint_steps: steps between checkpoints, 0 for none.
+        time_steps: of each phase [s].
     """
 
     scene: Scene
@@ -46,7 +46,7 @@ class Simulation:
     folder: Path
     log: logging.Logger
     yade: str
-    checkpoint_steps: int
+    time_steps: Sequence[float]
     checkpointed: float | None = None
     """Simulated time of the newest checkpoint [s], at which the watchdog found nothing; None: there is none."""
     _phase: int = 0
@@ -87,6 +87,9 @@ class Simulation:
         phase = self.scene.phases[self._phase]
         if self._stage is None:
             self._stage = begin(self.scene, self._phase)
+            if self.engine.time_step != self.time_steps[self._phase]:
+                self.engine.set_time_step(self.time_steps[self._phase])
+                self.recorder.schedule(self.engine)
             self._performed.append(
                 {
                     "index": self._phase,
@@ -129,11 +132,17 @@ class Simulation:
         while engine.steps < self._target:
             engine.advance(min(self._target, recorder.next_step) - engine.steps)
             if engine.steps == recorder.next_step:
+                due = self._checkpoint_every and recorder.samples % self._checkpoint_every == 0
                 recorder.record(engine, self._phase)
-                if self.checkpoint_steps and engine.steps % self.checkpoint_steps == 0:
+                if due:
                     self._checkpoint()
 
     # -- checkpoints -------------------------------------------------------------------------------------------
+
+    @property
+    def _checkpoint_every(self) -> int:
+        """Samples between checkpoints, 0 for none."""
+        return round((self.scene.recording.checkpoint_interval_s or 0.0) / self.scene.recording.series_interval_s)
 
     def _checkpoint(self) -> None:
         saved = self.folder / ".engine.partial.yade"
@@ -189,6 +198,7 @@ class Simulation:
         self.checkpointed = self.engine.time
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
+        self.engine.set_time_step(self.time_steps[self._phase])
         self._stage = begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
         self._performed = [dict(entry) for entry in state["performed"]]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
+from dem.actuation import actuated
 from dem.chain import Strain
 from dem.errors import InputError
 from dem.hinges import HingeLaw
@@ -324,7 +325,7 @@ def time_step(scene: Scene) -> float:
         raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
     whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
-    steps = max(1, math.ceil(whole / wanted * (1 - 1e-12)))
+    steps = _steps_in(whole, wanted)
     if scene.actuates and scene.motor.law == "servo" and steps > 1:
         # A damper that acts a period late drives vibrations that are faster than the period.
         msg = (
@@ -333,3 +334,29 @@ def time_step(scene: Scene) -> float:
         )
         raise InputError(msg)
     return whole / steps
+
+
+def time_steps(scene: Scene) -> tuple[float, ...]:
+    """The time step [s] of each phase.
+
+    Until motors act for the first time, smarticles are the rigid bodies that were poured, which hinges do not concern:
+    these phases have the step of a scene without motors, and so the same bits. After that a welded smarticle has
+    whatever shape its motors left it in, for which no longer step than that of the hinges is known to be stable. A
+    step given by hand is that of all phases.
+
+    Raises:
+        InputError: as in `time_step`.
+    """
+    shortest = time_step(scene)
+    first = next((k for k, phase in enumerate(scene.phases) if actuated(phase)), len(scene.phases))
+    if scene.fidelity.time_step_s is not None or scene.plane is not None or first == len(scene.phases):
+        return (shortest,) * len(scene.phases)
+    whole = scene.recording.series_interval_s
+    stable = stable_time_step(scene.particle, contact_law(scene))
+    poured = whole / _steps_in(whole, scene.fidelity.time_step_fraction * stable)
+    return (poured,) * first + (shortest,) * (len(scene.phases) - first)
+
+
+def _steps_in(interval: float, wanted: float) -> int:
+    """How many equal time steps an interval has, of at most the length that is wanted [s]."""
+    return max(1, math.ceil(interval / wanted * (1 - 1e-12)))

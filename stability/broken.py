@@ -103,7 +103,7 @@ def heated(out: Path, *, count: int, share: float) -> list[Check]:
     push(engine, count - 1, velocity=(0, 0, 1e-3))
     said, fast, begun = None, 0.0, engine.time
     while not said and engine.time < begun + 5.0:
-        engine.advance(recorder.series_steps)
+        engine.advance(round(recorder.interval / engine.time_step))
         fast = fastest(engine)
         said = look(engine, recorder)
     return [
@@ -133,7 +133,7 @@ def soft(out: Path, *, stiffness: float) -> list[Check]:
 def wrong_step(out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
     """A time step above the stable one, slipped past the check: the run fails, and names its last checkpoint."""
     data = scene(swing(seconds), count=count, recording={"checkpoint_interval_s": 0.02})
-    with patch.object(dem.run, "time_step", lambda scene: _too_long(scene, factor)):
+    with patch.object(dem.run, "time_steps", lambda scene: (_too_long(scene, factor),) * len(scene.phases)):
         run = whole(data, out)
     return [
         Check(

@@ -30,12 +30,12 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = build_engine(scene, time_step(scene) if dt is None else dt)
     progress = Progress(Path(out), scene.count, show=False)
-    return scene, engine, build_recorder(scene, engine, Path(out), progress)
+    return scene, engine, build_recorder(scene, Path(out), progress)
 
 
 def look(engine: Engine, recorder: Recorder) -> str | None:
     """What the recorder's next look says, contacts included; None: nothing."""
-    recorder.watch_steps = 1
+    recorder.watch_every = 1
     try:
         recorder.record(engine, 0)
     except RunError as error:

@@ -182,7 +182,7 @@ def mass_ratio(out: Path, *, heavy_above: bool, stiffness: float, time: float, r
     heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
     said, begun, heights = None, engine.time, []
     while not said and engine.time < begun + time:
-        engine.advance(recorder.series_steps // 20)
+        engine.advance(round(recorder.interval / engine.time_step) // 20)
         said = look(engine, recorder)
         heights.append(engine.state().positions[:, 2])
     if not carries:

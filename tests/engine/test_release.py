@@ -8,10 +8,10 @@ from typing import Any
 
 import cases
 import fixture_cases
-import h5py
 import meshio
 import numpy as np
 import pytest
+from run_files import series
 
 pytestmark = pytest.mark.engine
 
@@ -46,11 +46,6 @@ def test_a_lifted_wall_drags_by_friction(simulate: Simulate, scene_data: SceneDa
     assert rubbed["speed"].max() < 0.3
     assert acceleration == pytest.approx(MU * G, rel=5e-3)
     assert rubbed["force"] == pytest.approx(-MU * rubbed["weight"], rel=5e-3)
-
-
-def series(out: Path) -> dict[str, np.ndarray]:
-    with h5py.File(out / "series.h5") as file:
-        return {name: dataset[()] for name, dataset in file.items()}
 
 
 @pytest.mark.parametrize("speed", [None, 0.2])

@@ -15,11 +15,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 import cases
-import h5py
 import meshio
 import numpy as np
 import pytest
 import yaml
+from run_files import frame_files, series
 
 from dem.scene import load_scene, scene_hash
 
@@ -58,15 +58,6 @@ def finish(process: subprocess.Popen[str]) -> str:
     finally:
         process.kill()
     return error.strip().splitlines()[-1] if error.strip() else ""
-
-
-def series(out: Path) -> dict[str, np.ndarray]:
-    with h5py.File(out / "series.h5") as file:
-        return {name: dataset[()] for name, dataset in file.items()}
-
-
-def frame_files(out: Path) -> list[Path]:
-    return sorted((out / "frames").glob("*.vtu"))
 
 
 def read_json(path: Path) -> dict[str, Any]:

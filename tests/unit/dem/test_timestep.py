@@ -21,6 +21,7 @@ from dem.timestep import (
     restitution_of,
     stable_time_step,
     time_step,
+    time_steps,
     typical_effective_mass,
 )
 
@@ -236,3 +237,21 @@ def test_stiff_hinges_and_shafts_shorten_the_step(make_scene: MakeScene, key: st
         about_hinge = barb.link_inertias[0, 2] + barb.link_masses[0] * (barb.barb_length / 2) ** 2
         fixed = 2 / math.sqrt(value / about_hinge)
         assert 0.2 * fixed < time_step(stiff) < fixed
+
+
+SWING: dict[str, object] = {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}
+
+
+def test_phases_before_the_motors_have_the_step_of_a_scene_without(make_scene: MakeScene) -> None:
+    rest: list[dict[str, object]] = [{"type": "deposit"}, {"type": "relax", "duration_s": 1}]
+    scene, without = make_scene({"phases": [*rest, SWING, *rest[1:]]}), make_scene({"phases": rest})
+    shortest = time_step(scene)
+    assert time_steps(scene) == (*time_steps(without), shortest, shortest)
+    assert time_steps(without) == (time_step(without),) * 2
+    assert time_steps(scene)[0] > 1.5 * shortest
+
+
+@pytest.mark.parametrize("changes", [{"fidelity": {"time_step_s": 1e-5}}, {"phases": [{"type": "deposit"}]}])
+def test_a_step_by_hand_or_no_motors_make_all_phases_alike(make_scene: MakeScene, changes: dict[str, object]) -> None:
+    scene = make_scene({"phases": [{"type": "deposit"}, SWING], **changes})
+    assert set(time_steps(scene)) == {time_step(scene)}
