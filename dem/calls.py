@@ -111,6 +111,7 @@ def hooks(scene: Scene) -> Call:
         return False, "no key hooks"
     pulls = [
         f"phase {k} raises the upper one by {1e3 * phase.distance_m:.3g} mm at {1e3 * phase.speed_m_per_s:.3g} mm/s"
+        + ("" if phase.force_limit_N is None else f", or until it takes {phase.force_limit_N:.3g} N")
         for k, phase in enumerate(scene.phases)
         if isinstance(phase, PullHook)
     ]

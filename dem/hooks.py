@@ -66,6 +66,12 @@ class PullHook(Part):
         default_factory=_time_of_pull,
         description="length of the phase [s]; default: until the hook has arrived; longer: it then stays where it is",
     )
+    force_limit_N: float | None = Field(
+        None,
+        gt=0,
+        description="force on the raised hook, mean over 0.01 s, at which it stops and the phase soon ends [N], as a "
+        "testing machine does before it breaks; null: none. A rigid smarticle that holds both hooks takes any force",
+    )
 
     _length_unit = field_validator("distance_m")(refuse_wrong_unit)
 

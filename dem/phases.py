@@ -23,6 +23,7 @@ from dem.scene import Scene, derive_seed
 from dem.strings import StringLaw
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down or a pile has settled
+HELD_FAST = 0.1  # s that a hook stays where its force limit has stopped it, for the force to be measured
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
 
 Memory = dict[str, Any]
@@ -143,24 +144,39 @@ class Removing:
 
 
 class Pulling:
-    """The upper hook is raised, and then stays where it is."""
+    """The upper hook is raised until it has arrived or takes too much force, and then stays where it is."""
 
     def __init__(self, phase: PullHook) -> None:
         self._phase = phase
-        self.memory: Memory = {"end": None, "raising": False}
+        # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last look.
+        self.memory: Memory = {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
 
     def proceed(self, engine: Engine) -> float:
         """See `Stage.proceed`."""
         memory, phase = self.memory, self._phase
         if memory["end"] is None:
-            memory.update(end=engine.time + phase.duration_s, raising=True)
+            arrival = engine.time + phase.distance_m / phase.speed_m_per_s
+            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True)
             engine.weld()
             engine.fixtures.raise_upper(phase.speed_m_per_s)
-            return phase.distance_m / phase.speed_m_per_s
+            self._note(engine)
+        elif memory["raising"] and self._overloaded(engine):
+            memory.update(arrival=engine.time, end=engine.time + HELD_FAST)
+        if memory["raising"] and (left := _time_left(engine, memory["arrival"])):
+            return left if phase.force_limit_N is None else min(CHECK_INTERVAL, left)
         if memory["raising"]:
             memory["raising"] = False
             engine.fixtures.stop()
         return _time_left(engine, memory["end"])
+
+    def _overloaded(self, engine: Engine) -> bool:
+        """Whether the hook took more than it may since the last look, on average."""
+        limit, before, step = self._phase.force_limit_N, self.memory["force_sum"], self.memory["step"]
+        self._note(engine)
+        return limit is not None and before - self.memory["force_sum"] > limit * (self.memory["step"] - step)
+
+    def _note(self, engine: Engine) -> None:
+        self.memory.update(force_sum=float(engine.fixtures.hook_sums[1, 2]), step=engine.steps)
 
 
 def _time_left(engine: Engine, end: float) -> float:

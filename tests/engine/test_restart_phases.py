@@ -26,7 +26,7 @@ hooks: {lower_height_m: 0.003, upper_height_m: 0.006}
 phases:
   - {type: deposit, per_layer: 4}
   - {type: shake, duration_s: 0.1}
-  - {type: pull-hook, speed_m_per_s: 0.06, duration_s: 0.45}
+  - {type: pull-hook, speed_m_per_s: 0.06, duration_s: 0.45, force_limit_N: 10}
   - {type: remove-container, speed_m_per_s: 0.05, duration_s: 0.4}
   - {type: relax, duration_s: 0.1}
 """,
