@@ -2,6 +2,9 @@
 
 Runs of one l/w and seed were poured alike, so they are compared seed by seed, and slopes are taken within seeds. The
 paper's text claims nothing of how the force depends on l/w or on θ by itself: of these there are figures and means.
+
+A pile that holds fast, so that the hook stops at its limit, has a peak of at least that: of two procedures one is then
+only said to be above the other where what is unknown cannot change that.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
-from postprocess.fracture_runs import NET, PEAK, PEAK_RAISED
+from postprocess.fracture_runs import HELD_FAST, NET, PEAK, PEAK_RAISED
 from postprocess.procedures_effects import of_procedure, paired
 from postprocess.procedures_runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.seeds import slope_within
@@ -46,37 +49,55 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
     return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
 
 
-def _compared(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str], sign: int) -> tuple[str, Verdict]:
-    """Whether one procedure is above (sign 1) or below (−1) each of others, seed by seed."""
-    effects = [paired(table, quantity, one, other) for other in others]
-    ours = ", ".join(f"less {other} {told(effect, 3)}" for other, effect in zip(others, effects, strict=True))
-    return ours, all_of([judge(effect if sign > 0 else negative(effect)) for effect in effects])
+def _told_less(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str]) -> str:
+    """By how much one procedure is above others, seed by seed."""
+    return ", ".join(f"less {other} {told(paired(table, quantity, one, other), 3)}" for other in others)
+
+
+def _above(table: pd.DataFrame, upper: str, lower: str) -> Verdict:
+    """Whether the peaks of one procedure are above those of another, which are lower bounds where a pile held fast."""
+    verdict = judge(paired(table, PEAK, upper, lower))
+    if (verdict == "found" and _holding(table, lower)) or (verdict == "not found" and _holding(table, upper)):
+        return "not resolved"
+    return verdict
+
+
+def _holding(table: pd.DataFrame, procedure: str) -> int:
+    """How many piles of a procedure held fast."""
+    return int(of_procedure(table, procedure)[HELD_FAST].sum())
+
+
+def _told_holding(part: pd.DataFrame) -> str:
+    """`held fast: static 1 of 3, …`."""
+    rows = {name: of_procedure(part, name) for name in (STATIC, EXTERNAL, SHAPE, INTERNAL)}
+    told_rows = [f"{name} {_holding(part, name)} of {len(found)}" for name, found in rows.items() if len(found)]
+    return f"held fast: {', '.join(told_rows) or 'no data'}"
 
 
 def _shape_change_strongest(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
-    ours, verdict = _compared(part, PEAK, SHAPE, (EXTERNAL, INTERNAL), 1)
+    ours = _told_less(part, PEAK, SHAPE, (EXTERNAL, INTERNAL))
     static = told(paired(part, PEAK, SHAPE, STATIC), 3)
-    net, _ = _compared(part, NET, SHAPE, (EXTERNAL, INTERNAL, STATIC), 1)
+    net = _told_less(part, NET, SHAPE, (EXTERNAL, INTERNAL, STATIC))
     return Finding(
         paper=f"Shape change has the highest peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
         ours=f"peak of shape-change {ours}; beside the criterion: less static {static}; peak less the lower "
-        f"hook's force {net}",
-        verdict=verdict,
+        f"hook's force {net}; {_told_holding(part)}",
+        verdict=all_of([_above(part, SHAPE, other) for other in (EXTERNAL, INTERNAL)]),
         criterion=f"peak force above those of external and of internal oscillation at θ = {AMPLITUDE:g}°, seed by seed",
     )
 
 
 def _internal_weakest(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
-    ours, verdict = _compared(part, PEAK, INTERNAL, (EXTERNAL, SHAPE), -1)
+    ours = _told_less(part, PEAK, INTERNAL, (EXTERNAL, SHAPE))
     static = told(paired(part, PEAK, INTERNAL, STATIC), 3)
-    net, _ = _compared(part, NET, INTERNAL, (EXTERNAL, SHAPE, STATIC), -1)
+    net = _told_less(part, NET, INTERNAL, (EXTERNAL, SHAPE, STATIC))
     return Finding(
         paper=f"Internal oscillation has the least peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
         ours=f"peak of internal {ours}; beside the criterion: less static {static}; peak less the lower "
         f"hook's force {net}",
-        verdict=verdict,
+        verdict=all_of([_above(part, other, INTERNAL) for other in (EXTERNAL, SHAPE)]),
         criterion=f"peak force at θ = {AMPLITUDE:g}° below that of external oscillation and of shape change, by seed",
     )
 
@@ -92,7 +113,8 @@ def _other_order_than_crossings(table: pd.DataFrame) -> Finding:
             effect = paired(part, quantity, one, other)
             unknown |= math.isnan(effect.value)
             above, below = judge(effect) == "found", judge(negative(effect)) == "found"
-            signs.append(above - below)
+            unsure = quantity == PEAK and (_holding(part, one) or _holding(part, other))
+            signs.append(0 if unsure else above - below)
         if all(signs):
             (along if signs[0] == signs[1] else against).append(f"{one} and {other}")
     verdict: Verdict = "not resolved"
@@ -164,7 +186,7 @@ def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:
         paper="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
         ours=f"shape-change less internal: peak {told(harder, 3)}, hook raised at the peak {told(brittle, 3, ' m')}",
-        verdict=all_of([judge(harder), judge(negative(brittle))]),
+        verdict=all_of([_above(part, SHAPE, INTERNAL), judge(negative(brittle))]),
         criterion="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
     )

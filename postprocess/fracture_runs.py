@@ -19,7 +19,7 @@ from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
 from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, held_at, peak, read_pull, weight_of_one
-from postprocess.scene_file import read_phases
+from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.series import Series, read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, duration
 
@@ -33,11 +33,13 @@ WINDOWS: Mapping[float, str] = MappingProxyType(
 """The peak over other windows than `WINDOW`: window [s] and column."""
 HELD, NET = "lower hook force at the peak over n W_s [-]", "peak force less lower hook's over n W_s [-]"
 WORK, LEFT, BEFORE = "work over n W_s w [-]", "load at the end over n W_s [-]", "load before the pull over n W_s [-]"
+HELD_FAST, LIMIT = "held fast [-]", "force limit over n W_s [-]"
 CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
 ABOVE, ACCOUNT = "smarticles above the hook [-]", "work less that of the engine's account [-]"
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
-        PEAK: f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s",
+        PEAK: f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where it held",
+        HELD_FAST: "1 where the hook was stopped by its force limit on the way, 0 where it arrived",
         **{column: f"the same over {window:g} s" for window, column in WINDOWS.items()},
         HELD: "upwards on the lower hook at the peak, over n W_s: what goes from hook to hook",
         NET: f"largest mean over {WINDOW:g} s of the force on the upper hook less that on the lower, over n W_s",
@@ -88,10 +90,9 @@ def fracture_row(run: RunManifest) -> dict[str, object]:
     active = run.phases[2] if rest > 1 else None
     procedure = STATIC if active is None else PROCEDURES[active.type]
     settings = read_phases(run.directory)
-    if settings[pulled.index].type != PULL:
-        msg = (
-            f"{run.directory}: phase {pulled.index} is {PULL} in run.json, {settings[pulled.index].type} in scene.yaml"
-        )
+    asked = settings[pulled.index]
+    if asked.type != PULL:
+        msg = f"{run.directory}: phase {pulled.index} is {PULL} in run.json, {asked.type} in scene.yaml"
         raise InputError(msg)
     series = read_series(run.directory)
     table = summarise_run(run.directory, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
@@ -111,12 +112,21 @@ def fracture_row(run: RunManifest) -> dict[str, object]:
         CROSSINGS: before["crossings mean [-]"],
         ABOVE: _above(run, series, rest) / run.count,
     }
-    row |= _of_pull(run, read_pull(run, series, pulled.index))
+    pull = read_pull(run, series, pulled.index)
+    row |= _of_pull(run, pull)
+    # A hook that nothing stops arrives within a time step.
+    row[HELD_FAST] = float(pull.raised[-1] < 0.99 * asked.number("distance_m", positive=True))
+    row[LIMIT] = _limit(asked) / run.count / weight_of_one(run)
     row["escaped at the end [-]"] = table["escaped [-]"].iloc[-1]
     row["frames averaged [-]"] = int(before["frames averaged"])
     row["scene_sha256"] = run.scene_sha256
     row["run"] = run.directory.name
     return row
+
+
+def _limit(asked: PhaseSettings) -> float:
+    """The force that stops the hook [N]; infinite where none does."""
+    return math.inf if asked.values.get("force_limit_N") is None else asked.number("force_limit_N", positive=True)
 
 
 def _of_pull(run: RunManifest, pull: Pull) -> dict[str, float]:

@@ -23,14 +23,28 @@ def weight(run: SyntheticRun) -> float:
 
 
 def write_hooked_run(
-    directory: Path, run: SyntheticRun, force: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    directory: Path,
+    run: SyntheticRun,
+    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    limit: float | None = None,
+    stops: float = np.inf,
 ) -> Path:
-    """A whole run whose last phase pulls the hook; `force` [N] needed, of times since the pull began [s]."""
+    """A whole run whose last phase pulls the hook.
+
+    Args:
+        directory: The run directory.
+        run: What it is.
+        force: Needed to raise the hook [N], of times since the pull began [s].
+        limit: The force that is to stop the hook [N].
+        stops: When it does so, since the pull began [s].
+    """
     write_run(directory, run)
     path = directory / "scene.yaml"
     scene = yaml.safe_load(path.read_text())
     scene["gravity_m_per_s2"] = GRAVITY
     scene["hooks"] = {"side_m": 5e-4, "length_m": W, "lower_height_m": LOWER, "upper_height_m": UPPER}
+    scene["phases"][-1] |= {"distance_m": SPEED * run.durations["pull-hook"], "force_limit_N": limit}
     path.write_text(yaml.safe_dump(scene))
     ends = np.cumsum([run.durations[kind] for kind in run.phases])
     times = np.arange(1, round(ends[-1] / INTERVAL) + 1) * INTERVAL
@@ -40,7 +54,7 @@ def write_hooked_run(
     # A sample is the mean since the one before: taken in the middle between them.
     upper[:, 2] = -np.where(since > 0, force(since - INTERVAL / 2), weight(run))
     lower = -HELD * np.where(since[:, None] > 0, upper, 0.0)
-    raised = SPEED * since
+    raised = SPEED * np.minimum(since, stops)
     work = np.cumsum(-upper[:, 2] * np.diff(raised, prepend=0.0))
     columns = {
         "time_s": (times, "s"),

@@ -23,7 +23,9 @@ from postprocess.fracture_runs import (
     CAME_FREE,
     FREE_TIME,
     HELD,
+    HELD_FAST,
     LEFT,
+    LIMIT,
     NET,
     PEAK,
     PEAK_RAISED,
@@ -106,6 +108,20 @@ def test_smarticles_above_the_hook_are_counted(study):
     expected = float((centres > UPPER).mean())
     assert 0 < expected < 1
     assert row[ABOVE] == pytest.approx(expected)
+
+
+def test_a_hook_that_stops_on_the_way_was_held_fast(tmp_path, undrawn):
+    made = run(SHAPE)
+    total = made.count * weight(made)
+    held = write_hooked_run(
+        tmp_path / "held", made, lambda time: 1.5 * total * (time > 0.8), limit=1.5 * total, stops=0.8
+    )
+    analyse([held, write(tmp_path / "free", SHAPE, seed=2)], tmp_path / "out", **ORIGIN)
+    runs = table_of(tmp_path, "runs").set_index(SEED)
+    assert (runs.loc[1, HELD_FAST], runs.loc[2, HELD_FAST]) == (1, 0)
+    assert (runs.loc[1, LIMIT], runs.loc[2, LIMIT]) == (pytest.approx(1.5), math.inf)
+    assert runs.loc[1, PEAK] == pytest.approx(1.5, rel=1e-3)
+    assert table_of(tmp_path, "points")[HELD_FAST].tolist() == [0.5]
 
 
 def test_points_are_means_over_seeds_with_errors(study):
@@ -204,6 +220,7 @@ def sample(procedure, seed, peak, crossings, *, theta=math.nan, aspect=0.7, rais
         THETA: theta,
         ASPECT: aspect,
         PEAK_RAISED: raised,
+        HELD_FAST: 0.0,
     }
 
 
@@ -240,6 +257,25 @@ def test_the_opposite_is_not_found():
     table[PEAK_RAISED] = 0.02 - table[PEAK_RAISED]
     # That procedures have another order by force than by entanglement holds then as well.
     assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found"]
+
+
+def holding(table, procedure):
+    """The same table, with one pile of a procedure that held fast."""
+    table = table.copy()
+    table.loc[table.index[table[PROCEDURE] == procedure][0], HELD_FAST] = 1.0
+    return table
+
+
+def test_what_a_held_pile_leaves_unknown_changes_no_verdict():
+    """Its peak is a lower bound: enough to be above another, not enough to be below."""
+    table = as_in_the_paper()
+    assert verdicts(holding(table, SHAPE))[:2] == ["found", "found"]
+    assert verdicts(holding(table, EXTERNAL))[:2] == ["not resolved", "found"]
+    assert verdicts(holding(table[table[THETA] != 5], INTERNAL))[1] == "not resolved"
+    table[PEAK] = 2 - table[PEAK]
+    assert verdicts(table)[0] == "not found"
+    assert verdicts(holding(table, SHAPE))[0] == "not resolved"
+    assert "held fast: static 0 of 3, external 0 of 3, shape-change 1 of 3" in findings(holding(table, SHAPE))[0].ours
 
 
 def test_the_same_order_is_not_another_one():
