@@ -23,7 +23,8 @@ from postprocess.casting_runs import (
     WHOLE_KEPT,
 )
 from postprocess.manifest import RunManifest
-from postprocess.procedures_runs import INTERNAL, PROCEDURE, SHAPE, STATIC, marked
+from postprocess.points import marked
+from postprocess.procedures_runs import INTERNAL, PROCEDURE, SHAPE, STATIC
 from postprocess.release_runs import ORDER, around, removal
 from postprocess.strip import Row, draw_strip
 from postprocess.study_figures import draw_means, finished, marker

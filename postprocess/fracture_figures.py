@@ -11,6 +11,7 @@ from postprocess import figures
 from postprocess.fracture_findings import SHOWN_ASPECT, at_shown_aspect
 from postprocess.fracture_runs import PEAK, force_history
 from postprocess.manifest import RunManifest
+from postprocess.points import marked
 from postprocess.procedures_effects import of_procedure
 from postprocess.procedures_runs import (
     AMPLITUDE,
@@ -21,7 +22,6 @@ from postprocess.procedures_runs import (
     SHAPE,
     STATIC,
     THETA,
-    marked,
 )
 from postprocess.pull import WINDOW
 from postprocess.study_figures import History, draw_history, draw_means, finished, marker

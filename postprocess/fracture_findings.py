@@ -15,6 +15,7 @@ import pandas as pd
 
 from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.fracture_runs import NET, PEAK, PEAK_RAISED
+from postprocess.pairs import compared
 from postprocess.procedures_effects import of_procedure, paired
 from postprocess.procedures_runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.seeds import slope_within
@@ -48,9 +49,7 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
 
 def _compared(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str], sign: int) -> tuple[str, Verdict]:
     """Whether one procedure is above (sign 1) or below (−1) each of others, seed by seed."""
-    effects = [paired(table, quantity, one, other) for other in others]
-    ours = ", ".join(f"less {other} {told(effect, 3)}" for other, effect in zip(others, effects, strict=True))
-    return ours, all_of([judge(effect if sign > 0 else negative(effect)) for effect in effects])
+    return compared({other: paired(table, quantity, one, other) for other in others}, sign, between=", ")
 
 
 def _shape_change_strongest(table: pd.DataFrame) -> Finding:

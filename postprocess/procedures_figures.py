@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dem.errors import InputError
 from postprocess import figures
 from postprocess.manifest import RunManifest
+from postprocess.points import marked
 from postprocess.procedures_effects import of_procedure
 from postprocess.procedures_runs import (
     ACTIVE,
@@ -24,7 +25,6 @@ from postprocess.procedures_runs import (
     STATIC,
     THETA,
     height_history,
-    marked,
 )
 from postprocess.study_figures import (
     History,

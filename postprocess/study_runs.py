@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -105,21 +105,50 @@ def collect_runs(
 
 
 def refuse_mixture(
-    study: str, manifests: Sequence[RunManifest], quantity: str, value: Callable[[RunManifest], object]
+    study: str,
+    manifests: Sequence[RunManifest],
+    quantity: str,
+    value: Callable[[RunManifest], object],
+    *,
+    within: Callable[[RunManifest], Hashable] = lambda _: None,
 ) -> None:
     """Refuses runs that must be alike in some quantity and are not.
+
+    Args:
+        study: Its name, for messages.
+        manifests: The runs.
+        quantity: Its name, for messages.
+        value: The quantity of a run.
+        within: Of which group a run is; only those of one group must be alike.
 
     Raises:
         InputError: Two runs differ in it.
     """
+    firsts: dict[Hashable, RunManifest] = {}
     for run in manifests:
-        if value(run) != value(manifests[0]):
+        first = firsts.setdefault(within(run), run)
+        if value(run) != value(first):
             msg = (
                 f"study {study}: runs of different {quantity} must not be averaged: "
-                f"{manifests[0].directory} is {value(manifests[0])}, "
+                f"{first.directory} is {value(first)}, "
                 f"{run.directory} is {value(run)}; analyse them apart"
             )
             raise InputError(msg)
+
+
+def refuse_mixed_counts(study: str, manifests: Sequence[RunManifest]) -> None:
+    """Refuses runs of one aspect ratio that differ in their number of smarticles.
+
+    Raises:
+        InputError: Two runs do.
+    """
+    refuse_mixture(
+        study,
+        manifests,
+        "count",
+        lambda run: f"{run.count} smarticles at l/w {run.aspect_ratio:g}",
+        within=lambda run: round(run.aspect_ratio, 6),
+    )
 
 
 def refuse_repeats(

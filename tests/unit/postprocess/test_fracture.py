@@ -31,7 +31,8 @@ from postprocess.fracture_runs import (
     WINDOWS,
     WORK,
 )
-from postprocess.procedures_runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA, marked
+from postprocess.points import marked
+from postprocess.procedures_runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.pull import WINDOW
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 

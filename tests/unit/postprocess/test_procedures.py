@@ -13,6 +13,7 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from postprocess import procedures_figures
+from postprocess.points import marked
 from postprocess.procedures import analyse_procedures, told_points
 from postprocess.procedures_runs import (
     CROSSINGS,
@@ -25,7 +26,6 @@ from postprocess.procedures_runs import (
     STRAIGHT,
     THETA,
     half_compaction,
-    marked,
 )
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 
