@@ -126,6 +126,7 @@ def test_missing_runs_are_listed_and_the_rest_is_used(study):
     ]
     content = json.loads((study[0] / "out" / "provenance.json").read_text())
     assert (len(content["runs"]), content["study"]) == (14, "fracture")
+    assert content["definition"] == "second-highest-com"
     assert "14 of 16 runs, 2 missing; l/w (smarticles) 0.7 (12), 1 (12), seeds 1 2 3" in content["footer"][0]
 
 

@@ -219,6 +219,7 @@ def test_every_output_names_its_origin(study):
         assert "Gravish" not in text
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["reference"]["doi"] == "10.1039/d2sm01573k"
+    assert origin["definition"] == "second-highest-com"
     assert {r["directory"] for r in origin["runs"]} == {str(root / name) for name in report.runs["run"]}
 
 
