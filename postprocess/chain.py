@@ -39,7 +39,7 @@ from postprocess.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.origin import SAVOIE, Origin, make_folder
 from postprocess.points import told_means, told_number
 from postprocess.study_report import StudyReport
-from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats
+from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats, told_range
 
 _STUDY = "chain"
 
@@ -121,8 +121,7 @@ def _told_trials(means: pd.DataFrame) -> str:
     for speed, group in groups:
         names = dict.fromkeys(f"{variant} n = {count}" for variant, count in group.itertuples(index=False))
         told.append(f"{1e3 * float(str(speed)):g} mm/s: {', '.join(names)}")
-    trials = f"{means[SEEDS].min()} to {means[SEEDS].max()} trials per point"
-    return f"{trials}; {'; '.join(told)}."
+    return f"{told_range(means[SEEDS])} trials per point; {'; '.join(told)}."
 
 
 def _markdown(found: Sequence[Finding], means: pd.DataFrame, changes: pd.DataFrame) -> list[str]:

@@ -141,5 +141,6 @@ def _told_points(means: pd.DataFrame) -> ToldTable:
         ABOVE: ("above the hook", ".2f"),
         CROSSINGS: ("⟨N⟩", ".2f"),
     }
+    # Told in millimetres.
     raised = [PEAK_RAISED, marked(PEAK_RAISED, "SE")]
     return told_means(means.assign(**(1e3 * means[raised])), NAMED, columns)

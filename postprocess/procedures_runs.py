@@ -51,6 +51,16 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 )
 """What is averaged over seeds: columns of `samples`."""
 
+NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {
+        "procedure": lambda point: str(point[PROCEDURE]),
+        "θ": lambda point: "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°",
+        "l/w": lambda point: f"{point[ASPECT]:g}",
+        "seeds": lambda point: str(point[SEEDS]),
+    }
+)
+"""What tells a point from others, for a person to read; see `points.told_means`."""
+
 _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
 _WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
 
@@ -251,17 +261,6 @@ def points(table: pd.DataFrame, quantities: Iterable[str] = tuple(QUANTITIES)) -
         rows.append(row)
     order = (STATIC, EXTERNAL, SHAPE, INTERNAL)
     return ordered(pd.DataFrame(rows), [PROCEDURE, THETA, ASPECT], named=PROCEDURE, order=order)
-
-
-NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
-    {
-        "procedure": lambda point: str(point[PROCEDURE]),
-        "θ": lambda point: "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°",
-        "l/w": lambda point: f"{point[ASPECT]:g}",
-        "seeds": lambda point: str(point[SEEDS]),
-    }
-)
-"""What tells a point from others, for a person to read; see `points.told_means`."""
 
 
 def refuse_unlike(study: str, manifests: Sequence[RunManifest], rows: Sequence[Mapping[str, object]]) -> None:

@@ -306,5 +306,9 @@ def told_bars(counts: pd.Series, point: str) -> str:
 def told_seeds(runs: pd.DataFrame, counts: pd.Series, point: str) -> str:
     """Which seeds there are and how many per point, for footers; arguments as in `told_bars`."""
     seeds = " ".join(map(str, sorted(set(runs[SEED]))))
-    per_point = str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"
-    return f"seeds {seeds} ({per_point} per {point})"
+    return f"seeds {seeds} ({told_range(counts)} per {point})"
+
+
+def told_range(counts: pd.Series) -> str:
+    """`3` or `1 to 3`: how many there are of each."""
+    return str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"

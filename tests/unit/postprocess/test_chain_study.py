@@ -127,6 +127,9 @@ def test_texts_say_what_was_found_and_of_what(runs: list[Path], tmp_path: Path, 
     assert text.count("| found if |") == 1
     parts = [text.index(part) for part in ("## Points", "## What the assumptions matter", "columns of `points.csv`")]
     assert parts == sorted(parts)
+    assert (
+        "10 of 11 runs, 1 missing; 2 trials per point; 20 mm/s: baseline n = 2, baseline n = 6, friction n = 2." in text
+    )
     assert f"Reference: {SAVOIE.statement}.  " in text
     assert CRITERION in text
     # Figures state their reference and no verdicts.
