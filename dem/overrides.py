@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from dem.errors import InputError
-from dem.yaml_text import StrictLoader
+from dem.yaml_text import load_yaml
 
 
 def apply_override(data: Any, override: str) -> None:
@@ -25,8 +25,8 @@ def apply_override(data: Any, override: str) -> None:
         msg = f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2"
         raise InputError(msg)
     try:
-        value = yaml.load(text, Loader=StrictLoader)
-    except (yaml.YAMLError, ValueError):
+        value = load_yaml(text)
+    except yaml.YAMLError:
         msg = f"--set {override}: the value is not valid YAML"
         raise InputError(msg) from None
     *parents, last = key.split(".")

@@ -31,7 +31,7 @@ from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.parts import FIDELITIES, Contact, Container, Fidelity, Motor, Phase, Recording, Smarticle
 from dem.plane import Channel, Plane, check_plane
 from dem.release import check_release
-from dem.yaml_text import StrictLoader
+from dem.yaml_text import load_yaml
 
 SCHEMA_VERSION = 1
 
@@ -306,15 +306,14 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=StrictLoader)
+        data = load_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror}); give the path of a scene file"
         raise InputError(msg) from None
     except UnicodeDecodeError:
         msg = f"{path}: is not a text file; give the path of a scene file"
         raise InputError(msg) from None
-    except (yaml.YAMLError, ValueError) as error:
-        # A ValueError is a date that does not exist.
+    except yaml.YAMLError as error:
         msg = f"{path}: not valid YAML: {' '.join(str(error).split())}"
         raise InputError(msg) from None
     for override in overrides if isinstance(data, Mapping) else ():

@@ -54,8 +54,28 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+.0
 StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+0123456789"))
 
 
-def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
+def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
     """What a YAML text says.
+
+    Args:
+        text: the YAML.
+        loader: the loader class.
+
+    Raises:
+        yaml.YAMLError: the text is not YAML; `parse_yaml` says so to users.
+    """
+    try:
+        # A SafeLoader underneath: no Python objects can be made.
+        return yaml.load(text, Loader=loader)
+    except ValueError as error:
+        raise yaml.YAMLError(str(error)) from error  # a date that does not exist
+    except RecursionError as error:
+        msg = "nested too deeply to read"
+        raise yaml.YAMLError(msg) from error
+
+
+def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
+    """What a YAML text says, to users.
 
     Args:
         text: the YAML.
@@ -66,8 +86,7 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
         InputError: the text is not YAML; the message names the line.
     """
     try:
-        # A SafeLoader underneath: no Python objects can be made.
-        return yaml.load(text, Loader=loader)
+        return load_yaml(text, loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -75,10 +94,4 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
         raise InputError(msg) from error
     except yaml.YAMLError as error:
         msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
-        raise InputError(msg) from error
-    except ValueError as error:
-        msg = f"{source}: not valid YAML: {error}; correct the file"  # a date that does not exist
-        raise InputError(msg) from error
-    except RecursionError as error:
-        msg = f"{source}: nested too deeply to read; make the file flatter"
         raise InputError(msg) from error

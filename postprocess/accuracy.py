@@ -5,7 +5,6 @@ What is measured of a run, and how errors and their bands come about, is in `pos
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -32,10 +31,11 @@ from postprocess.accuracy_runs import (
     work_precision,
 )
 from postprocess.manifest import RunManifest
+from postprocess.markdown import table_lines
 from postprocess.measure import LAST_FRAMES
 from postprocess.origin import Origin, Reference, make_folder
 from postprocess.packing import DEFINITIONS
-from postprocess.procedures_runs import marked
+from postprocess.points import ToldTable, marked, told_number
 from postprocess.study_runs import (
     ASPECT,
     DEFINITION,
@@ -147,8 +147,8 @@ def _named(table: pd.DataFrame) -> Reference:
     )
 
 
-def told_rungs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of work and precision for a person to read."""
+def told_rungs(table: pd.DataFrame) -> ToldTable:
+    """The table of work and precision for a person to read."""
     header = ["knob", "value", "seeds", "cpu s per s", "± SE"]
     names = measured(table)
     for name in names:
@@ -158,20 +158,15 @@ def told_rungs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     rows = []
     for _, row in table.iterrows():
         cells = [str(row[KNOB]), label(row), str(row[SEEDS])]
-        cells += [_number(row[COST], ".3g"), _number(row[marked(COST, "SE")], ".2g")]
+        cells += [told_number(row[COST], ".3g"), told_number(row[marked(COST, "SE")], ".2g")]
         for name in names:
             column = COMPARED[name]
-            value, error, form = row[column], row[marked(column, "SE")], _FORMS[name]
-            cells.append(_number(value, form) + (f" ± {error:{form}}" if math.isfinite(error) else ""))
+            cells.append(told_number(row[column], _FORMS[name], row[marked(column, "SE")]))
             cells.append("reference" if row[VERDICT] == IS_REFERENCE else told_error(row, name))
             if row[f"{name} resolved"]:
                 cells[-1] += " *"
-        rows.append([*cells, *(_number(row[column], ".2g") for column in shown), str(row[VERDICT])])
+        rows.append([*cells, *(told_number(row[column], ".2g") for column in shown), str(row[VERDICT])])
     return [*header, *shown.values(), "verdict"], rows
-
-
-def _number(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else f"{value:{form}}"
 
 
 def _footer(origin: Origin, runs: pd.DataFrame, table: pd.DataFrame) -> tuple[str, ...]:
@@ -195,9 +190,7 @@ def _footer(origin: Origin, runs: pd.DataFrame, table: pd.DataFrame) -> tuple[st
 
 
 def _markdown(run: RunManifest, table: pd.DataFrame, advice: Sequence[Advice], closing: str) -> list[str]:
-    header, rows = told_rungs(table)
     lines = [f"# What accuracy costs: {run.count} smarticles of l/w = {run.aspect_ratio:g}", ""]
     lines += [f"**{closing}**", "", *(f"- {one.sentence}" for one in advice), ""]
     lines += ["Errors against the knob's reference; * beyond their band.", ""]
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    return lines + [f"| {' | '.join(row)} |" for row in rows]
+    return [*lines, *table_lines(*told_rungs(table))]

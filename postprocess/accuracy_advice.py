@@ -21,6 +21,7 @@ from postprocess.accuracy_runs import (
     VALUE,
     VERDICT,
 )
+from postprocess.points import told_number
 from postprocess.study_runs import SEEDS
 
 
@@ -144,10 +145,7 @@ def label(row: pd.Series) -> str:
 
 def told_error(row: pd.Series, name: str) -> str:
     """An error with its band, both in per cent, as far as there are any; `name` is a key of `COMPARED`."""
-    error, band = row[f"{name} error [%]"], row[f"{name} error 95 % [%]"]
-    if math.isnan(error):
-        return "-"
-    return f"{error:+.1f}" + (f" ± {band:.1f}" if math.isfinite(band) else "")
+    return told_number(row[f"{name} error [%]"], "+.1f", row[f"{name} error 95 % [%]"])
 
 
 def told_errors(row: pd.Series) -> str:

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from postprocess import figures
 from postprocess.accuracy_runs import COST, IS_REFERENCE, KNOB, VERDICT, measured
-from postprocess.procedures_runs import marked
+from postprocess.points import marked
 from postprocess.study_figures import draw_means, finished, marker
 
 if TYPE_CHECKING:

@@ -17,11 +17,11 @@ import pandas as pd
 from dem.errors import InputError
 from postprocess.manifest import RunManifest
 from postprocess.measure import summarise_run
-from postprocess.procedures_runs import marked
+from postprocess.points import marked, seeds_of
 from postprocess.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
 from postprocess.series import read_series
-from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, VARIANT, duration, variant_of
+from postprocess.study_runs import ASPECT, DEFINITION, SEED, VARIANT, duration, variant_of
 
 BASE = "base"
 """Setting of the scene that the others are variants of."""
@@ -214,8 +214,7 @@ def _rung_row(
         VARIANT: rung.setting,
         REFERENCE: "" if reference is None else reference.setting,
         "sensitivity": rung.sensitivity,
-        SEEDS: len(group),
-        "seeds": " ".join(map(str, sorted(group[SEED]))),
+        **seeds_of(group),
     }
     row |= {name: group[name].iloc[0] if len(group) else math.nan for name in _OF_SETTING}
     for name in _AVERAGED:

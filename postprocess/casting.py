@@ -5,8 +5,9 @@ Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import pandas as pd
 
@@ -27,16 +28,19 @@ from postprocess.casting_runs import (
     casting_row,
     mould,
 )
-from postprocess.findings import CRITERION, findings_table
-from postprocess.origin import Origin, make_folder
+from postprocess.findings import CRITERION, findings_table, without_criterion
+from postprocess.origin import SAVOIE, Origin, make_folder
 from postprocess.outline import BALL
-from postprocess.procedures import SAVOIE
+from postprocess.points import told_means
 from postprocess.procedures_runs import PROCEDURE
-from postprocess.release_runs import in_order, markdown, means, procedure, told_means
+from postprocess.release_runs import in_order, markdown, means, procedure
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_mixture, refuse_repeats, told_bars, told_seeds
 
 _STUDY = "casting"
+_NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {"procedure": lambda point: str(point[PROCEDURE]), "seeds": lambda point: str(point[SEEDS])}
+)
 _SHOWN = {
     **{name: (f"filled {tier}", ".3f") for tier, name in FILLED.items()},
     WHOLE: ("whole", ".3f"),
@@ -90,14 +94,13 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
         f"{told_bars(counts, 'procedure')}.",
         f"{CRITERION}.",
     )
-    below = [line for line in footer if not line.startswith(CRITERION)]
-    header = ["procedure", "seeds", *(name for name, _ in _SHOWN.values())]
-    table = header, told_means(points, [PROCEDURE, SEEDS], _SHOWN)
+    below = without_criterion(footer)
+    table = told_means(points, _NAMED, _SHOWN)
     files = origin.write(
         output,
         footer,
         tables={"runs": runs, "points": points, "findings": findings_table(found)},
-        text=("findings.md", markdown("Casts of smarticles", found, table, dict(QUANTITIES))),
+        text=("findings.md", markdown("Casts of smarticles", found, table, QUANTITIES)),
         draw=lambda: casting_figures.draw(output, points=points, runs=runs, manifests=manifests, footer=below),
     )
     return StudyReport(

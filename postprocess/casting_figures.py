@@ -23,21 +23,17 @@ from postprocess.casting_runs import (
     WHOLE_KEPT,
 )
 from postprocess.manifest import RunManifest
-from postprocess.procedures_runs import INTERNAL, PROCEDURE, SHAPE, STATIC, marked
+from postprocess.points import marked
+from postprocess.procedures_runs import INTERNAL, PROCEDURE, SHAPE, STATIC
 from postprocess.release_runs import ORDER, around, removal
 from postprocess.strip import Row, draw_strip
-from postprocess.study_figures import draw_means, finished, marker
+from postprocess.study_figures import draw_means, finished, legend_above, procedure_marker
 from postprocess.study_runs import SEED
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_LOOKS = {
-    STATIC: marker("^", figures.GREY, "white"),
-    INTERNAL: marker("o", figures.SKY, figures.SKY),
-    SHAPE: marker("s", figures.ORANGE, figures.ORANGE),
-}
 _LABELS = {STATIC: "static", INTERNAL: r"internal oscillation, $\theta$ = 10°", SHAPE: "shape change"}
 _PLACES = [*TIERS, "whole"]
 _STAGES = {
@@ -98,12 +94,12 @@ def _draw_overlaps(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> l
     _draw_places(axes, points, list(_OVERALL.values()))
     axes.set_xticks(range(len(_OVERALL)), labels=list(_OVERALL))
     axes.set_ylabel("common volume over that of both [-]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    legend_above(axes)
     return finished(figure, path, footer)
 
 
 def _draw_places(axes: Axes, points: pd.DataFrame, columns: Sequence[str]) -> None:
-    for k, (procedure, look) in enumerate(_LOOKS.items()):
+    for k, (procedure, label) in enumerate(_LABELS.items()):
         part = points[points[PROCEDURE] == procedure]
         if part.empty:
             continue
@@ -111,7 +107,7 @@ def _draw_places(axes: Axes, points: pd.DataFrame, columns: Sequence[str]) -> No
         values, errors = ([float(point[name]) for name in names] for names in (columns, map(_error, columns)))
         # Side by side, to keep error bars apart.
         x = np.arange(len(columns)) + 0.16 * (k - 1)
-        draw_means(axes, x, values, errors, look={**look, "linestyle": "none"}, label=_LABELS[procedure])
+        draw_means(axes, x, values, errors, look={**procedure_marker(procedure), "linestyle": "none"}, label=label)
     # Error bars of a share may reach beyond 0 and 1; they are shown whole.
     axes.set_ylim(min(1.05 * axes.dataLim.y0, 0.0), max(1.02 * axes.dataLim.y1, 1.05))
     axes.set_xlim(-0.5, len(columns) - 0.5)

@@ -21,7 +21,7 @@ from postprocess.casting_runs import (
 )
 from postprocess.findings import Finding, all_of, judge, negative, told
 from postprocess.procedures_runs import INTERNAL, SHAPE, STATIC
-from postprocess.release_runs import by_procedure, compared, of, paired
+from postprocess.release_runs import by_procedure, compared_with, of, paired
 from postprocess.seeds import mean_over_seeds
 
 FULL = 0.7
@@ -62,7 +62,7 @@ def _pour_fills(runs: pd.DataFrame) -> Finding:
 
 def _internal_fills(runs: pd.DataFrame) -> Finding:
     # A pile that packs denser sinks, and leaves the upper tier; the lower one is where it has enough to fill with.
-    ours, verdict = compared(runs, FILLED["lower"], INTERNAL, (STATIC, SHAPE), 1)
+    ours, verdict = compared_with(runs, FILLED["lower"], INTERNAL, (STATIC, SHAPE), 1)
     return Finding(
         paper="Internal oscillation fills the mould more completely, like a fluid",
         ours=f"filled share of the lower tier, internal {ours}; {by_procedure(runs, FILLED['lower'])}; of the whole "
@@ -97,7 +97,7 @@ def _internal_falls_apart(runs: pd.DataFrame) -> Finding:
 
 
 def _shape_change_keeps(runs: pd.DataFrame) -> Finding:
-    ours, verdict = compared(runs, OVERLAP, SHAPE, (INTERNAL,), 1)
+    ours, verdict = compared_with(runs, OVERLAP, SHAPE, (INTERNAL,), 1)
     return Finding(
         paper="Shape change keeps its shape better, as a hardened structure",
         ours=f"overlap before and after, shape-change {ours}; {by_procedure(runs, OVERLAP)}; kept of what was filled "
@@ -108,7 +108,7 @@ def _shape_change_keeps(runs: pd.DataFrame) -> Finding:
 
 
 def _internal_looks_like_the_mould(runs: pd.DataFrame) -> Finding:
-    ours, verdict = compared(runs, LIKENESS_BEFORE, INTERNAL, (SHAPE,), 1)
+    ours, verdict = compared_with(runs, LIKENESS_BEFORE, INTERNAL, (SHAPE,), 1)
     return Finding(
         paper="Internal oscillation sculpts to the mould more easily than shape change",
         ours=f"likeness to the mould before, internal {ours}; {by_procedure(runs, LIKENESS_BEFORE)}; after "

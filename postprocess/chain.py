@@ -7,8 +7,7 @@ What is measured of a run is in `postprocess.chain_runs`, what the paper found a
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -34,20 +33,25 @@ from postprocess.chain_runs import (
     chain_row,
     points,
 )
-from postprocess.findings import CRITERION, Finding, findings_table
+from postprocess.findings import CRITERION, Finding, findings_table, without_criterion
 from postprocess.manifest import RunManifest
-from postprocess.origin import Origin, Reference, make_folder
-from postprocess.procedures_runs import marked
+from postprocess.markdown import findings_lines, meaning_lines, table_lines
+from postprocess.origin import SAVOIE, Origin, make_folder
+from postprocess.points import told_means, told_number
 from postprocess.study_report import StudyReport
-from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats
+from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats, told_range
 
 _STUDY = "chain"
 
-SAVOIE = Reference(
-    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
-    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
+_NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {
+        "variant": lambda point: str(point[VARIANT]),
+        "n": lambda point: str(point[COUNT]),
+        "h/H": lambda point: f"{point[CONFINEMENT]:g}",
+        "mm/s": lambda point: f"{1e3 * point[SPEED]:g}",
+        "trials": lambda point: str(point[SEEDS]),
+    }
 )
-
 _SHOWN = {
     PEAK: ("peak force [N]", ".3f"),
     AT_PEAK: ("strain at the peak", ".3f"),
@@ -102,10 +106,10 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
         tables={"runs": runs, "points": means, "sensitivity": changes, "findings": findings_table(found)},
         text=("findings.md", _markdown(found, means, changes)),
         draw=lambda: chain_figures.draw(
-            output, points=means, runs=runs, changes=changes, manifests=manifests, footer=footer[:-3] + footer[-2:]
+            output, points=means, runs=runs, changes=changes, manifests=manifests, footer=without_criterion(footer)
         ),
     )
-    header, told = told_points(means)
+    header, told = told_means(means, _NAMED, _SHOWN)
     return StudyReport(
         header=header, rows=told, findings=found, told=("Means over trials ± standard error.",), files=files
     )
@@ -117,46 +121,42 @@ def _told_trials(means: pd.DataFrame) -> str:
     for speed, group in groups:
         names = dict.fromkeys(f"{variant} n = {count}" for variant, count in group.itertuples(index=False))
         told.append(f"{1e3 * float(str(speed)):g} mm/s: {', '.join(names)}")
-    trials = f"{means[SEEDS].min()} to {means[SEEDS].max()} trials per point"
-    return f"{trials}; {'; '.join(told)}."
-
-
-def told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of points for a person to read."""
-    rows = []
-    for _, point in means.iterrows():
-        row = [str(point[VARIANT]), str(point[COUNT]), f"{point[CONFINEMENT]:g}", f"{1e3 * point[SPEED]:g}"]
-        row.append(str(point[SEEDS]))
-        for quantity, (_, form) in _SHOWN.items():
-            value, error = point[quantity], point[marked(quantity, "SE")]
-            cell = "-" if math.isnan(value) else f"{value:{form}}"
-            row.append(f"{cell} ± {error:{form}}" if math.isfinite(error) else cell)
-        rows.append(row)
-    return ["variant", "n", "h/H", "mm/s", "trials", *(name for name, _ in _SHOWN.values())], rows
+    return f"{told_range(means[SEEDS])} trials per point; {'; '.join(told)}."
 
 
 def _markdown(found: Sequence[Finding], means: pd.DataFrame, changes: pd.DataFrame) -> list[str]:
-    lines = ["# The strain test of a chain of robots against the findings of Savoie et al.", ""]
-    lines += ["| finding in the paper | ours (± standard error) | verdict | found if |", "| --- " * 4 + "|"]
-    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in found]
-    header, rows = told_points(means)
-    lines += ["", "## Points", "", "Means over trials ± standard error.", ""]
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    if len(changes):
-        lines += ["", "## What the assumptions matter", ""]
-        lines += [
-            "Change against the baseline, in per cent ± 95 % half-width over pairs of runs with the same servos.",
-            "",
-        ]
-        names = [PEAK, FRACTURE, STIFFNESS]
-        lines += [f"| variant | {' | '.join(name.rpartition(' [')[0] for name in names)} |", "| --- " * 4 + "|"]
-        for variant, group in changes.groupby(VARIANT, sort=False):
-            cells = [
-                f"{row['change [%]']:+.1f}"
-                + (f" ± {row['change 95 % [%]']:.1f}" if math.isfinite(row["change 95 % [%]"]) else "")
+    return [
+        "# The strain test of a chain of robots against the findings of Savoie et al.",
+        "",
+        *findings_lines(found),
+        "",
+        "## Points",
+        "",
+        "Means over trials ± standard error.",
+        "",
+        *table_lines(*told_means(means, _NAMED, _SHOWN)),
+        *(_changes_lines(changes) if len(changes) else ()),
+        *meaning_lines("points.csv", QUANTITIES),
+    ]
+
+
+def _changes_lines(changes: pd.DataFrame) -> list[str]:
+    names = [PEAK, FRACTURE, STIFFNESS]
+    rows = [
+        [
+            str(variant),
+            *(
+                told_number(row["change [%]"], "+.1f", row["change 95 % [%]"])
                 for _, row in group.set_index("quantity").loc[names].iterrows()
-            ]
-            lines.append(f"| {variant} | {' | '.join(cells)} |")
-    lines += ["", "What the columns of `points.csv` are:", ""]
-    return lines + [f"- `{name}`: {meaning}" for name, meaning in QUANTITIES.items()]
+            ),
+        ]
+        for variant, group in changes.groupby(VARIANT, sort=False)
+    ]
+    return [
+        "",
+        "## What the assumptions matter",
+        "",
+        "Change against the baseline, in per cent ± 95 % half-width over pairs of runs with the same servos.",
+        "",
+        *table_lines(["variant", *(name.rpartition(" [")[0] for name in names)], rows),
+    ]

@@ -21,7 +21,7 @@ from postprocess.chain_runs import (
     read_pull,
 )
 from postprocess.manifest import RunManifest
-from postprocess.procedures_runs import marked
+from postprocess.points import marked
 from postprocess.study_figures import draw_means, finished, marker
 
 if TYPE_CHECKING:

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError
 from postprocess.manifest import RunManifest
-from postprocess.procedures_runs import marked
+from postprocess.points import averaged
 from postprocess.scene_file import read_phases
-from postprocess.seeds import mean_over_seeds
 from postprocess.series import read_series
 from postprocess.study_runs import SEED, SEEDS
 
@@ -218,11 +217,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
             SPEED: speed,
             SEEDS: len(group),
             "yielded [-]": int(group[YIELD].notna().sum()),
+            **averaged(group, QUANTITIES),
         }
-        for quantity in QUANTITIES:
-            mean = mean_over_seeds(group[quantity])
-            row[quantity] = mean.value
-            row[marked(quantity, "SE")] = mean.standard_error
-            row[marked(quantity, "95 %")] = mean.half_width
         rows.append(row)
     return pd.DataFrame(rows)

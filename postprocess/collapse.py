@@ -21,15 +21,18 @@ from postprocess.collapse_reference import COLLAPSE
 from postprocess.collapse_runs import COLUMNS, DEFINITION, FREQUENCY, GAMMA, HEIGHT_BEFORE, WATCHED, collapse_rows
 from postprocess.collapse_time import LEAST_FALL, WORST_ERROR
 from postprocess.column import DEFINITIONS, REMAINING, REST, vibration
-from postprocess.findings import CRITERION, Finding, findings_table
+from postprocess.findings import CRITERION, Finding, findings_table, without_criterion
 from postprocess.manifest import RunManifest
+from postprocess.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.origin import Origin, make_folder
+from postprocess.points import ToldTable, told_number
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import (
     ASPECT,
     SEED,
     SEEDS,
     collect_runs,
+    refuse_mixed_counts,
     refuse_mixture,
     refuse_repeats,
     told_bars,
@@ -73,8 +76,7 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     by_level, deltas, judged = levels(rows), activations(rows), findings(rows)
     origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=COLLAPSE)
     footer = _footer(origin, rows, by_level)
-    # How verdicts come about is no matter of figures.
-    below = [line for line in footer if not line.startswith(CRITERION)]
+    below = without_criterion(footer)
     files = origin.write(
         output,
         footer,
@@ -99,9 +101,7 @@ def _refuse_unlike(manifests: Sequence[RunManifest]) -> None:
     shaken = {run.directory: vibration(run) for run in manifests}
     refuse_mixture(_STUDY, manifests, "frequency", lambda run: f"{shaken[run.directory].frequency:g} Hz")
     refuse_mixture(_STUDY, manifests, "container", lambda run: f"{run.container_radius:g} m wide")
-    for aspect in sorted({run.aspect_ratio for run in manifests}):
-        alike = [run for run in manifests if run.aspect_ratio == aspect]
-        refuse_mixture(_STUDY, alike, "count", lambda run: f"{run.count} smarticles")
+    refuse_mixed_counts(_STUDY, manifests)
     refuse_repeats(
         _STUDY,
         manifests,
@@ -129,29 +129,39 @@ def _footer(origin: Origin, rows: pd.DataFrame, by_level: pd.DataFrame) -> tuple
 
 
 def _markdown(judged: Sequence[Finding], deltas: pd.DataFrame) -> list[str]:
-    lines = ["# Collapse of columns against the findings of Gravish et al.", ""]
-    lines += ["| finding in the paper | ours (± standard error) | verdict | found if |", "| --- " * 4 + "|"]
-    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in judged]
-    lines += ["", "## Δ by each definition of the height", "", "Means over seeds ± standard error.", ""]
-    header = ["definition", "l/w", "Δ", "Gravish", "Γ used", "runs with a bound"]
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    for _, row in deltas.iterrows():
-        cells = [row[DEFINITION], f"{row[ASPECT]:g}", told_delta(row), _told(row[REFERENCE], "g"), row[USED] or "none"]
-        lines.append(f"| {' | '.join([*cells, str(row[CENSORED])])} |")
-    lines += ["", *(f"- `{name}`: {meaning}" for name, meaning in DEFINITIONS.items())]
-    lines += ["", "What the columns of `runs.csv` are:", ""]
-    return lines + [f"- `{name}`: {meaning}" for name, meaning in COLUMNS.items()]
+    rows = [
+        [
+            row[DEFINITION],
+            f"{row[ASPECT]:g}",
+            told_delta(row),
+            told_number(row[REFERENCE], "g"),
+            row[USED] or "none",
+            str(row[CENSORED]),
+        ]
+        for _, row in deltas.iterrows()
+    ]
+    return [
+        "# Collapse of columns against the findings of Gravish et al.",
+        "",
+        *findings_lines(judged),
+        "",
+        "## Δ by each definition of the height",
+        "",
+        "Means over seeds ± standard error.",
+        "",
+        *table_lines(["definition", "l/w", "Δ", "Gravish", "Γ used", "runs with a bound"], rows),
+        "",
+        *(f"- `{name}`: {meaning}" for name, meaning in DEFINITIONS.items()),
+        *meaning_lines("runs.csv", COLUMNS),
+    ]
 
 
-def _told_deltas(deltas: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+def _told_deltas(deltas: pd.DataFrame) -> ToldTable:
     """Header and rows of the table for the terminal: Δ by the first definition."""
     rows = []
     for _, row in deltas[deltas[DEFINITION] == REMAINING].iterrows():
         value = told_delta(row).partition(" ± ")[0] if math.isnan(row[ACTIVATION]) else f"{row[ACTIVATION]:.2f}"
-        cells = [f"{row[ASPECT]:g}", str(row[SEEDS]), row[USED] or "none", value, _told(row[HALF_WIDTH], ".2f")]
-        rows.append([*cells, _told(row[REFERENCE], "g"), _told(row[DEVIATION], "+.0f"), str(row[CENSORED])])
+        cells = [f"{row[ASPECT]:g}", str(row[SEEDS]), row[USED] or "none", value, told_number(row[HALF_WIDTH], ".2f")]
+        cells += [told_number(row[REFERENCE], "g"), told_number(row[DEVIATION], "+.0f")]
+        rows.append([*cells, str(row[CENSORED])])
     return ["l/w", "seeds", "Γ used", "Δ", "± 95 %", "Gravish", "deviation %", "runs with a bound"], rows
-
-
-def _told(value: float, form: str) -> str:
-    return f"{value:{form}}" if math.isfinite(value) else "-"

@@ -14,7 +14,7 @@ from postprocess.collapse_law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH,
 from postprocess.collapse_reference import ACCELERATIONS, read_collapse_reference
 from postprocess.collapse_runs import DEFINITION, GAMMA, LOG, WATCHED
 from postprocess.column import COM, CORE, REMAINING, column_history, vibration
-from postprocess.study_figures import History, bin_width, draw_history, draw_means, finished, marker
+from postprocess.study_figures import ASPECT_LABEL, History, bin_width, draw_history, draw_means, finished, marker
 from postprocess.study_runs import ASPECT
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from postprocess.manifest import RunManifest
 
-_ASPECT_LABEL = r"aspect ratio $l/w$ [-]"
 _LABELS = {REMAINING: "remaining", COM: "centre of mass", CORE: "centre of mass within the radius"}
 _LOOKS = {
     REMAINING: marker("o", figures.BLUE, figures.BLUE),
@@ -176,7 +175,7 @@ def _draw_activations(path: Path, activations: pd.DataFrame, footer: Sequence[st
         draw_means(axes, x, part[ACTIVATION], part[HALF_WIDTH], look=look, label=f"here, {label}")
         _draw_bounds(axes, x, part[AT_LEAST].where(part[ACTIVATION].isna()), look)
     axes.set_ylim(0, None)
-    axes.set_xlabel(_ASPECT_LABEL)
+    axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"activation $\Delta$ [-]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     told = (

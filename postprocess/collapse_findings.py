@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pandas as pd
 
@@ -12,6 +13,7 @@ from postprocess.collapse_law import (
     DEVIATION,
     DEVIATION_HALF_WIDTH,
     ERROR,
+    LawCheck,
     activation_of,
     activations,
     check_law,
@@ -19,7 +21,8 @@ from postprocess.collapse_law import (
 from postprocess.collapse_runs import DEFINITION
 from postprocess.column import DEFINITIONS, REMAINING
 from postprocess.findings import Finding, Verdict, all_of, judge, told
-from postprocess.seeds import Difference, difference
+from postprocess.points import told_number
+from postprocess.seeds import Difference, Slope, difference
 from postprocess.study_runs import ASPECT
 
 INTERMEDIATE = 0.40
@@ -43,9 +46,7 @@ def findings(rows: pd.DataFrame) -> tuple[Finding, ...]:
 
 
 def _later_when_gentler(rows: pd.DataFrame) -> Finding:
-    by_name = {name: check_law(rows, name).rise for name in DEFINITIONS}
-    rise = by_name.pop(REMAINING)
-    others = "; ".join(f"by {name} {told(other, 2)}" for name, other in by_name.items())
+    rise, others = _by_definition(rows, lambda law: law.rise)
     return Finding(
         paper="Columns collapse the later the gentler the vibration",
         ours=f"ln(fτ) against 1/Γ rises by {told(rise, 2)}; {others}",
@@ -55,15 +56,20 @@ def _later_when_gentler(rows: pd.DataFrame) -> Finding:
 
 
 def _law(rows: pd.DataFrame) -> Finding:
-    by_name = {name: check_law(rows, name).change for name in DEFINITIONS}
-    change = by_name.pop(REMAINING)
-    others = "; ".join(f"by {name} {told(other, 2)}" for name, other in by_name.items())
+    change, others = _by_definition(rows, lambda law: law.change)
     return Finding(
         paper="τ = (1/f) exp(Δ/Γ) with one Δ at each l/w",
         ours=f"Γ ln(fτ) from the least Γ to the greatest, over its mean: {told(change, 2)}; {others}",
         verdict=_within(change.value, change.half_width, CONSTANT),
         criterion=f"Γ ln(fτ) changes by less than {CONSTANT:.0%} of its mean, at 95 %",
     )
+
+
+def _by_definition(rows: pd.DataFrame, effect: Callable[[LawCheck], Slope]) -> tuple[Slope, str]:
+    """An effect by the height `REMAINING`, and in words by the others."""
+    by_name = {name: effect(check_law(rows, name)) for name in DEFINITIONS}
+    first = by_name.pop(REMAINING)
+    return first, "; ".join(f"by {name} {told(other, 2)}" for name, other in by_name.items())
 
 
 def _greatest_between(table: pd.DataFrame) -> Finding:
@@ -99,8 +105,7 @@ def told_delta(row: pd.Series) -> str:
     """Δ with its standard error, or what it is at least."""
     if math.isnan(row[ACTIVATION]):
         return f"≥ {row[AT_LEAST]:.1f}"
-    error = f" ± {row[ERROR]:.2f}" if math.isfinite(row[ERROR]) else ""
-    return f"{row[ACTIVATION]:.2f}{error}"
+    return told_number(row[ACTIVATION], ".2f", row[ERROR])
 
 
 def _as_gravish(table: pd.DataFrame) -> Finding:
@@ -109,11 +114,10 @@ def _as_gravish(table: pd.DataFrame) -> Finding:
         _within(value / 100, half_width / 100, CLOSE)
         for value, half_width in zip(own[DEVIATION], own[DEVIATION_HALF_WIDTH], strict=True)
     ]
-    parts = []
-    for _, row in own.iterrows():
-        error = f" ± {row[DEVIATION_HALF_WIDTH]:.0f}" if math.isfinite(row[DEVIATION_HALF_WIDTH]) else ""
-        parts.append(f"l/w = {row[ASPECT]:g}: {row[DEVIATION]:+.0f}{error} %")
-    ours = ", ".join(parts)
+    ours = ", ".join(
+        f"l/w = {row[ASPECT]:g}: {told_number(row[DEVIATION], '+.0f', row[DEVIATION_HALF_WIDTH])} %"
+        for _, row in own.iterrows()
+    )
     return Finding(
         paper="Δ as measured",
         ours=f"deviations with 95 % half-widths: {ours}" if ours else "no data",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,11 +17,12 @@ import pandas as pd
 from postprocess.collapse_reference import reference_delta
 from postprocess.collapse_runs import DEFINITION, DELTA, GAMMA, LOG, is_seen
 from postprocess.column import DEFINITIONS
+from postprocess.points import marked, mean_columns, ordered
 from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 
-ACTIVATION, HALF_WIDTH, ERROR = "Delta [-]", "Delta 95 % [-]", "Delta SE [-]"
-LOG_ERROR, LOG_HALF_WIDTH = "ln(f tau) SE [-]", "ln(f tau) 95 % [-]"
+ACTIVATION = "Delta [-]"
+ERROR, HALF_WIDTH, LOG_HALF_WIDTH = marked(ACTIVATION, "SE"), marked(ACTIVATION, "95 %"), marked(LOG, "95 %")
 AT_LEAST, CENSORED, USED = "Delta at least [-]", "runs with a bound [-]", "Gamma used [g]"
 REFERENCE, DEVIATION, DEVIATION_HALF_WIDTH = "Delta Gravish [-]", "deviation [%]", "deviation 95 % [%]"
 
@@ -46,9 +47,7 @@ def levels(rows: pd.DataFrame) -> pd.DataFrame:
                 GAMMA: gamma,
                 SEEDS: len(group),
                 CENSORED: int((~seen).sum()),
-                LOG: mean.value,
-                LOG_ERROR: mean.standard_error if whole else math.nan,
-                LOG_HALF_WIDTH: mean.half_width if whole else math.nan,
+                **mean_columns(LOG, mean if whole else _without_error(mean)),
                 DELTA: gamma * mean.value,
             }
         )
@@ -79,9 +78,7 @@ def activations(rows: pd.DataFrame) -> pd.DataFrame:
                 DEFINITION: definition,
                 ASPECT: aspect,
                 SEEDS: len(seeds),
-                ACTIVATION: mean.value,
-                ERROR: mean.standard_error,
-                HALF_WIDTH: mean.half_width,
+                **mean_columns(ACTIVATION, mean),
                 AT_LEAST: bounds.max() if len(bounds) else math.nan,
                 CENSORED: int(own[CENSORED].sum()),
                 USED: " ".join(f"{gamma:g}" for gamma in used),
@@ -93,9 +90,12 @@ def activations(rows: pd.DataFrame) -> pd.DataFrame:
     return _sorted(pd.DataFrame(found), [ASPECT])
 
 
+def _without_error(mean: SeedMean) -> SeedMean:
+    return replace(mean, standard_error=math.nan, half_width=math.nan)
+
+
 def _sorted(table: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
-    ranks = table[DEFINITION].map({name: rank for rank, name in enumerate(DEFINITIONS)})
-    return table.assign(rank=ranks).sort_values(["rank", *columns], ignore_index=True).drop(columns="rank")
+    return ordered(table, [DEFINITION, *columns], named=DEFINITION, order=DEFINITIONS)
 
 
 def slope_through_origin(x: Sequence[float], y: Sequence[float]) -> float:

@@ -7,14 +7,13 @@ paper found and how it is judged in `postprocess.fracture_findings`.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 
 from postprocess import fracture_figures
-from postprocess.findings import CRITERION, Finding, findings_table
+from postprocess.findings import CRITERION, Finding, findings_table, without_criterion
 from postprocess.fracture_findings import findings
 from postprocess.fracture_runs import (
     ABOVE,
@@ -31,10 +30,10 @@ from postprocess.fracture_runs import (
     WORK,
     fracture_row,
 )
-from postprocess.manifest import RunManifest
-from postprocess.origin import Origin, make_folder
-from postprocess.procedures import SAVOIE
-from postprocess.procedures_runs import ACTIVE, CROSSINGS, INTERNAL, PROCEDURE, STATIC, THETA, marked, points
+from postprocess.markdown import findings_lines, meaning_lines, table_lines
+from postprocess.origin import SAVOIE, Origin, make_folder
+from postprocess.points import ToldTable, marked, told_means
+from postprocess.procedures_runs import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
 from postprocess.pull import END, FREE, WINDOW
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import (
@@ -42,8 +41,7 @@ from postprocess.study_runs import (
     SEED,
     SEEDS,
     collect_runs,
-    refuse_mixture,
-    refuse_repeats,
+    refuse_mixed_counts,
     runs_table,
     told_bars,
     told_seeds,
@@ -73,13 +71,13 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     """
     output = make_folder(output)
     manifests, rows, missing = collect_runs(_STUDY, run_dirs, fracture_row)
-    _refuse_unlike(manifests, rows)
+    refuse_mixed_counts(_STUDY, manifests)
+    refuse_unlike(_STUDY, manifests, rows)
     runs = runs_table(rows).sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
     means, found = points(runs, QUANTITIES), findings(runs)
     origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=SAVOIE)
     footer = _footer(origin, runs, means)
-    # How verdicts come about is no matter of figures.
-    below = [line for line in footer if not line.startswith(CRITERION)]
+    below = without_criterion(footer)
     header, told_rows = _told_points(means)
     files = origin.write(
         output,
@@ -90,29 +88,6 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     )
     told = ("Means over seeds ± standard error; forces over n W_s.",)
     return StudyReport(header=header, rows=told_rows, findings=found, told=told, files=files)
-
-
-def _refuse_unlike(manifests: Sequence[RunManifest], rows: Sequence[Mapping[str, object]]) -> None:
-    """Refuses runs that must not be averaged or compared with each other."""
-    row_of = dict(zip((run.directory for run in manifests), rows, strict=True))
-    for aspect in sorted({float(str(row[ASPECT])) for row in rows}):
-        alike = [run for run in manifests if row_of[run.directory][ASPECT] == aspect]
-        refuse_mixture(_STUDY, alike, "count", lambda run: f"{run.count} smarticles at l/w {run.aspect_ratio:g}")
-    for procedure in sorted({str(row[PROCEDURE]) for row in rows}):
-        alike = [run for run in manifests if row_of[run.directory][PROCEDURE] == procedure]
-        refuse_mixture(
-            _STUDY,
-            alike,
-            "duration",
-            lambda run: f"{row_of[run.directory][PROCEDURE]} for {row_of[run.directory][ACTIVE]:.3g} s",
-        )
-
-    def name(run: RunManifest) -> str:
-        row = row_of[run.directory]
-        theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
-        return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"
-
-    refuse_repeats(_STUDY, manifests, "point", name)
 
 
 def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[str, ...]:
@@ -132,9 +107,7 @@ def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[st
 
 
 def _markdown(found: Sequence[Finding], header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    lines = ["# A hook pulled out of a pile, against the findings of Savoie et al.", ""]
-    lines += ["| finding in the paper | ours (± standard error) | verdict | found if |", "| --- " * 4 + "|"]
-    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in found]
+    lines = ["# A hook pulled out of a pile, against the findings of Savoie et al.", "", *findings_lines(found)]
     lines += [
         "",
         "Of how the force depends on θ or on l/w by itself the paper's text says nothing; it has figures.",
@@ -145,10 +118,7 @@ def _markdown(found: Sequence[Finding], header: Sequence[str], rows: Sequence[Se
     ]
     lines[-1] += "that is what pile and container take."
     lines += ["", "## Points", "", "Means over seeds ± standard error; forces over n W_s.", ""]
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    lines += ["", "What the columns of `points.csv` are:", ""]
-    lines += [f"- `{name}`: {meaning}" for name, meaning in QUANTITIES.items()]
+    lines += [*table_lines(header, rows), *meaning_lines("points.csv", QUANTITIES)]
     return [
         *lines,
         "",
@@ -156,30 +126,23 @@ def _markdown(found: Sequence[Finding], header: Sequence[str], rows: Sequence[Se
     ]
 
 
-def _told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of points for a person to read."""
+def _told_points(means: pd.DataFrame) -> ToldTable:
+    """The table of points for a person to read."""
     narrow, wide = WINDOWS[WINDOW / 2], WINDOWS[2 * WINDOW]
     columns = {
-        PEAK: ("peak", ".3f", 1.0),
-        narrow: (f"over {WINDOW / 2:g} s", ".3f", 1.0),
-        wide: (f"over {2 * WINDOW:g} s", ".3f", 1.0),
-        HELD: ("lower hook at it", ".3f", 1.0),
-        NET: ("peak less lower hook", ".3f", 1.0),
-        PEAK_RAISED: ("raised at it [mm]", ".1f", 1e3),
-        WORK: ("work / n W_s w", ".3f", 1.0),
-        LEFT: ("load at the end", ".3f", 1.0),
-        HELD_FAST: ("held fast", ".2f", 1.0),
-        CAME_FREE: ("came free", ".2f", 1.0),
-        ABOVE: ("above the hook", ".2f", 1.0),
-        CROSSINGS: ("⟨N⟩", ".2f", 1.0),
+        PEAK: ("peak", ".3f"),
+        narrow: (f"over {WINDOW / 2:g} s", ".3f"),
+        wide: (f"over {2 * WINDOW:g} s", ".3f"),
+        HELD: ("lower hook at it", ".3f"),
+        NET: ("peak less lower hook", ".3f"),
+        PEAK_RAISED: ("raised at it [mm]", ".1f"),
+        WORK: ("work / n W_s w", ".3f"),
+        LEFT: ("load at the end", ".3f"),
+        HELD_FAST: ("held fast", ".2f"),
+        CAME_FREE: ("came free", ".2f"),
+        ABOVE: ("above the hook", ".2f"),
+        CROSSINGS: ("⟨N⟩", ".2f"),
     }
-    rows = []
-    for _, point in means.iterrows():
-        theta = "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°"
-        row = [str(point[PROCEDURE]), theta, f"{point[ASPECT]:g}", str(point[SEEDS])]
-        for quantity, (_, form, factor) in columns.items():
-            value, error = factor * point[quantity], factor * point[marked(quantity, "SE")]
-            cell = "-" if math.isnan(value) else f"{value:{form}}"
-            row.append(f"{cell} ± {error:{form}}" if math.isfinite(error) else cell)
-        rows.append(row)
-    return ["procedure", "θ", "l/w", "seeds", *(name for name, _, _ in columns.values())], rows
+    # Told in millimetres.
+    raised = [PEAK_RAISED, marked(PEAK_RAISED, "SE")]
+    return told_means(means.assign(**(1e3 * means[raised])), NAMED, columns)

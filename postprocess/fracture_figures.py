@@ -11,6 +11,7 @@ from postprocess import figures
 from postprocess.fracture_findings import SHOWN_ASPECT, at_shown_aspect
 from postprocess.fracture_runs import PEAK, force_history
 from postprocess.manifest import RunManifest
+from postprocess.points import marked
 from postprocess.procedures_effects import of_procedure
 from postprocess.procedures_runs import (
     AMPLITUDE,
@@ -21,30 +22,37 @@ from postprocess.procedures_runs import (
     SHAPE,
     STATIC,
     THETA,
-    marked,
 )
 from postprocess.pull import WINDOW
-from postprocess.study_figures import History, draw_history, draw_means, finished, marker
+from postprocess.study_figures import (
+    ASPECT_LABEL,
+    COLOURS,
+    SHAPES,
+    THETA_LABEL,
+    History,
+    draw_history,
+    draw_means,
+    finished,
+    legend_above,
+    marker,
+    procedure_marker,
+)
 from postprocess.study_runs import ASPECT
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 _TIME_LABEL = "time since the hook began to rise [s]"
 _FORCE_LABEL = r"force on the hook $F/(n W_\mathrm{s})$ [-]"
 _NET_LABEL = r"upper less lower hook, $F/(n W_\mathrm{s})$ [-]"
 _PEAK_LABEL = r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]"
 _CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ before the pull [-]"
-_THETA_LABEL, _ASPECT_LABEL = r"amplitude $\theta$ [degree]", r"aspect ratio $l/w$ [-]"
 _LABELS = {
     SHAPE: "shape change",
     EXTERNAL: "external",
     INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
     STATIC: "static",
 }
-_COLOURS = {SHAPE: figures.ORANGE, EXTERNAL: figures.BLUE, INTERNAL: figures.SKY, STATIC: figures.GREY}
-_MARKERS = {SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"}
 _HISTORIES = f"Line: mean over seeds of means over {WINDOW:g} s; band: lowest to highest seed; in brackets: seeds."
 
 
@@ -148,7 +156,6 @@ def _draw_forces(
     net: bool = False,
 ) -> list[Path]:
     figure, axes = figures.new_figure(height=2.8)
-    drawn = 0
     for line in lines:
         names = line.part(runs)["run"]
         histories = [
@@ -157,13 +164,12 @@ def _draw_forces(
         ]
         if histories:
             draw_history(axes, histories, WINDOW, colour=line.colour, label=f"{line.label} ({len(histories)})")
-            drawn += 1
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=min(0.0, float(axes.dataLim.y0)))
     axes.set_xlabel(_TIME_LABEL)
     axes.set_ylabel(_NET_LABEL if net else _FORCE_LABEL)
-    _legend_above(axes, drawn)
+    legend_above(axes)
     return finished(figure, path, [f"{_HISTORIES} Broken line: weight of all smarticles.", *footer])
 
 
@@ -173,9 +179,9 @@ def _draw_peaks(path: Path, x: str, points: pd.DataFrame, footer: Sequence[str])
     internal = points[points[PROCEDURE] == INTERNAL]
     part = at_shown_aspect(internal) if x == THETA else of_procedure(internal, INTERNAL)
     part = part.sort_values(x)
-    look: dict[str, Any] = marker("o", figures.SKY, figures.SKY) | {"linestyle": (0, (2, 1.5))}
+    look: dict[str, Any] = procedure_marker(INTERNAL) | {"linestyle": (0, (2, 1.5))}
     draw_means(axes, part[x], part[PEAK], part[marked(PEAK, "95 %")].to_numpy(), look=look, label="mean over seeds")
-    axes.set_xlabel(_THETA_LABEL if x == THETA else _ASPECT_LABEL)
+    axes.set_xlabel(THETA_LABEL if x == THETA else ASPECT_LABEL)
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)
     return finished(figure, path, footer)
@@ -184,7 +190,6 @@ def _draw_peaks(path: Path, x: str, points: pd.DataFrame, footer: Sequence[str])
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     """Peak force against ⟨N⟩: every run, and the means with their standard errors."""
     figure, axes = figures.new_figure(height=2.8)
-    drawn = 0
     for line in _all_points(runs):
         one, mean = line.part(runs), line.part(points)
         if one.empty:
@@ -193,11 +198,10 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
         look = {"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"}
         errors = {"xerr": mean[marked(CROSSINGS, "SE")], "yerr": mean[marked(PEAK, "SE")]}
         axes.errorbar(mean[CROSSINGS], mean[PEAK], **errors, **look, label=line.label)
-        drawn += 1
     axes.set_xlabel(_CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)
-    _legend_above(axes, drawn)
+    legend_above(axes)
     told = "Small: single runs; large: means over seeds with standard errors, not 95 %."
     return finished(figure, path, [told, *footer])
 
@@ -205,7 +209,7 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
 def _procedures() -> list[_Line]:
     """The procedures at the aspect ratio and the amplitude of the comparison."""
     return [
-        _Line(label=label, colour=_COLOURS[name], shape=_MARKERS[name], part=_at_aspect_of(name))
+        _Line(label=label, colour=COLOURS[name], shape=SHAPES[name], part=_at_aspect_of(name))
         for name, label in _LABELS.items()
     ]
 
@@ -214,8 +218,3 @@ def _all_points(runs: pd.DataFrame) -> list[_Line]:
     """The procedures, and the internal oscillation of each other θ and l/w."""
     others = [*_amplitudes(runs, but=AMPLITUDE), *_aspects(runs, but=SHOWN_ASPECT)]
     return [*_procedures(), *(replace(line, label=f"internal, {line.label}") for line in others)]
-
-
-def _legend_above(axes: Axes, entries: int) -> None:
-    if entries:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

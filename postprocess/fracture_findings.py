@@ -18,6 +18,7 @@ import pandas as pd
 
 from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.fracture_runs import HELD_FAST, NET, PEAK, PEAK_RAISED
+from postprocess.pairs import told_less
 from postprocess.procedures_effects import of_procedure, paired
 from postprocess.procedures_runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.seeds import slope_within
@@ -51,7 +52,7 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
 
 def _told_less(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str]) -> str:
     """By how much one procedure is above others, seed by seed."""
-    return ", ".join(f"less {other} {told(paired(table, quantity, one, other), 3)}" for other in others)
+    return told_less({other: paired(table, quantity, one, other) for other in others}, ", ")
 
 
 def _above(table: pd.DataFrame, upper: str, lower: str) -> Verdict:

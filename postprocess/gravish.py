@@ -8,7 +8,6 @@ How errors and answers come about is in `postprocess.gravish_answers`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -25,8 +24,10 @@ from postprocess.gravish_answers import (
     summarise_runs,
 )
 from postprocess.gravish_reference import DIGITISING_ERROR, SHAKE_TIME, read_reference
+from postprocess.markdown import table_lines
 from postprocess.origin import Origin, make_folder
 from postprocess.packing import DEFINITIONS
+from postprocess.points import told_number
 from postprocess.study_runs import (
     ASPECT,
     DEFINITION,
@@ -159,26 +160,35 @@ def _footer(origin: Origin, runs: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _markdown(deviations: pd.DataFrame, verdicts: Sequence[Verdict]) -> list[str]:
-    parts = ["# Packing of shaken smarticles against Gravish et al. 2012", "", "## Verdicts", ""]
-    parts += ["| question | answer | evidence |", "| --- | --- | --- |"]
-    parts += [f"| {v.question} | {v.answer} | {v.evidence} |" for v in verdicts]
-    parts += ["", "## Mean absolute deviation", ""]
-    parts += ["| stage | meaning | points | mean absolute | mean, signed | largest |"]
-    parts += ["| --- | --- | --- | --- | --- | --- |"]
+    stages = []
     for stage, part in deviations.groupby("stage", sort=False):
         percent = part["deviation [%]"]
         largest = percent.loc[percent.abs().idxmax()]
-        parts.append(
-            f"| {stage} | {STAGES[stage]} | {len(part)} | {percent.abs().mean():.1f} % "
-            f"| {percent.mean():+.1f} % | {largest:+.1f} % |"
-        )
-    parts += ["", "## Points", ""]
-    parts += ["| stage | l/w | seeds | φ | Gravish | deviation |", "| --- " * 6 + "|"]
-    for _, row in deviations.iterrows():
-        error = row["phi 95 % [-]"]
-        bar = f" ± {error:.4f}" if math.isfinite(error) else ""
-        parts.append(
-            f"| {row['stage']} | {row[ASPECT]:g} | {row[SEEDS]} | {row['phi [-]']:.4f}{bar} "
-            f"| {row['phi Gravish [-]']:.4f} | {row['deviation [%]']:+.1f} % |"
-        )
-    return parts
+        numbers = [f"{percent.abs().mean():.1f} %", f"{percent.mean():+.1f} %", f"{largest:+.1f} %"]
+        stages.append([str(stage), STAGES[str(stage)], str(len(part)), *numbers])
+    points = [
+        [
+            row["stage"],
+            f"{row[ASPECT]:g}",
+            str(row[SEEDS]),
+            told_number(row["phi [-]"], ".4f", row["phi 95 % [-]"]),
+            f"{row['phi Gravish [-]']:.4f}",
+            f"{row['deviation [%]']:+.1f} %",
+        ]
+        for _, row in deviations.iterrows()
+    ]
+    return [
+        "# Packing of shaken smarticles against Gravish et al. 2012",
+        "",
+        "## Verdicts",
+        "",
+        *table_lines(["question", "answer", "evidence"], [(v.question, v.answer, v.evidence) for v in verdicts]),
+        "",
+        "## Mean absolute deviation",
+        "",
+        *table_lines(["stage", "meaning", "points", "mean absolute", "mean, signed", "largest"], stages),
+        "",
+        "## Points",
+        "",
+        *table_lines(["stage", "l/w", "seeds", "φ", "Gravish", "deviation"], points),
+    ]

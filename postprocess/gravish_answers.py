@@ -15,8 +15,9 @@ import numpy as np
 import pandas as pd
 
 from postprocess.gravish_reference import COLUMNS, DIGITISING_ERROR, reference_at
+from postprocess.points import mean_columns, seeds_of
 from postprocess.seeds import mean_over_seeds
-from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, SHAKEN, STAGES, measured_quantities
+from postprocess.study_runs import ASPECT, DEFINITION, SEEDS, SHAKEN, STAGES, measured_quantities
 
 ACCEPTED_DEVIATION = 10.0
 """Mean absolute deviation from Gravish's points that the study accepts [%]."""
@@ -57,15 +58,12 @@ def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
     for aspect, group in runs.groupby(ASPECT, sort=True):
         row: dict[str, object] = {
             ASPECT: aspect,
-            SEEDS: len(group),
-            "seeds": " ".join(map(str, sorted(group[SEED]))),
+            **seeds_of(group),
             SHAKEN: group[SHAKEN].mean(),
         }
         for quantity in measured_quantities(runs):
             mean = mean_over_seeds(group[f"{quantity} [-]"])
-            row[f"{quantity} [-]"] = mean.value
-            row[f"{quantity} SE [-]"] = mean.standard_error
-            row[f"{quantity} 95 % [-]"] = mean.half_width
+            row |= mean_columns(f"{quantity} [-]", mean)
             if quantity in _COMPARED:
                 value = reference_at(reference, aspect, _COMPARED[quantity])
                 row[f"{quantity} Gravish [-]"] = value

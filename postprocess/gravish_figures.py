@@ -13,6 +13,8 @@ from postprocess import figures
 from postprocess.manifest import RunManifest
 from postprocess.series import read_series
 from postprocess.study_figures import (
+    ASPECT_LABEL,
+    CROSSINGS_LABEL,
     History,
     bin_width,
     draw_ends,
@@ -101,7 +103,7 @@ def _draw_packing(
         ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
     ):
         _draw_means(axes, summary, f"{stage} {definition}", marker(shape, colour, face), label)
-    axes.set_xlabel(r"aspect ratio $l/w$ [-]")
+    axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
     axes.legend(loc="upper right")
@@ -115,8 +117,8 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
         ("crossings after", figures.BLUE, "at the end of shaking", _SHIFT),
     ):
         _draw_means(axes, summary, quantity, marker("D", figures.BLUE, face), label, shift=shift)
-    axes.set_xlabel(r"aspect ratio $l/w$ [-]")
-    axes.set_ylabel(r"links through a plane $\langle N\rangle$ [-]")
+    axes.set_xlabel(ASPECT_LABEL)
+    axes.set_ylabel(CROSSINGS_LABEL)
     axes.set_ylim(bottom=0)
     axes.legend(loc="best")
     return finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])

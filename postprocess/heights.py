@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
+from postprocess.bisection import least_reaching
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry import centres_of_mass, checked_vertices, link_lengths
 
@@ -98,11 +99,6 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
     wanted = weights.sum() * percentile / 100
     # A level link is a step of the sum; any small span makes it a steep line instead.
     span = np.maximum(upper - lower, 1e-12 * (upper.max() - lower.min()) + 1e-15)
-    low, high = float(lower.min()), float(upper.max())
-    for _ in range(60):
-        middle = (low + high) / 2
-        if weights @ np.clip((middle - lower) / span, 0, 1) < wanted:
-            low = middle
-        else:
-            high = middle
-    return high
+    return least_reaching(
+        lambda height: weights @ np.clip((height - lower) / span, 0, 1), wanted, float(lower.min()), float(upper.max())
+    )

@@ -5,13 +5,14 @@ Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import pandas as pd
 
 from postprocess import melting_figures
-from postprocess.findings import CRITERION, findings_table
+from postprocess.findings import CRITERION, findings_table, without_criterion
 from postprocess.manifest import RunManifest
 from postprocess.melting_findings import findings
 from postprocess.melting_runs import (
@@ -29,10 +30,10 @@ from postprocess.melting_runs import (
     Melting,
     measure_melting,
 )
-from postprocess.origin import Origin, make_folder
-from postprocess.procedures import SAVOIE
+from postprocess.origin import SAVOIE, Origin, make_folder
+from postprocess.points import told_means
 from postprocess.procedures_runs import PROCEDURE
-from postprocess.release_runs import in_order, markdown, means, told_means
+from postprocess.release_runs import in_order, markdown, means
 from postprocess.spread import OUTSIDE, TOUCHING
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import (
@@ -40,13 +41,21 @@ from postprocess.study_runs import (
     SEED,
     SEEDS,
     collect_runs,
-    refuse_mixture,
+    refuse_mixed_counts,
     refuse_repeats,
     told_bars,
     told_seeds,
 )
 
 _STUDY = "melting"
+_NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {
+        "procedure": lambda point: str(point[PROCEDURE]),
+        "l/w": lambda point: f"{point[ASPECT]:g}",
+        "lift [m/s]": lambda point: f"{point[LIFT]:g}",
+        "seeds": lambda point: str(point[SEEDS]),
+    }
+)
 _SHOWN = {
     BASE: ("radius before [m]", ".4f"),
     TOP: ("height before [m]", ".4f"),
@@ -90,9 +99,7 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
     names = [f"{row[PROCEDURE]} l/w {row[ASPECT]:g} lifted at {row[LIFT]:g} m/s" for row in rows]
     point = dict(zip((run.directory for run in manifests), names, strict=True))
     refuse_repeats(_STUDY, manifests, "point", lambda run: point[run.directory])
-    for aspect in {run.aspect_ratio for run in manifests}:
-        alike = [run for run in manifests if run.aspect_ratio == aspect]
-        refuse_mixture(_STUDY, alike, "count", lambda run: f"{run.count} smarticles")
+    refuse_mixed_counts(_STUDY, manifests)
     keys = [LIFT, ASPECT, PROCEDURE]
     runs = in_order(pd.DataFrame(rows), [LIFT, ASPECT, SEED])
     points = means(runs, keys, list(QUANTITIES))
@@ -112,13 +119,13 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
         f"{told_bars(counts, 'point')}.",
         f"{CRITERION}.",
     )
-    below = [line for line in footer if not line.startswith((CRITERION, "Error bars"))]
-    table = told_points(points)
+    below = [line for line in without_criterion(footer) if not line.startswith("Error bars")]
+    table = told_means(points, _NAMED, _SHOWN)
     files = origin.write(
         output,
         footer,
         tables={"runs": runs, "points": points, "findings": findings_table(found), "times": times(melted)},
-        text=("findings.md", markdown("Piles whose wall is taken away", found, table, dict(QUANTITIES))),
+        text=("findings.md", markdown("Piles whose wall is taken away", found, table, QUANTITIES)),
         draw=lambda: melting_figures.draw(output, runs=runs, melted=melted, manifests=manifests, footer=below),
     )
     return StudyReport(
@@ -128,13 +135,6 @@ def analyse(run_dirs: Sequence[Path | str], output: Path | str, *, note: str, co
         told=("Means over seeds ± standard error, at the end of the run.",),
         files=files,
     )
-
-
-def told_points(points: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of points for a person to read."""
-    keys = [PROCEDURE, ASPECT, LIFT, SEEDS]
-    header = ["procedure", "l/w", "lift [m/s]", "seeds", *(name for name, _ in _SHOWN.values())]
-    return header, told_means(points, keys, _SHOWN)
 
 
 def times(melted: dict[str, Melting]) -> pd.DataFrame:

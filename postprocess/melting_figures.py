@@ -12,7 +12,7 @@ from postprocess.melting_runs import CONTACT, ENTANGLED, HEIGHT, LIFT, SLOUGHED,
 from postprocess.procedures_runs import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
 from postprocess.release_runs import ORDER, around, removal
 from postprocess.strip import Row, draw_strip
-from postprocess.study_figures import History, bin_width, draw_history, finished
+from postprocess.study_figures import COLOURS, History, bin_width, draw_history, finished
 from postprocess.study_runs import ASPECT, SEED
 
 if TYPE_CHECKING:
@@ -33,12 +33,6 @@ _RANGES = {
     SPREAD: (0.98, 1.2),
     SLOUGHED: (-0.002, 0.1),
     TILT: (0.0, 10.0),
-}
-COLOURS: Mapping[str, str] = {
-    STATIC: figures.GREY,
-    EXTERNAL: figures.BLUE,
-    INTERNAL: figures.SKY,
-    SHAPE: figures.ORANGE,
 }
 _COLOURS = (
     "Each smarticle has a colour of its own, the same in all pictures of a row; first seed; a ring marks the wall."

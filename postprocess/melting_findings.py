@@ -19,10 +19,10 @@ from postprocess.melting_runs import (
     TOP,
     TOPPLED,
 )
+from postprocess.pairs import mean_difference, pairs
 from postprocess.procedures_runs import INTERNAL, SHAPE, STATIC
-from postprocess.release_runs import by_procedure, compared, of, paired
+from postprocess.release_runs import by_procedure, compared_with, of, paired
 from postprocess.seeds import mean_over_seeds
-from postprocess.study_runs import ASPECT, SEED
 
 WHOLE = 0.95
 """A pile holds together if more than this share of it is one cluster [-]: of 60 smarticles, no more than 2 apart."""
@@ -62,7 +62,7 @@ def _holds_together(runs: pd.DataFrame) -> Finding:
 
 
 def _entangled(runs: pd.DataFrame) -> Finding:
-    ours, verdict = compared(runs, ENTANGLED, SHAPE, (INTERNAL, STATIC), 1)
+    ours, verdict = compared_with(runs, ENTANGLED, SHAPE, (INTERNAL, STATIC), 1)
     return Finding(
         paper="Shape change holds together by entanglement, more than internal oscillation",
         ours=f"largest cluster by crossings in the end, shape-change {ours}; {by_procedure(runs, ENTANGLED)}",
@@ -73,7 +73,7 @@ def _entangled(runs: pd.DataFrame) -> Finding:
 
 
 def _keeps_its_edge(runs: pd.DataFrame) -> Finding:
-    ours, verdict = compared(runs, SLOUGHED, SHAPE, (INTERNAL,), -1)
+    ours, verdict = compared_with(runs, SLOUGHED, SHAPE, (INTERNAL,), -1)
     return Finding(
         paper="Shape change: smarticles at the edge do not come off, unlike after internal oscillation",
         ours=f"sloughed share, shape-change {ours}; {by_procedure(runs, SLOUGHED)}",
@@ -123,9 +123,8 @@ def _sloughs(runs: pd.DataFrame) -> Finding:
 
 def _low_and_wide(runs: pd.DataFrame) -> Finding:
     height = paired(runs, CENTRE, INTERNAL, STATIC)
-    keys = [ASPECT, SEED]
-    both = of(runs, INTERNAL)[[*keys, BASE]].merge(of(runs, STATIC)[[*keys, BASE]], on=keys)
-    width = mean_over_seeds(both[f"{BASE}_x"] / both[f"{BASE}_y"] - 1)
+    both = pairs(of(runs, INTERNAL), of(runs, STATIC), BASE)
+    width = mean_over_seeds(both["one"] / both["other"] - 1)
     bounds = [judge(negative(width), threshold=-SAME_WIDTH), judge(width, threshold=-SAME_WIDTH)]
     return Finding(
         paper="Internal oscillation lowers the pile and keeps its width",
@@ -137,7 +136,7 @@ def _low_and_wide(runs: pd.DataFrame) -> Finding:
 
 
 def _more_stable(runs: pd.DataFrame) -> Finding:
-    ours, verdict = compared(runs, HEIGHT, INTERNAL, (STATIC,), 1)
+    ours, verdict = compared_with(runs, HEIGHT, INTERNAL, (STATIC,), 1)
     return Finding(
         paper="Internal oscillation makes the pile more stable than it was as poured",
         ours=f"com height kept, internal {ours}; {by_procedure(runs, HEIGHT)}",
@@ -147,13 +146,11 @@ def _more_stable(runs: pd.DataFrame) -> Finding:
 
 
 def _lifted(runs: pd.DataFrame) -> Finding:
-    keys = [ASPECT, SEED]
     parts, verdicts = [], []
     for name in (INTERNAL, SHAPE):
         part = of(runs, name)
-        both = part[part[LIFT] > 0].merge(part[part[LIFT] == 0], on=keys)
         for quantity, told_as in ((HEIGHT, "com height kept"), (SLOUGHED, "sloughed")):
-            effect = mean_over_seeds(both[f"{quantity}_x"] - both[f"{quantity}_y"])
+            effect = mean_difference(part[part[LIFT] > 0], part[part[LIFT] == 0], quantity)
             parts.append(f"{name} {told_as} {told(effect, 3)}")
             # Either sign is a difference.
             either: Verdict = judge(effect)

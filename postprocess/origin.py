@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from dem.errors import InputError
 from postprocess import figures
 from postprocess.gravish_reference import CITATION, DIGITISING_ERROR, REFERENCE
 from postprocess.manifest import RunManifest
+from postprocess.markdown import table_lines
 from postprocess.measure import LAST_FRAMES
 from postprocess.packing import DEFINITIONS
 from postprocess.study_runs import DEFINITION, MissingRun
@@ -58,6 +59,11 @@ GRAVISH = Reference(
             "digitising_error": DIGITISING_ERROR,
         }
     ),
+)
+
+SAVOIE = Reference(
+    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
+    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
 )
 
 
@@ -128,16 +134,22 @@ class Origin:
         name, lines = text
         written[name] = write_text("\n".join([*lines, *markdown_ending(self.missing, footer)]), output / name)
         provenance = output / "provenance.json"
-        written[provenance.name] = write_text(_provenance(self, footer), provenance)
+        told = {column for table in tables.values() for column in table.columns}
+        written[provenance.name] = write_text(_provenance(self, footer, told), provenance)
         return MappingProxyType(written | {path.name: path for path in draw()})
 
 
-def _provenance(origin: Origin, footer: Sequence[str]) -> str:
-    """Everything about the origin of a study's results as JSON."""
+def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str]) -> str:
+    """Everything about the origin of a study's results as JSON; of φ where its tables have such columns."""
     try:
         version = importlib.metadata.version("smarticles")
     except importlib.metadata.PackageNotFoundError:
         version = "unknown"
+    packing: dict[str, object] = {
+        "definition": DEFINITION,
+        "definition_meaning": DEFINITIONS[DEFINITION],
+        "frames_averaged_at_most": LAST_FRAMES,
+    }
     content = {
         "format": 1,
         "study": origin.study,
@@ -145,9 +157,7 @@ def _provenance(origin: Origin, footer: Sequence[str]) -> str:
         "command": origin.command,
         "footer": list(footer),
         "analysed_with": {"smarticles": version},
-        "definition": DEFINITION,
-        "definition_meaning": DEFINITIONS[DEFINITION],
-        "frames_averaged_at_most": LAST_FRAMES,
+        **(packing if any(DEFINITION in column for column in columns) else {}),
         "reference": dict(origin.reference.facts),
         "runs": [
             {
@@ -196,8 +206,8 @@ def markdown_ending(missing: Sequence[MissingRun], footer: Sequence[str]) -> lis
     """The lines that end a report: missing runs and footer."""
     lines = []
     if missing:
-        lines += ["", "## Missing runs", "", "| run | status | cause |", "| --- | --- | --- |"]
-        lines += [f"| {run.directory} | {run.status} | {run.cause} |" for run in missing]
+        rows = [(run.directory, run.status, run.cause) for run in missing]
+        lines += ["", "## Missing runs", "", *table_lines(["run", "status", "cause"], rows)]
     return [*lines, "", "---", "", *(f"{line}  " for line in footer), ""]
 
 

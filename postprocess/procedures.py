@@ -7,19 +7,18 @@ into a cylinder go through one of three activities. What is measured of a run is
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 import pandas as pd
 
 from postprocess import procedures_figures
-from postprocess.findings import CRITERION, Finding, findings_table
-from postprocess.manifest import RunManifest
-from postprocess.origin import Origin, Reference, make_folder
+from postprocess.findings import CRITERION, Finding, findings_table, without_criterion
+from postprocess.markdown import findings_lines, meaning_lines, table_lines
+from postprocess.origin import SAVOIE, Origin, make_folder
 from postprocess.packing import DEFINITIONS
+from postprocess.points import ToldTable, told_means
 from postprocess.procedures_findings import findings
 from postprocess.procedures_runs import (
     ACTIVE,
@@ -27,15 +26,15 @@ from postprocess.procedures_runs import (
     CROSSINGS,
     ENERGY,
     HEIGHT,
-    INTERNAL,
+    NAMED,
     PHI,
     PHI_ACTIVE,
     PROCEDURE,
     QUANTITIES,
     THETA,
-    marked,
     points,
     procedure_row,
+    refuse_unlike,
     samples,
     static_spread,
 )
@@ -47,18 +46,19 @@ from postprocess.study_runs import (
     MissingRun,
     collect_runs,
     refuse_mixture,
-    refuse_repeats,
     runs_table,
     told_bars,
     told_seeds,
 )
 
 _STUDY = "procedures"
-
-SAVOIE = Reference(
-    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
-    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
-)
+_SHOWN = {
+    PHI_ACTIVE: ("φ_f", ".4f"),
+    PHI: ("φ at rest again", ".4f"),
+    CROSSINGS: ("⟨N⟩", ".2f"),
+    ENERGY: ("energy [J]", ".2e"),
+    HEIGHT: ("h/h0", ".3f"),
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,14 +106,14 @@ def analyse_procedures(
     """
     output = make_folder(output)
     manifests, rows, missing = collect_runs(_STUDY, run_dirs, procedure_row)
-    _refuse_unlike(manifests, rows)
+    refuse_mixture(_STUDY, manifests, "count", lambda run: f"{run.count} smarticles")
+    refuse_unlike(_STUDY, manifests, rows)
     runs = runs_table(rows).sort_values([PROCEDURE, THETA, ASPECT, SEED], ignore_index=True)
     table = samples(runs)
     means, found = points(table), findings(table)
     origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command, reference=SAVOIE)
     footer = _footer(origin, runs, means)
-    # How verdicts come about is no matter of figures.
-    below = [line for line in footer if not line.startswith(CRITERION)]
+    below = without_criterion(footer)
     files = origin.write(
         output,
         footer,
@@ -122,26 +122,6 @@ def analyse_procedures(
         draw=lambda: procedures_figures.draw(output, points=means, runs=runs, manifests=manifests, footer=below),
     )
     return ProceduresReport(runs=runs, points=means, findings=found, missing=missing, footer=footer, files=files)
-
-
-def _refuse_unlike(manifests: Sequence[RunManifest], rows: Sequence[Mapping[str, object]]) -> None:
-    """Refuses runs that must not be averaged or compared with each other."""
-    refuse_mixture(_STUDY, manifests, "count", lambda run: f"{run.count} smarticles")
-    row_of = dict(zip((run.directory for run in manifests), rows, strict=True))
-
-    def lasting(run: RunManifest) -> str:
-        row = row_of[run.directory]
-        return f"{row[PROCEDURE]} for {row[ACTIVE]:.3g} s"
-
-    def name(run: RunManifest) -> str:
-        row = row_of[run.directory]
-        theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
-        return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"
-
-    for procedure in sorted({str(row[PROCEDURE]) for row in rows}):
-        alike = [run for run in manifests if row_of[run.directory][PROCEDURE] == procedure]
-        refuse_mixture(_STUDY, alike, "duration", lasting)
-    refuse_repeats(_STUDY, manifests, "point", name)
 
 
 def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[str, ...]:
@@ -163,34 +143,21 @@ def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[st
 
 
 def _markdown(found: Sequence[Finding], means: pd.DataFrame) -> list[str]:
-    lines = ["# Procedures of smarticles against the findings of Savoie et al.", ""]
-    lines += ["| finding in the paper | ours (± standard error) | verdict | found if |", "| --- " * 4 + "|"]
-    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in found]
-    lines += ["", "## Points", "", "Means over seeds ± standard error. Of θ only what the hinge reaches is run: a barb"]
-    lines += ["swings to 90° + θ/2 · 0.7/(l/w), 105° at most, so θ is at most 30° (l/w)/0.7.", ""]
-    header, rows = told_points(means)
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    lines += ["", "What the columns of `points.csv` are:", ""]
-    return lines + [f"- `{name}`: {meaning}" for name, meaning in QUANTITIES.items()]
+    return [
+        "# Procedures of smarticles against the findings of Savoie et al.",
+        "",
+        *findings_lines(found),
+        "",
+        "## Points",
+        "",
+        "Means over seeds ± standard error. Of θ only what the hinge reaches is run: a barb",
+        "swings to 90° + θ/2 · 0.7/(l/w), 105° at most, so θ is at most 30° (l/w)/0.7.",
+        "",
+        *table_lines(*told_points(means)),
+        *meaning_lines("points.csv", QUANTITIES),
+    ]
 
 
-def told_points(means: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of points for a person to read."""
-    columns = {
-        PHI_ACTIVE: ("φ_f", ".4f"),
-        PHI: ("φ at rest again", ".4f"),
-        CROSSINGS: ("⟨N⟩", ".2f"),
-        ENERGY: ("energy [J]", ".2e"),
-        HEIGHT: ("h/h0", ".3f"),
-    }
-    rows = []
-    for _, point in means.iterrows():
-        theta = "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°"
-        row = [str(point[PROCEDURE]), theta, f"{point[ASPECT]:g}", str(point[SEEDS])]
-        for quantity, (_, form) in columns.items():
-            value, error = point[quantity], point[marked(quantity, "SE")]
-            cell = "-" if math.isnan(value) else f"{value:{form}}"
-            row.append(f"{cell} ± {error:{form}}" if math.isfinite(error) else cell)
-        rows.append(row)
-    return ["procedure", "θ", "l/w", "seeds", *(name for name, _ in columns.values())], rows
+def told_points(means: pd.DataFrame) -> ToldTable:
+    """The table of points for a person to read."""
+    return told_means(means, NAMED, _SHOWN)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from postprocess.findings import Verdict, all_of, judge, negative, told
+from postprocess.pairs import mean_difference, pairs
 from postprocess.procedures_runs import AMPLITUDE, INTERNAL, PROCEDURE, THETA
 from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import ASPECT, SEED
@@ -19,18 +20,14 @@ def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
     return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL else chosen
 
 
-def pairs(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
+def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
     """Values of two procedures for the same aspect ratio and seed: columns `one` and `other`."""
-    keys = [ASPECT, SEED]
-    left = of_procedure(table, one)[[*keys, quantity]].rename(columns={quantity: "one"})
-    right = of_procedure(table, other)[[*keys, quantity]].rename(columns={quantity: "other"})
-    return left.merge(right, on=keys).dropna()
+    return pairs(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
     """One procedure less another, mean over pairs of the same aspect ratio and seed."""
-    both = pairs(table, quantity, one, other)
-    return mean_over_seeds(both["one"] - both["other"])
+    return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def against_aspect(part: pd.DataFrame, quantity: str) -> Slope:
@@ -53,7 +50,7 @@ def compared(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str]
     """Whether one procedure is above (sign 1) or below (−1) each of others, pair by pair."""
     parts, verdicts = [], []
     for other in others:
-        both = pairs(table, quantity, one, other)
+        both = pairs_of(table, quantity, one, other)
         differences = both["one"] - both["other"]
         effect, means = mean_over_seeds(differences), differences.groupby(both[ASPECT]).mean()
         places = f", {'above' if sign > 0 else 'below'} at {(sign * means > 0).sum()} of {len(means)} l/w"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dem.errors import InputError
 from postprocess import figures
 from postprocess.manifest import RunManifest
+from postprocess.points import marked
 from postprocess.procedures_effects import of_procedure
 from postprocess.procedures_runs import (
     ACTIVE,
@@ -24,30 +25,32 @@ from postprocess.procedures_runs import (
     STATIC,
     THETA,
     height_history,
-    marked,
 )
 from postprocess.study_figures import (
+    ASPECT_LABEL,
+    COLOURS,
+    CROSSINGS_LABEL,
+    THETA_LABEL,
     History,
     bin_width,
     draw_ends,
     draw_history,
     draw_means,
     finished,
+    legend_above,
     marker,
+    procedure_marker,
     told_histories,
 )
 from postprocess.study_runs import ASPECT
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 _SHOWN_ASPECT = 0.7
 """Aspect ratio whose heights are drawn against time, as in the paper [-]."""
 
-_ASPECT_LABEL, _THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
 _PHI_LABEL = r"packing fraction $\phi_\mathrm{f}$ at the end of the activity [-]"
-_CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
 _ENERGY_LABEL = "energy per smarticle [J]"
 _INTERNAL_LABEL = rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°"
 _LABELS = {
@@ -55,12 +58,6 @@ _LABELS = {
     EXTERNAL: "external oscillation",
     INTERNAL: _INTERNAL_LABEL,
     STATIC: r"static ($\phi_0$)",
-}
-_LOOKS = {
-    SHAPE: marker("s", figures.ORANGE, figures.ORANGE),
-    EXTERNAL: marker("D", figures.BLUE, figures.BLUE),
-    INTERNAL: marker("o", figures.SKY, figures.SKY),
-    STATIC: marker("^", figures.GREY, "white"),
 }
 # To keep error bars apart.
 _SHIFTS = {SHAPE: -0.006, EXTERNAL: 0.006, INTERNAL: 0.0, STATIC: 0.0}
@@ -89,10 +86,10 @@ def draw(
     """
     panels = [
         _Panel(name="phi_aspect", quantity=PHI_ACTIVE, label=_PHI_LABEL, lines=_of_procedures),
-        _Panel(name="crossings_aspect", quantity=CROSSINGS, label=_CROSSINGS_LABEL, lines=_of_procedures),
+        _Panel(name="crossings_aspect", quantity=CROSSINGS, label=CROSSINGS_LABEL, lines=_of_procedures),
         _Panel(name="energy_aspect", quantity=ENERGY, label=_ENERGY_LABEL, lines=_of_energies, log=True),
         _Panel(name="phi_theta", quantity=PHI_ACTIVE, label=_PHI_LABEL, x=THETA, lines=_of_aspects),
-        _Panel(name="crossings_theta", quantity=CROSSINGS, label=_CROSSINGS_LABEL, x=THETA, lines=_of_aspects),
+        _Panel(name="crossings_theta", quantity=CROSSINGS, label=CROSSINGS_LABEL, x=THETA, lines=_of_aspects),
         _Panel(name="energy_theta", quantity=ENERGY, label=_ENERGY_LABEL, x=THETA, lines=_of_aspects, log=True),
     ]
     with figures.style():
@@ -126,7 +123,7 @@ class _Panel:
 
 def _of_procedures(points: pd.DataFrame) -> list[_Line]:
     return [
-        _Line(points=of_procedure(points, name), label=label, look=_LOOKS[name], shift=_SHIFTS[name])
+        _Line(points=of_procedure(points, name), label=label, look=procedure_marker(name), shift=_SHIFTS[name])
         for name, label in _LABELS.items()
     ]
 
@@ -166,7 +163,7 @@ def _draw_panel(path: Path, panel: _Panel, points: pd.DataFrame, footer: Sequenc
         x, values = line.points[panel.x] + line.shift, line.points[panel.quantity]
         half_widths = line.points[marked(panel.quantity, "95 %")].to_numpy()
         draw_means(axes, x, values, half_widths, look=line.look, label=line.label)
-    axes.set_xlabel(_ASPECT_LABEL if panel.x == ASPECT else _THETA_LABEL)
+    axes.set_xlabel(ASPECT_LABEL if panel.x == ASPECT else THETA_LABEL)
     axes.set_ylabel(panel.label)
     if not lines:
         axes.text(0.5, 0.5, "no runs for this yet", transform=axes.transAxes, ha="center", va="center")
@@ -174,14 +171,9 @@ def _draw_panel(path: Path, panel: _Panel, points: pd.DataFrame, footer: Sequenc
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0)
-    _legend_above(axes, len(lines))
+    legend_above(axes)
     shifted = any(line.shift for line in lines)
     return finished(figure, path, [*([_APART] if shifted else []), *footer])
-
-
-def _legend_above(axes: Axes, entries: int) -> None:
-    if entries:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def _draw_heights(
@@ -206,12 +198,12 @@ def _draw_heights(
     ends = [history.active for seeds in histories.values() for history in seeds]
     width = bin_width(ends)
     for procedure, seeds in histories.items():
-        draw_history(axes, seeds, width, colour=_LOOKS[procedure]["color"], label=_LABELS[procedure])
+        draw_history(axes, seeds, width, colour=COLOURS[procedure], label=_LABELS[procedure])
     draw_ends(axes, ends)
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6)
     axes.set_xlabel("time since the activity began [s]")
     axes.set_ylabel(r"height of the centre of mass $h/h_0$ [-]")
-    _legend_above(axes, len(histories))
+    legend_above(axes)
     told = [f"l/w = {aspect:g}. {told_histories(width, 'Each activity')}"]
     if without:
         told.append(f"No time series of the height: {', '.join(without)}.")

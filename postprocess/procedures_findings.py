@@ -21,7 +21,7 @@ from postprocess.procedures_effects import (
     compared,
     of_procedure,
     paired,
-    pairs,
+    pairs_of,
 )
 from postprocess.procedures_runs import (
     AMPLITUDE,
@@ -153,7 +153,7 @@ def _tighter_at_low_amplitude(table: pd.DataFrame) -> Finding:
 
 
 def _shape_change_costs(table: pd.DataFrame) -> Finding:
-    both = pairs(table, ENERGY, SHAPE, INTERNAL)
+    both = pairs_of(table, ENERGY, SHAPE, INTERNAL)
     both = both[(both["one"] > 0) & (both["other"] > 0)]
     ratio = np.log10(both["one"] / both["other"])
     effect = mean_over_seeds(ratio)

@@ -9,7 +9,7 @@ bounces, and is looser while it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measure import PASSIVE_PHASES, summarise_run
+from postprocess.points import mean_columns, ordered, seeds_of
 from postprocess.scene_file import read_phases
 from postprocess.seeds import mean_over_seeds
 from postprocess.series import Series, read_series
-from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, duration
+from postprocess.study_runs import ASPECT, DEFINITION, SEED, SEEDS, duration, refuse_mixture, refuse_repeats
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
 PROCEDURES: Mapping[str, str] = MappingProxyType(
@@ -49,6 +50,16 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
     }
 )
 """What is averaged over seeds: columns of `samples`."""
+
+NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {
+        "procedure": lambda point: str(point[PROCEDURE]),
+        "θ": lambda point: "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°",
+        "l/w": lambda point: f"{point[ASPECT]:g}",
+        "seeds": lambda point: str(point[SEEDS]),
+    }
+)
+"""What tells a point from others, for a person to read; see `points.told_means`."""
 
 _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
 _WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
@@ -242,27 +253,37 @@ def points(table: pd.DataFrame, quantities: Iterable[str] = tuple(QUANTITIES)) -
     """
     rows = []
     for (procedure, aspect, theta), group in table.groupby([PROCEDURE, ASPECT, THETA], sort=True, dropna=False):
-        row: dict[str, object] = {
-            PROCEDURE: procedure,
-            THETA: theta,
-            ASPECT: aspect,
-            SEEDS: len(group),
-            "seeds": " ".join(map(str, sorted(group[SEED]))),
-        }
+        row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, ASPECT: aspect, **seeds_of(group)}
         for quantity in quantities:
             mean = mean_over_seeds(group[quantity])
-            row[quantity] = mean.value
-            row[marked(quantity, "SE")] = mean.standard_error
-            row[marked(quantity, "95 %")] = mean.half_width
+            row |= mean_columns(quantity, mean)
             row[f"{quantity.rpartition(' [')[0]} seeds [-]"] = mean.count
         rows.append(row)
-    found = pd.DataFrame(rows)
-    order = {name: rank for rank, name in enumerate((STATIC, EXTERNAL, SHAPE, INTERNAL))}
-    ranks = found[PROCEDURE].map(order)
-    return found.assign(rank=ranks).sort_values(["rank", THETA, ASPECT], ignore_index=True).drop(columns="rank")
+    order = (STATIC, EXTERNAL, SHAPE, INTERNAL)
+    return ordered(pd.DataFrame(rows), [PROCEDURE, THETA, ASPECT], named=PROCEDURE, order=order)
 
 
-def marked(quantity: str, mark: str) -> str:
-    """Name of a column that belongs to a quantity's: the mark stands before the unit."""
-    name, _, unit = quantity.rpartition(" [")
-    return f"{name} {mark} [{unit}"
+def refuse_unlike(study: str, manifests: Sequence[RunManifest], rows: Sequence[Mapping[str, object]]) -> None:
+    """Refuses runs of one procedure that took different times, and a point's runs with the same seed.
+
+    Args:
+        study: Its name, for messages.
+        manifests: The runs.
+        rows: Their rows of the table of runs, in the same order.
+
+    Raises:
+        InputError: There are such.
+    """
+    row_of = dict(zip((run.directory for run in manifests), rows, strict=True))
+
+    def lasting(run: RunManifest) -> str:
+        row = row_of[run.directory]
+        return f"{row[PROCEDURE]} for {row[ACTIVE]:.3g} s"
+
+    def name(run: RunManifest) -> str:
+        row = row_of[run.directory]
+        theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
+        return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"
+
+    refuse_mixture(study, manifests, "duration", lasting, within=lambda run: str(row_of[run.directory][PROCEDURE]))
+    refuse_repeats(study, manifests, "point", name)

@@ -5,26 +5,21 @@ A run is poured, goes through one activity or none, rests, and loses its wall in
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
+from postprocess.findings import Finding, Verdict
 from postprocess.frames import Frame, FrameSequence, read_frames
 from postprocess.manifest import PhaseRecord, RunManifest
+from postprocess.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.measure import PASSIVE_PHASES
-from postprocess.procedures_runs import (
-    EXTERNAL,
-    INTERNAL,
-    PROCEDURE,
-    PROCEDURES,
-    SHAPE,
-    STATIC,
-    marked,
-)
+from postprocess.pairs import compared, mean_difference
+from postprocess.points import ToldTable, averaged, ordered, seeds_of, told_number
+from postprocess.procedures_runs import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 from postprocess.seeds import SeedMean, mean_over_seeds
-from postprocess.study_runs import ASPECT, SEED, SEEDS
+from postprocess.study_runs import ASPECT, SEED
 
 ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 """Procedures in the order of tables and pictures."""
@@ -99,21 +94,14 @@ def means(runs: pd.DataFrame, keys: Sequence[str], quantities: Sequence[str]) ->
     """
     rows = []
     for values, group in runs.groupby(list(keys), sort=True):
-        row: dict[str, object] = dict(zip(keys, values if isinstance(values, tuple) else (values,), strict=True))
-        row |= {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
-        for quantity in quantities:
-            mean = mean_over_seeds(group[quantity])
-            row[quantity] = mean.value
-            row[marked(quantity, "SE")] = mean.standard_error
-            row[marked(quantity, "95 %")] = mean.half_width
-        rows.append(row)
+        places = dict(zip(keys, values if isinstance(values, tuple) else (values,), strict=True))
+        rows.append({**places, **seeds_of(group), **averaged(group, quantities)})
     return in_order(pd.DataFrame(rows), [key for key in keys if key != PROCEDURE])
 
 
 def in_order(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     """Rows by keys, then by procedure as in `ORDER`."""
-    ranks = table[PROCEDURE].map({name: rank for rank, name in enumerate(ORDER)})
-    return table.assign(rank=ranks).sort_values([*keys, "rank"], ignore_index=True).drop(columns="rank")
+    return ordered(table, [*keys, PROCEDURE], named=PROCEDURE, order=ORDER)
 
 
 def of(runs: pd.DataFrame, name: str) -> pd.DataFrame:
@@ -123,16 +111,12 @@ def of(runs: pd.DataFrame, name: str) -> pd.DataFrame:
 
 def paired(runs: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
     """One procedure less another, mean over pairs of runs that were poured alike."""
-    keys = [ASPECT, SEED]
-    both = of(runs, one)[[*keys, quantity]].merge(of(runs, other)[[*keys, quantity]], on=keys).dropna()
-    return mean_over_seeds(both[f"{quantity}_x"] - both[f"{quantity}_y"])
+    return mean_difference(of(runs, one), of(runs, other), quantity)
 
 
-def compared(runs: pd.DataFrame, quantity: str, one: str, others: Sequence[str], sign: int) -> tuple[str, Verdict]:
+def compared_with(runs: pd.DataFrame, quantity: str, one: str, others: Sequence[str], sign: int) -> tuple[str, Verdict]:
     """Whether one procedure is above (sign 1) or below (−1) each of others, pair by pair; numbers and verdict."""
-    effects = {other: paired(runs, quantity, one, other) for other in others}
-    ours = "; ".join(f"less {other} {told(effect, 3)}" for other, effect in effects.items())
-    return ours, all_of([judge(effect if sign > 0 else negative(effect)) for effect in effects.values()])
+    return compared({other: paired(runs, quantity, one, other) for other in others}, sign)
 
 
 def by_procedure(runs: pd.DataFrame, quantity: str, form: str = ".3f") -> str:
@@ -141,40 +125,21 @@ def by_procedure(runs: pd.DataFrame, quantity: str, form: str = ".3f") -> str:
     for name in ORDER:
         mean = mean_over_seeds(of(runs, name)[quantity])
         if mean.count:
-            error = f" ± {mean.standard_error:{form}}" if mean.count > 1 else ""
-            parts.append(f"{name} {mean.value:{form}}{error}")
+            parts.append(f"{name} {told_number(mean.value, form, mean.standard_error)}")
     return ", ".join(parts) or "none"
 
 
-def told_means(points: pd.DataFrame, keys: Sequence[Hashable], shown: dict[str, tuple[str, str]]) -> list[list[str]]:
-    """Rows of a table of means for a person to read.
-
-    Args:
-        points: See `means`.
-        keys: Columns that come first as they are.
-        shown: Name and format of each quantity.
-    """
-    rows = []
-    for _, point in points.iterrows():
-        row = [f"{point[key]:g}" if isinstance(point[key], float) else str(point[key]) for key in keys]
-        for quantity, (_, form) in shown.items():
-            value, error = point[quantity], point[marked(quantity, "SE")]
-            cell = "-" if pd.isna(value) else f"{value:{form}}"
-            row.append(f"{cell} ± {error:{form}}" if pd.notna(error) else cell)
-        rows.append(row)
-    return rows
-
-
-def markdown(
-    title: str, found: Sequence[Finding], table: tuple[list[str], list[list[str]]], meanings: dict[str, str]
-) -> list[str]:
+def markdown(title: str, found: Sequence[Finding], table: ToldTable, meanings: Mapping[str, str]) -> list[str]:
     """Lines of `findings.md`: findings, points, and what their columns are."""
-    lines = [f"# {title}", "", "| finding in the paper | ours (± standard error) | verdict | found if |"]
-    lines += ["| --- " * 4 + "|"]
-    lines += [f"| {one.paper} | {one.ours} | **{one.verdict}** | {one.criterion} |" for one in found]
-    header, rows = table
-    lines += ["", "## Points", "", "Means over seeds ± standard error.", ""]
-    lines += [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    lines += ["", "What the columns of `points.csv` are:", ""]
-    return lines + [f"- `{name}`: {meaning}" for name, meaning in meanings.items()]
+    return [
+        f"# {title}",
+        "",
+        *findings_lines(found),
+        "",
+        "## Points",
+        "",
+        "Means over seeds ± standard error.",
+        "",
+        *table_lines(*table),
+        *meaning_lines("points.csv", meanings),
+    ]

@@ -17,12 +17,13 @@ import pandas as pd
 from postprocess import sensitivity_figure
 from postprocess.gravish_reference import read_reference, reference_at
 from postprocess.manifest import RunManifest
+from postprocess.markdown import table_lines
 from postprocess.origin import Origin, make_folder
+from postprocess.points import marked, seeds_of, told_number
 from postprocess.seeds import mean_over_seeds, relative_difference
 from postprocess.study_runs import (
     ASPECT,
     DEFINITION,
-    SEED,
     SEEDS,
     VARIANT,
     WHEN,
@@ -140,16 +141,12 @@ def summarise_variants(runs: pd.DataFrame, variants: Sequence[str]) -> pd.DataFr
     groups = {variant: runs[runs[VARIANT] == variant] for variant in variants}
     rows = []
     for variant, group in groups.items():
-        row: dict[str, object] = {
-            VARIANT: variant,
-            SEEDS: len(group),
-            "seeds": " ".join(map(str, sorted(group[SEED]))),
-        }
+        row: dict[str, object] = {VARIANT: variant, **seeds_of(group)}
         for name, quantity in COMPARED.items():
             column = f"{quantity} [-]"
             mean, baseline = mean_over_seeds(group[column]), mean_over_seeds(groups[variants[0]][column])
             row[column] = mean.value
-            row[f"{quantity} 95 % [-]"] = mean.half_width
+            row[marked(column, "95 %")] = mean.half_width
             change = None if variant == variants[0] else relative_difference(mean, baseline)
             row[f"{name} change [%]"] = change.value if change else math.nan
             row[f"{name} change 95 % [%]"] = change.half_width if change else math.nan
@@ -178,27 +175,23 @@ def _markdown(title: str, summary: pd.DataFrame, reference: Mapping[str, float])
     parts = [f"# {title}", ""]
     parts += [f"Gravish et al. 2012 at this l/w: {', '.join(known)}." if known else "Gravish has no point at this l/w."]
     parts += ["Changes are against the first row; those beyond their error are bold.", ""]
-    parts += ["| variant | seeds | φ_0 | change % | φ_f | change % | ⟨N⟩ after | change % |", "| --- " * 8 + "|"]
+    header = ["variant", "seeds", "φ_0", "change %", "φ_f", "change %", "⟨N⟩ after", "change %"]
+    rows = []
     for _, row in summary.iterrows():
         cells = [str(row[VARIANT]), str(row[SEEDS])]
         for name, quantity in COMPARED.items():
             cells.append(told_value(row[f"{quantity} [-]"], row[f"{quantity} 95 % [-]"], name))
             change = told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"])
             cells.append(f"**{change}**" if row[f"{name} clear"] else change)
-        parts.append(f"| {' | '.join(cells)} |")
-    return parts
+        rows.append(cells)
+    return [*parts, *table_lines(header, rows)]
 
 
 def told_value(value: float, half_width: float, name: str) -> str:
     """A mean with its half-width, as far as there are any; `name` is a key of `COMPARED`."""
-    digits = 4 if name.startswith("phi") else 2
-    if math.isnan(value):
-        return "-"
-    return f"{value:.{digits}f}" + (f" ± {half_width:.{digits}f}" if math.isfinite(half_width) else "")
+    return told_number(value, ".4f" if name.startswith("phi") else ".2f", half_width)
 
 
 def told_change(change: float, half_width: float) -> str:
     """A change with its half-width, both in per cent, as far as there are any."""
-    if math.isnan(change):
-        return "-"
-    return f"{change:+.1f}" + (f" ± {half_width:.1f}" if math.isfinite(half_width) else "")
+    return told_number(change, "+.1f", half_width)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
+from postprocess.bisection import least_reaching
 from postprocess.clusters import contact_clusters, entanglement_clusters
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry import centres_of_mass, checked_vertices, link_lengths
@@ -137,14 +138,8 @@ def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float
     start, along = points[:, :-1].reshape(-1, 2), np.diff(points, axis=1).reshape(-1, 2)
     weights = link_lengths(vertices).ravel()
     wanted = share * weights.sum()
-    low, high = 0.0, float(np.linalg.norm(points, axis=2).max())
-    for _ in range(60):
-        middle = (low + high) / 2
-        if weights @ _shares_within(start, along, middle) < wanted:
-            low = middle
-        else:
-            high = middle
-    return high
+    farthest = float(np.linalg.norm(points, axis=2).max())
+    return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), wanted, 0.0, farthest)
 
 
 def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:

@@ -6,16 +6,29 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postprocess import figures
+from postprocess.procedures_runs import EXTERNAL, INTERNAL, SHAPE, STATIC
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
+
+ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
+CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
+
+COLOURS: Mapping[str, str] = MappingProxyType(
+    {SHAPE: figures.ORANGE, EXTERNAL: figures.BLUE, INTERNAL: figures.SKY, STATIC: figures.GREY}
+)
+"""Colour of each procedure, the same in all studies."""
+
+SHAPES: Mapping[str, str] = MappingProxyType({SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"})
+"""Marker of each procedure, the same in all studies."""
 
 _LEAST_BIN = 0.1  # s: three periods of shaking at 30 Hz
 _BINS = 100
@@ -105,6 +118,18 @@ def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
         "elinewidth": 0.8,
         "capthick": 0.8,
     }
+
+
+def procedure_marker(procedure: str) -> dict[str, Any]:
+    """The marker of a procedure; that of the static state, which is none, is open."""
+    colour = COLOURS[procedure]
+    return marker(SHAPES[procedure], colour, "white" if procedure == STATIC else colour)
+
+
+def legend_above(axes: Axes) -> None:
+    """Puts the legend above the axes, where there is one."""
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def finished(figure: Figure, path: Path, footer: Sequence[str]) -> list[Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -105,21 +105,50 @@ def collect_runs(
 
 
 def refuse_mixture(
-    study: str, manifests: Sequence[RunManifest], quantity: str, value: Callable[[RunManifest], object]
+    study: str,
+    manifests: Sequence[RunManifest],
+    quantity: str,
+    value: Callable[[RunManifest], object],
+    *,
+    within: Callable[[RunManifest], Hashable] = lambda _: None,
 ) -> None:
     """Refuses runs that must be alike in some quantity and are not.
+
+    Args:
+        study: Its name, for messages.
+        manifests: The runs.
+        quantity: Its name, for messages.
+        value: The quantity of a run.
+        within: Of which group a run is; only those of one group must be alike.
 
     Raises:
         InputError: Two runs differ in it.
     """
+    firsts: dict[Hashable, RunManifest] = {}
     for run in manifests:
-        if value(run) != value(manifests[0]):
+        first = firsts.setdefault(within(run), run)
+        if value(run) != value(first):
             msg = (
                 f"study {study}: runs of different {quantity} must not be averaged: "
-                f"{manifests[0].directory} is {value(manifests[0])}, "
+                f"{first.directory} is {value(first)}, "
                 f"{run.directory} is {value(run)}; analyse them apart"
             )
             raise InputError(msg)
+
+
+def refuse_mixed_counts(study: str, manifests: Sequence[RunManifest]) -> None:
+    """Refuses runs of one aspect ratio that differ in their number of smarticles.
+
+    Raises:
+        InputError: Two runs do.
+    """
+    refuse_mixture(
+        study,
+        manifests,
+        "count",
+        lambda run: f"{run.count} smarticles at l/w {run.aspect_ratio:g}",
+        within=lambda run: round(run.aspect_ratio, 6),
+    )
 
 
 def refuse_repeats(
@@ -277,5 +306,9 @@ def told_bars(counts: pd.Series, point: str) -> str:
 def told_seeds(runs: pd.DataFrame, counts: pd.Series, point: str) -> str:
     """Which seeds there are and how many per point, for footers; arguments as in `told_bars`."""
     seeds = " ".join(map(str, sorted(set(runs[SEED]))))
-    per_point = str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"
-    return f"seeds {seeds} ({per_point} per {point})"
+    return f"seeds {seeds} ({told_range(counts)} per {point})"
+
+
+def told_range(counts: pd.Series) -> str:
+    """`3` or `1 to 3`: how many there are of each."""
+    return str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"

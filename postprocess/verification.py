@@ -15,6 +15,7 @@ import pandas as pd
 from dem.errors import InputError
 from postprocess import verification_figures
 from postprocess.convergence import observed_order
+from postprocess.markdown import table_lines
 from postprocess.origin import markdown_ending, write_tables, write_text
 
 BAND = 0.3
@@ -254,4 +255,4 @@ def _markdown(
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
     cells = [[f"{value:.6g}" if isinstance(value, float) else str(value) for value in row] for row in rows]
-    return [f"| {' | '.join(line)} |" for line in (list(header), ["---"] * len(header), *cells)]
+    return table_lines(header, cells)

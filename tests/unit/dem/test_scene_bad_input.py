@@ -275,6 +275,10 @@ def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
     assert message.startswith(expected) if expected.endswith(": ") else message == expected
 
 
+def test_nested_too_deeply(tmp_path: Path) -> None:
+    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read"
+
+
 def test_impossible_date(tmp_path: Path) -> None:
     assert refused(tmp_path, GOOD + "name: 2020-99-99\n") == "bad.yaml: not valid YAML: month must be in 1..12"
     assert refused(tmp_path, GOOD, ["name=2020-99-99"]) == "--set name=2020-99-99: the value is not valid YAML"

@@ -29,7 +29,7 @@ from postprocess.accuracy_runs import (
     Rung,
     work_precision,
 )
-from postprocess.procedures_runs import marked
+from postprocess.points import marked
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, VARIANT
 
 PHI_F = f"phi_f {DEFINITION} [-]"

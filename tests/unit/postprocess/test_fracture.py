@@ -33,7 +33,8 @@ from postprocess.fracture_runs import (
     WINDOWS,
     WORK,
 )
-from postprocess.procedures_runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA, marked
+from postprocess.points import marked
+from postprocess.procedures_runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from postprocess.pull import WINDOW
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 
@@ -141,6 +142,7 @@ def test_missing_runs_are_listed_and_the_rest_is_used(study):
     ]
     content = json.loads((study[0] / "out" / "provenance.json").read_text())
     assert (len(content["runs"]), content["study"]) == (14, "fracture")
+    assert content["definition"] == "second-highest-com"
     assert "14 of 16 runs, 2 missing; l/w (smarticles) 0.7 (12), 1 (12), seeds 1 2 3" in content["footer"][0]
 
 

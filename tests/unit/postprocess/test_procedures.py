@@ -13,6 +13,7 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from postprocess import procedures_figures
+from postprocess.points import marked
 from postprocess.procedures import analyse_procedures, told_points
 from postprocess.procedures_runs import (
     CROSSINGS,
@@ -25,7 +26,6 @@ from postprocess.procedures_runs import (
     STRAIGHT,
     THETA,
     half_compaction,
-    marked,
 )
 from postprocess.study_runs import ASPECT, SEED, SEEDS
 
@@ -219,6 +219,7 @@ def test_every_output_names_its_origin(study):
         assert "Gravish" not in text
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["reference"]["doi"] == "10.1039/d2sm01573k"
+    assert origin["definition"] == "second-highest-com"
     assert {r["directory"] for r in origin["runs"]} == {str(root / name) for name in report.runs["run"]}
 
 
