@@ -22,6 +22,7 @@ from postprocess.fracture_runs import (
     HELD,
     HELD_FAST,
     LEFT,
+    LIMIT,
     NET,
     PEAK,
     PEAK_RAISED,
@@ -44,6 +45,7 @@ from postprocess.study_runs import (
     refuse_mixed_counts,
     runs_table,
     told_bars,
+    told_range,
     told_seeds,
 )
 
@@ -102,8 +104,17 @@ def _footer(origin: Origin, runs: pd.DataFrame, means: pd.DataFrame) -> tuple[st
         f"Peak: largest mean over {WINDOW:g} s of the force that raises the hook, over the weight n W_s of all "
         f"smarticles; free: below {FREE:g} of it for good; load at the end: mean over the last {END:g} s. ⟨N⟩: links "
         f"of others through a smarticle's plane at rest before the pull. {told_bars(counts, 'point')}.",
+        *_told_held(runs),
         f"{CRITERION}.",
     )
+
+
+def _told_held(runs: pd.DataFrame) -> tuple[str, ...]:
+    """What peaks of piles that held fast are; nothing where none did."""
+    held = int(runs[HELD_FAST].sum())
+    limits = told_range(runs[LIMIT].round(3))
+    told = f"Held fast: {held} of {len(runs)} runs, whose hook stopped at {limits} n W_s; their peaks are lower bounds."
+    return (told,) if held else ()
 
 
 def _markdown(found: Sequence[Finding], header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from postprocess import figures
 from postprocess.fracture_findings import SHOWN_ASPECT, at_shown_aspect
-from postprocess.fracture_runs import PEAK, force_history
+from postprocess.fracture_runs import HELD_FAST, PEAK, force_history
 from postprocess.manifest import RunManifest
 from postprocess.points import marked
 from postprocess.procedures_effects import of_procedure
@@ -53,7 +53,10 @@ _LABELS = {
     INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
     STATIC: "static",
 }
-_HISTORIES = f"Line: mean over seeds of means over {WINDOW:g} s; band: lowest to highest seed; in brackets: seeds."
+_HISTORIES = (
+    f"Line: mean over seeds of means over {WINDOW:g} s, as far as all of them go; band: lowest to highest seed; "
+    "in brackets: seeds."
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,6 +198,9 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
         if one.empty:
             continue
         axes.plot(one[CROSSINGS], one[PEAK], line.shape, color=line.colour, markersize=1.8, alpha=0.55)
+        held = one[one[HELD_FAST] > 0]
+        arrow = {"yerr": 0.08 * float(runs[PEAK].max()), "lolims": True, "linestyle": "none", "capsize": 1.6}
+        axes.errorbar(held[CROSSINGS], held[PEAK], **arrow, color=line.colour, elinewidth=0.6, alpha=0.55)
         look = {"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"}
         errors = {"xerr": mean[marked(CROSSINGS, "SE")], "yerr": mean[marked(PEAK, "SE")]}
         axes.errorbar(mean[CROSSINGS], mean[PEAK], **errors, **look, label=line.label)
@@ -202,7 +208,7 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)
     legend_above(axes)
-    told = "Small: single runs; large: means over seeds with standard errors, not 95 %."
+    told = "Small: single runs, with an arrow: held fast; large: means over seeds with standard errors, not 95 %."
     return finished(figure, path, [told, *footer])
 
 
