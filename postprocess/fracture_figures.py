@@ -199,7 +199,12 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
             continue
         axes.plot(one[CROSSINGS], one[PEAK], line.shape, color=line.colour, markersize=1.8, alpha=0.55)
         held = one[one[HELD_FAST] > 0]
-        arrow = {"yerr": 0.08 * float(runs[PEAK].max()), "lolims": True, "linestyle": "none", "capsize": 1.6}
+        arrow: dict[str, Any] = {
+            "yerr": 0.08 * float(runs[PEAK].max()),
+            "lolims": True,
+            "linestyle": "none",
+            "capsize": 1.6,
+        }
         axes.errorbar(held[CROSSINGS], held[PEAK], **arrow, color=line.colour, elinewidth=0.6, alpha=0.55)
         look = {"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"}
         errors = {"xerr": mean[marked(CROSSINGS, "SE")], "yerr": mean[marked(PEAK, "SE")]}
