@@ -30,6 +30,7 @@ from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.parts import FIDELITIES, Contact, Container, Fidelity, Motor, Phase, Recording, Smarticle
 from dem.plane import Channel, Plane, check_plane
+from dem.refusal import first_line
 from dem.release import check_release
 from dem.yaml_text import StrictLoader
 
@@ -291,7 +292,7 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        msg = f"{source}: {_first_line(error, data)}"
+        msg = f"{source}: {first_line(error, data)}"
         raise InputError(msg) from None
 
 
@@ -345,46 +346,3 @@ def json_schema() -> dict[str, Any]:
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
     return schema
-
-
-def _first_line(error: ValidationError, data: Any) -> str:
-    """The first of pydantic's errors as `key: what, value; way out`, and how many more there are."""
-    # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
-    # Nor is a list too short whose items are there, but wrong.
-    errors = [
-        found
-        for found in error.errors()
-        if found["type"] != "default_factory_not_called" and not (found["type"] == "too_short" and found["input"])
-    ]
-    first = errors[0]
-    place = _key(first["loc"], data)
-    text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "missing":
-        text = "missing; it has no default"
-    elif first["type"] == "union_tag_invalid":
-        text = f"type: {first['ctx']['tag']!r} is not known; known: {first['ctx']['expected_tags']}"
-    elif first["type"] == "union_tag_not_found":
-        text = f"type: missing, got {first['input']!r}; write which one it is, see `smarticles schema`"
-    elif first["type"] == "model_attributes_type":
-        text = f"expected keys and values, {{type: …}}, got {first['input']!r}"
-    elif first["type"] != "value_error":
-        text = f"{text[0].lower()}{text[1:]}, got {first['input']!r}"
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return f"{place}: {text}{more}" if place else f"{text}{more}"
-
-
-def _key(steps: Sequence[int | str], data: Any) -> str:
-    """Pydantic's path to a value as the key of the scene file.
-
-    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
-    """
-    here, keys = data, []
-    for step in steps:
-        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
-            continue
-        keys.append(str(step))
-        if isinstance(here, Mapping):
-            here = here.get(step)
-        elif isinstance(here, list) and isinstance(step, int):
-            here = here[step] if step < len(here) else None  # one that is missing
-    return ".".join(keys)

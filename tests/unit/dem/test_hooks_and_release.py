@@ -120,20 +120,32 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [DEPOSIT, PULL]}, "phases.1: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {}` "),
     (
         {"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": 0}]},
-        "phases.1.speed_m_per_s: input should be greater",
+        "phases.1.speed_m_per_s: 0 m/s is out of range; use more than 0 m/s",
     ),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": -1}]}, "phases.1.speed_m_per_s: input should be "),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]}, "phases.1.distance_m: input should be greater"),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": -1}]},
+        "phases.1.speed_m_per_s: -1 m/s is out of range",
+    ),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]},
+        "phases.1.distance_m: 0 m is out of range; use more than 0 m",
+    ),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m: 23.4 means 23.4 m"),
     (
         {"hooks": {}, "phases": [DEPOSIT, {**PULL, "duration_s": 1}]},
-        "phases.1: duration_s: 1 s is too short to raise the hook by distance_m = 0.0234 m at speed_m_per_s = "
+        "phases.1.duration_s: 1 s is too short to raise the hook by distance_m = 0.0234 m at speed_m_per_s = "
         "0.0117 m/s; use at least 2 s",
     ),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which: input should be 'upper', got "),
-    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": 0}]}, "phases.1.speed_m_per_s: input should be greater than 0"),
-    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s: input should be greater than"),
-    ({"phases": [DEPOSIT, {**REMOVE, "parts": "floor"}]}, "phases.1.parts: input should be 'wall', got 'floor'"),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]},
+        "phases.1.which: 'lower' is not known; use 'upper'",
+    ),
+    (
+        {"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": 0}]},
+        "phases.1.speed_m_per_s: 0 m/s is out of range; use more than",
+    ),
+    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s: -0.1 m/s is out of range; "),
+    ({"phases": [DEPOSIT, {**REMOVE, "parts": "floor"}]}, "phases.1.parts: 'floor' is not known; use 'wall'"),
     (
         {"phases": [DEPOSIT, REMOVE, SHAKE, REMOVE]},
         "phases.3: remove-container, but phases.1 did so already; leave one of them out",
@@ -162,17 +174,17 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"hooks": {"side_m": 0.02}}, "hooks.side_m: 0.02 m is more than length_m = 0.0117 m; bars are long and thin"),
     ({"hooks": {"length_m": 11.7}}, "hooks.length_m: 11.7 means 11.7 m, which no smarticle scene needs; "),
     ({"hooks": {"sides_m": 1}}, "hooks: unknown key 'sides_m'; did you mean 'side_m'?"),
-    ({"hooks": True}, "hooks: got the boolean true, expected a value of its kind"),
-    ({"hooks": [1]}, "hooks: input should be a valid dictionary"),
+    ({"hooks": True}, "hooks: got the boolean true, expected keys and values"),
+    ({"hooks": [1]}, "hooks: [1] is not keys and values; write them as {key: value}"),
     (
         {"container": {"tiers": [TIERS[1], TIERS[0]]}},
-        "container: tiers.1.radius_m: 0.0234 m is wider than the tier below, 0.018 m; a mould is filled from the top "
+        "container.tiers.1.radius_m: 0.0234 m is wider than the tier below, 0.018 m; a mould is filled from the top "
         "and lifted off: order tiers from wide to narrow",
     ),
-    ({"container": {"tiers": []}}, "container.tiers: tuple should have at least 1 item"),
+    ({"container": {"tiers": []}}, "container.tiers: an empty list; give at least 1 item"),
     (
         {"container": {"tiers": TIERS, "radius_m": 0.02}},
-        "container: radius_m: 0.02 m, but tiers make it 0.0234 m; leave radius_m out",
+        "container.radius_m: 0.02 m, but tiers make it 0.0234 m; leave radius_m out",
     ),
     (
         {"container": {"tiers": [*TIERS, {"radius_m": 0.005, "height_m": 0.01}]}},
@@ -206,7 +218,7 @@ def test_an_error_in_the_smarticle_is_one_error(scene_data: SceneData) -> None:
     data = scene_data({"smarticle.middle_length_m": -1, "hooks": {}, "phases": [DEPOSIT, PULL]})
     with pytest.raises(InputError) as caught:
         parse_scene(data, source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: input should be greater than 0, got -1"
+    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: -1 m is out of range; use more than 0 m"
 
 
 def test_a_hook_may_be_pulled_out_over_the_wall(make_scene: MakeScene) -> None:
