@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from dem.actuation import actuated
-from dem.actuation_checks import actuation_warnings
-from dem.chain import Arrange
+from dem.advice import warnings_of
 from dem.construction import in_order
+from dem.durations import expected_duration, known_duration
 from dem.effects import Adds, Decision, decide
 from dem.parts import Deposit
 from dem.scene import Scene
@@ -20,9 +19,8 @@ from dem.timestep import stable_step, time_step
 COST_PER_SPHERE_STEP = 3.3e-7
 # A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
 ARTICULATED_SHARE = 1.7
-# A pour costs about half of the same time in the full pile, since the pile grows from nothing; 0.1 s per layer.
+# A pour costs about half of the same time in the full pile, since the pile grows from nothing.
 POUR_SHARE = 0.5
-LAYER_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -104,15 +102,9 @@ def plan(scene: Scene) -> Plan:
     rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
     phases = []
     for index, phase in enumerate(scene.phases):
-        if isinstance(phase, Deposit):
-            estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
-            phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate))
-        elif isinstance(phase, Arrange):
-            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0))
-        else:
-            estimate = phase.duration_s
-            wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
-            phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall))
+        estimate = expected_duration(phase, scene.count)
+        share = POUR_SHARE if isinstance(phase, Deposit) else ARTICULATED_SHARE if actuated(phase) else 1.0
+        phases.append(PlannedPhase(index, phase.type, known_duration(phase), estimate, rate * estimate * share))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
     return Plan(
@@ -128,6 +120,6 @@ def plan(scene: Scene) -> Plan:
         engines=in_order(Adds.together(effect.adds for effect in effects).engines),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
-        warnings=actuation_warnings(scene),
+        warnings=warnings_of(scene),
         planar=scene.plane is not None,
     )

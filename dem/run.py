@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 
 from dem import effects
-from dem.actuation_checks import actuation_warnings
+from dem.advice import warnings_of
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
@@ -130,9 +130,8 @@ def _run(
             yade=yade,
             checkpoint_steps=round((scene.recording.checkpoint_interval_s or 0.0) / dt),
         )
-        for warning in actuation_warnings(scene):
-            log.warning("%s", warning)
-            bar.warn(warning)
+        for warning in warnings_of(scene):
+            simulation.warn(warning)
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()
@@ -191,8 +190,7 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
         return
     checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
     if warning:
-        log.warning("%s", warning)
-        simulation.recorder.progress.warn(warning)
+        simulation.warn(warning)
     simulation.restore(checkpoint)
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 

@@ -120,8 +120,15 @@ class Simulation:
             self.engine.time,
             entry["wall_s"],
         )
+        if warning := self._stage.memory.get("warning"):
+            self.warn(f"phases.{self._phase} ({phase.type}): {warning}")
         self._stage = None
         self._phase += 1
+
+    def warn(self, message: str) -> None:
+        """Tell the log and the person at the terminal."""
+        self.log.warning("%s", message)
+        self.recorder.progress.warn(message)
 
     def _advance(self) -> None:
         """Advance to the target step, recording what is due on the way."""

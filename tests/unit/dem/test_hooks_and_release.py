@@ -222,7 +222,7 @@ def test_an_error_in_the_smarticle_is_one_error(scene_data: SceneData) -> None:
 
 
 def test_a_hook_may_be_pulled_out_over_the_wall(make_scene: MakeScene) -> None:
-    make_scene({"hooks": {}, "container.height_m": 0.02, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
+    make_scene({"hooks": {}, "container.height_m": 0.03, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
 
 
 def test_the_wall_is_high_enough_for_the_hooks(make_scene: MakeScene) -> None:
