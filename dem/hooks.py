@@ -216,5 +216,5 @@ def hook_warnings(scene: Scene) -> tuple[str, ...]:
     return (
         f"hooks.upper_height_m: the hooks are {across:.3g} m from outside to outside, less than a smarticle's inner "
         f"length, {inside:.3g} m: one smarticle can hold both hooks, and then only the contacts give way; set them at "
-        f"least {inside - hooks.side_m:.3g} m apart, or measure it as it is",
+        f"least {1.005 * (inside - hooks.side_m):.3g} m apart, or measure it as it is",
     )

@@ -29,6 +29,7 @@ W, T2 = 0.0117, 0.5e-3
 DEPOSIT = {"type": "deposit"}
 PULL = {"type": "pull-hook"}
 REMOVE = {"type": "remove-container"}
+RELAX = {"type": "relax", "duration_s": 0.1}
 SHAKE = {"type": "shake", "duration_s": 0.1}
 TIERS = [{"radius_m": 0.0234, "height_m": 0.012}, {"radius_m": 0.018, "height_m": 0.012}]
 
@@ -171,6 +172,21 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"hooks": {"upper_height_m": 0.2}, "container.height_m": 0.1},
         "hooks.upper_height_m: 0.2 m is outside the container, whose wall ends at 0.1 m; use at most 0.09975 m",
     ),
+    (
+        {"hooks": {"upper_height_m": 0.3}, "phases": [DEPOSIT, RELAX, PULL]},
+        "hooks.upper_height_m: 0.3 m is above all that 10 smarticles can reach while they are poured, 0.108 m, so that "
+        "phases.2 (pull-hook) would feel nothing; lower it",
+    ),
+    (
+        {"container": {"tiers": [{**tier, "height_m": 0.01} for tier in TIERS]}},
+        "container.tiers: 0.02 m of wall is too low for one layer of the pour, spread over phases.0.layer_height_w = 1 "
+        "w, which reaches 0.02192 m; raise height_m of the top tier by at least 0.00192 m or lower layer_height_w",
+    ),
+    (
+        {"container.height_m": 0.02},
+        "container.height_m: 0.02 m of wall is too low for one layer of the pour, spread over phases.0.layer_height_w "
+        "= 1 w, which reaches 0.02192 m; raise it by at least 0.00192 m or lower layer_height_w",
+    ),
     ({"hooks": {"side_m": 0.02}}, "hooks.side_m: 0.02 m is more than length_m = 0.0117 m; bars are long and thin"),
     ({"hooks": {"length_m": 11.7}}, "hooks.length_m: 11.7 means 11.7 m, which no smarticle scene needs; "),
     ({"hooks": {"sides_m": 1}}, "hooks: unknown key 'sides_m'; did you mean 'side_m'?"),
@@ -306,3 +322,13 @@ def test_watchdog_knows_the_tiers() -> None:
     DOG.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
     with pytest.raises(RunError, match="left through the wall"):
         DOG.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)
+
+
+def test_a_layer_that_fits_by_either_way_out_is_let_pass(make_scene: MakeScene) -> None:
+    make_scene({"container.height_m": 0.02193})
+    make_scene({"container.height_m": 0.02, "phases.0.layer_height_w": 0.8})
+
+
+def test_a_high_hook_that_nobody_pulls_is_let_pass(make_scene: MakeScene) -> None:
+    make_scene({"hooks": {"upper_height_m": 0.3}})
+    make_scene({"hooks": {"upper_height_m": 0.1}, "phases": [DEPOSIT, RELAX, PULL]})
