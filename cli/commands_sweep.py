@@ -289,9 +289,17 @@ def _with_queue(runs: list[RunStatus], directory: Path) -> tuple[list[RunStatus]
     return [merged(run, tasks.get(run.name)) for run in runs], {"jobs": jobs, "error": None, "tasks": plain(tasks)}
 
 
+_ENDED_EARLY = ("failed", "interrupted", "stopped")
+
+
 def _status_table(runs: Sequence[RunStatus]) -> str:
     header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
     rows = [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs]
+    if any(run.state in _ENDED_EARLY for run in runs):
+        # What was computed after it is computed again.
+        header.insert(4, "checkpoint s")
+        for row, run in zip(rows, runs, strict=True):
+            row.insert(4, run.checkpoint_s if run.checkpoint_s is not None or run.state not in _ENDED_EARLY else "none")
     if any(run.job for run in runs):
         header.insert(2, "job")
         for row, run in zip(rows, runs, strict=True):

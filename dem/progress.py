@@ -37,6 +37,8 @@ class Progress:
     _start: float = 0.0
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
+    _checkpoint: float | None = None
+    _told: dict[str, object] = field(default_factory=dict)
 
     def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
         """A phase begins, or is gone on with.
@@ -57,6 +59,12 @@ class Progress:
         start = "\r\x1b[K" if self.show else ""
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
+    def checkpointed(self, time: float) -> None:
+        """There is a checkpoint of a simulated time [s], which the run would go on from: other processes know at once."""
+        self._checkpoint = time
+        if self._told:
+            self._tell(self._told)
+
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""
         now = _now()
@@ -64,7 +72,7 @@ class Progress:
             return
         self._last = now
         shown_phi = phi if math.isfinite(phi) else None
-        data = {
+        told = {
             "phase": self._phase,
             "phase_index": self._index,
             "time_s": time,
@@ -73,15 +81,20 @@ class Progress:
             "count": count,
             "wall_s": now - self._begun,
         }
+        if self._tell(told) and self.show:
+            self._draw(time, shown_phi, count, now)
+
+    def _tell(self, told: dict[str, object]) -> bool:
+        """Write `progress.json`, if that can be done."""
+        self._told = told
         temporary = self.folder / ".progress.partial.json"
         try:
-            temporary.write_text(json.dumps(data))
+            temporary.write_text(json.dumps(told | {"checkpoint_s": self._checkpoint}))
             os.replace(temporary, self.folder / "progress.json")  # noqa: PTH105
         except OSError:
             # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
-            return
-        if self.show:
-            self._draw(time, shown_phi, count, now)
+            return False
+        return True
 
     def finish(self) -> None:
         """The run has ended."""

@@ -167,10 +167,14 @@ class Simulation:
             "cpu_s": self.cpu,
         }
         write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
-        self.checkpointed = self.engine.time
+        self._note_checkpoint()
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
             raise StopRequestedError(msg)
+
+    def _note_checkpoint(self) -> None:
+        self.checkpointed = self.engine.time
+        self.recorder.progress.checkpointed(self.engine.time)
 
     def _check_space(self) -> None:
         # YADE does not notice a full disk when it saves, and would then load what it could not write.
@@ -193,7 +197,7 @@ class Simulation:
             self.engine.load(saved, state["engine"])
         finally:
             saved.unlink(missing_ok=True)
-        self.checkpointed = self.engine.time
+        self._note_checkpoint()
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
         self._stage = begin(self.scene, self._phase)

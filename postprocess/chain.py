@@ -16,28 +16,23 @@ import pandas as pd
 
 from postprocess import chain_figures
 from postprocess.chain_findings import findings, sensitivity
-from postprocess.chain_runs import (
-    AT_PEAK,
-    CARRIES,
-    CONFINEMENT,
-    COUNT,
-    FRACTURE,
-    LOSS,
-    PEAK,
-    QUANTITIES,
-    SPEED,
-    STIFFNESS,
-    VARIANT,
-    WALL,
-    WIDENING,
-    YIELD,
-    chain_row,
-    points,
-)
+from postprocess.chain_runs import CONFINEMENT, COUNT, SPEED, VARIANT, chain_row, points
 from postprocess.findings import CRITERION, Finding, findings_table
 from postprocess.manifest import RunManifest
 from postprocess.origin import Origin, Reference, make_folder
 from postprocess.procedures_runs import marked
+from postprocess.strain import (
+    AT_PEAK,
+    CARRIES,
+    FRACTURE,
+    LOSS,
+    PEAK,
+    QUANTITIES,
+    STIFFNESS,
+    WALL,
+    WIDENING,
+    YIELD,
+)
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats
 

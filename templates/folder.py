@@ -47,6 +47,7 @@ class RunStatus:
         time_s: simulated time [s], or None.
         wall_s: wall time so far [s], or None.
         job: number of the queue's task that computes it, or did last, or None.
+        checkpoint_s: simulated time of its newest checkpoint [s], from which it can go on, or None.
     """
 
     name: str
@@ -57,6 +58,7 @@ class RunStatus:
     time_s: float | None = None
     wall_s: float | None = None
     job: str | None = None
+    checkpoint_s: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -98,6 +100,7 @@ def run_status(directory: Path, *, name: str | None = None, active: bool = False
         phase=progress.get("phase"),
         time_s=(failed or progress).get("time_s"),
         wall_s=progress.get("wall_s"),
+        checkpoint_s=(failed or progress).get("checkpoint_s"),
     )
 
 
