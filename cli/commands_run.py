@@ -213,7 +213,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
     scene = _load(arguments.scene, arguments.set)
     choice = _chosen(scene, arguments)
-    planned = plan(scene if choice is None else choice.scene)
+    planned = plan(scene) if choice is None else choice.planned
     if arguments.json:
         content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
         print(json.dumps(content, indent=2, ensure_ascii=False))

@@ -78,7 +78,8 @@ def add(commands: Commands) -> None:
         summary="what is done, running, failed, missing",
         text="""
 From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was told to
-stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it.""",
+stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it. `simulated s` is how far a
+run came, `checkpoint s` from where it would go on.""",
         examples="""\
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
@@ -299,7 +300,7 @@ def _status_table(runs: Sequence[RunStatus]) -> str:
         # What was computed after it is computed again.
         header.insert(4, "checkpoint s")
         for row, run in zip(rows, runs, strict=True):
-            row.insert(4, run.checkpoint_s if run.checkpoint_s is not None or run.state not in _ENDED_EARLY else "none")
+            row.insert(4, run.checkpoint_s if run.state in _ENDED_EARLY else None)
     if any(run.job for run in runs):
         header.insert(2, "job")
         for row, run in zip(rows, runs, strict=True):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 from dem.actuation import actuated
 from dem.advice import warnings_of
@@ -36,7 +36,7 @@ class PlannedPhase:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything `smarticles plan` says."""
+    """Everything `smarticles plan` says; `correction` is the factor that its wall times have been corrected by."""
 
     name: str
     count: int
@@ -52,6 +52,12 @@ class Plan:
     wall_s: float
     warnings: tuple[str, ...]
     planar: bool = False
+    correction: float = 1.0
+
+    def corrected(self, factor: float) -> Self:
+        """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
+        phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
+        return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -59,6 +65,7 @@ class Plan:
 
     def to_text(self) -> str:
         """A table for the terminal."""
+        corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
@@ -73,7 +80,7 @@ class Plan:
             lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_told(phase.wall_s):>22}")
         lines += [
             f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_told(self.wall_s):>22}",
-            "(one core; machines differ by a factor of two)",
+            f"(one core{corrected}; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why, and what it adds",
         ]

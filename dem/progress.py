@@ -38,7 +38,7 @@ class Progress:
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
     _checkpoint: float | None = None
-    _told: dict[str, object] = field(default_factory=dict)
+    _seen: tuple[float, int] | None = None
 
     def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
         """A phase begins, or is gone on with.
@@ -60,19 +60,22 @@ class Progress:
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
     def checkpointed(self, time: float) -> None:
-        """There is a checkpoint of a simulated time [s], which the run would go on from: other processes know at once."""
+        """There is a checkpoint of a simulated time [s], from which the run would go on; told at once."""
         self._checkpoint = time
-        if self._told:
-            self._tell(self._told)
+        if self._seen is not None:
+            phi, count = self._seen
+            self._last = -math.inf
+            self.update(time=time, phi=phi, count=count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""
+        self._seen = (phi, count)
         now = _now()
         if now - self._last < INTERVAL:
             return
         self._last = now
         shown_phi = phi if math.isfinite(phi) else None
-        told = {
+        data = {
             "phase": self._phase,
             "phase_index": self._index,
             "time_s": time,
@@ -80,21 +83,17 @@ class Progress:
             "phi": shown_phi,
             "count": count,
             "wall_s": now - self._begun,
+            "checkpoint_s": self._checkpoint,
         }
-        if self._tell(told) and self.show:
-            self._draw(time, shown_phi, count, now)
-
-    def _tell(self, told: dict[str, object]) -> bool:
-        """Write `progress.json`, if that can be done."""
-        self._told = told
         temporary = self.folder / ".progress.partial.json"
         try:
-            temporary.write_text(json.dumps(told | {"checkpoint_s": self._checkpoint}))
+            temporary.write_text(json.dumps(data))
             os.replace(temporary, self.folder / "progress.json")  # noqa: PTH105
         except OSError:
             # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
-            return False
-        return True
+            return
+        if self.show:
+            self._draw(time, shown_phi, count, now)
 
     def finish(self) -> None:
         """The run has ended."""

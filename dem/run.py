@@ -158,8 +158,7 @@ def _run(
     except Exception as error:
         # A defect of ours: the run directory must still say that the run has ended.
         log.exception("unexpected error")
-        cause = f"unexpected {type(error).__name__}: {error}"
-        mark_failed(out, status="failed", cause=cause, time=0.0, checkpoint=None)
+        _mark_ended(simulation, out, log, status="failed", cause=f"unexpected {type(error).__name__}: {error}")
         raise
     finally:
         bar.finish()
