@@ -285,9 +285,10 @@ def _manifest(
     versions: Mapping[str, str],
     expected_s: Callable[[Scene], float],
 ) -> dict[str, Any]:
-    files = {str(sweep.path): sweep.text, str(sweep.template): sweep.template_text}
-    if sweep.table_path is not None and sweep.table_text is not None:
-        files[str(sweep.table_path)] = sweep.table_text
+    # By the names that they have seen from the sweep file, wherever that lies on this machine.
+    files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}
+    if sweep.content.points.table is not None and sweep.table_text is not None:
+        files[sweep.content.points.table.file] = sweep.table_text
     return {
         "format": FORMAT,
         "name": sweep.content.name,

@@ -21,7 +21,9 @@ def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> 
     assert content["name"] == "test"
     assert content["command"] == "smarticles sweep sweep.yaml --out out"
     assert content["versions"] == {"smarticles": "0"}
-    files = {Path(name).name: text for name, text in content["files"].items()}
+    # By the names they have seen from the sweep file: none of this machine's folders.
+    files = content["files"]
+    assert set(files) == {"sweep.yaml", "scene.yaml.j2"}
     assert files["sweep.yaml"] == SWEEP
     assert "{{ count }}" in files["scene.yaml.j2"]
     assert content["points"][0]["name"] == "n10_seed1"
