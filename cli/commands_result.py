@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,17 @@ _SHOWN = (
     ("z [mm]", "com height [m]", ".2f", 1e3),
     ("peak F/nW", "hook peak force over n W_s [-]", ".3f", 1.0),
     ("hook work [mJ]", "hook work [J]", ".3g", 1e3),
+    ("peak F [N]", "peak force [N]", ".3f", 1.0),
+    ("strain at it", "strain at the peak [-]", ".3f", 1.0),
+    ("at yield", "strain at the yield drop [-]", ".3f", 1.0),
+    ("at fracture", "strain at fracture [-]", ".3f", 1.0),
+    ("widening", "widening [-]", ".3f", 1.0),
+)
+# Of single frames only: averaged over the last ones they would say nothing.
+_SHOWN_PER_FRAME = (
+    ("F [N]", "pulled string force x [N]", ".3f", 1.0),
+    ("length [mm]", "chain length [m]", ".1f", 1e3),
+    ("width [mm]", "chain width [m]", ".1f", 1e3),
 )
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 
@@ -46,7 +57,8 @@ def add(commands: Commands) -> None:
         text="""
 Reads VTK frames and HDF5 series of runs that are done, failed or still going on. One row per phase,
 averaged over its last frames, with standard errors (SE). φ is given by several definitions, each
-named in its column. Of a sweep's directory, all runs that have frames are measured.""",
+named in its column. A phase that pulls a hook or strains a chain has its forces. Of a sweep's
+directory, all runs that have frames are measured.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
@@ -136,16 +148,39 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
-    print(_table(table))
-    print(_legend(per_frame=arguments.frames, hooks="hook work [J]" in table.columns))
+    shown = _shown(table, per_frame=arguments.frames)
+    print(_table(table, shown))
+    print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames))
+    for note in _notes(table):
+        print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
     return 0
 
 
-def _table(table: pd.DataFrame) -> str:
-    """The columns worth showing, one block per run under its name."""
-    shown = [entry for entry in _SHOWN if entry[1] in table.columns]
+_Shown = tuple[str, str, str, float]
+
+
+def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Shown]:
+    """The columns worth showing: of those that a person wants to see, the ones with a value in any row."""
+    wanted = _SHOWN + (_SHOWN_PER_FRAME if per_frame else ())
+    return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
+
+
+def _notes(table: pd.DataFrame) -> list[str]:
+    """What a table shows that a person could take for a result."""
+    if "hook work [J]" not in table.columns:
+        return []
+    untouched = table[(table["hook work [J]"] == 0) & (table["hook peak force over n W_s [-]"] == 0)]
+    return [
+        f"{row['run']}: nothing touched the hook that phase {row['phase']} ({row['phase type']}) raised, its force is "
+        "0 N throughout; lower hooks.upper_height_m or raise count"
+        for row in untouched.to_dict("records")
+    ]
+
+
+def _table(table: pd.DataFrame, shown: Sequence[_Shown]) -> str:
+    """The columns to be shown, one block per run under its name."""
     rows = [
         [_cell(value, form, factor) for value, (_, _, form, factor) in zip(row, shown, strict=True)]
         for row in table[[entry[1] for entry in shown]].values.tolist()
@@ -167,27 +202,36 @@ def _cell(value: object, form: str, factor: float) -> Cell | str:
     return Cell(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 
-def _legend(*, per_frame: bool, hooks: bool) -> str:
-    """What the columns mean, and over what they are averaged."""
+def _legend(shown: Container[str], *, per_frame: bool) -> str:
+    """What the columns that are shown mean, and over what they are averaged."""
     from postprocess.measure import LAST_FRAMES  # noqa: PLC0415
     from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.pull import WINDOW  # noqa: PLC0415
+    from postprocess.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415
 
-    costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
     averaged = f"means over the last {LAST_FRAMES} frames of each phase, SE: their standard error"
-    lines = [
-        f"{'one row per frame' if per_frame else averaged}; {costly} at the last frame of each phase only",
-        *(
+    lines = ["one row per frame" if per_frame else averaged]
+    if f"phi {_COMPARED} [-]" in shown:
+        costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
+        lines[0] += f"; {costly} at the last frame of each phase only"
+        lines += [
             f"{'φ by ' if name == _COMPARED else ''}{name}: {'' if name == _COMPARED else 'φ = '}{meaning}"
             for name, meaning in DEFINITIONS.items()
-        ),
-        "⟨N⟩: links of others through a smarticle's plane; z: height of the centre of mass above the floor",
-    ]
-    if hooks:
+        ]
+    if "crossings mean [-]" in shown:
+        lines.append(
+            "⟨N⟩: links of others through a smarticle's plane; z: height of the centre of mass above the floor"
+        )
+    if "hook work [J]" in shown:
         lines.append(
             f"peak F/nW: largest mean over {WINDOW:g} s of the force on the hook that is raised, over the weight of "
             "all smarticles; hook work: ∫ F dz over the whole pull"
         )
+    if PEAK in shown:
+        lines.append(f"peak F: {QUANTITIES[PEAK]}; strain: of the distance along x between the strings' ties")
+        lines += [f"at yield: {QUANTITIES[YIELD]}"] if YIELD in shown else []
+        lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
+        lines.append(f"widening: {QUANTITIES[WIDENING]}")
     return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
 
 

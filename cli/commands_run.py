@@ -194,13 +194,13 @@ def compute(
 
 
 def _load(scene_file: Path, settings: Sequence[str]) -> Scene:
-    """A scene whose time step is known to be good as well; errors name the file."""
+    """A scene whose time steps are known to be good as well; errors name the file."""
     from dem.scene import load_scene  # noqa: PLC0415
-    from dem.timestep import time_step  # noqa: PLC0415
+    from dem.timestep import time_steps  # noqa: PLC0415
 
     scene = load_scene(scene_file, settings)
     try:
-        time_step(scene)
+        time_steps(scene)
     except InputError as error:
         msg = f"{scene_file}: {error}"
         raise InputError(msg) from None
@@ -213,7 +213,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
     scene = _load(arguments.scene, arguments.set)
     choice = _chosen(scene, arguments)
-    planned = plan(scene if choice is None else choice.scene)
+    planned = plan(scene) if choice is None else choice.planned
     if arguments.json:
         content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
         print(json.dumps(content, indent=2, ensure_ascii=False))

@@ -14,6 +14,7 @@ from cli.studies import STUDIES, Analysis
 from dem.errors import InputError
 
 if TYPE_CHECKING:
+    from templates.expand import Point
     from templates.folder import Entry, Folder
 
 
@@ -109,16 +110,36 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     """Constants of the study that the command line changes.
 
     Raises:
-        InputError: the study has a fidelity of its own.
+        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
     """
-    from templates.sweep import load_sweep  # noqa: PLC0415
+    from dem.parts import FIDELITIES  # noqa: PLC0415
+    from templates.expand import expand  # noqa: PLC0415
+    from templates.sweep import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity is None:
         return {}
-    if "fidelity" not in load_sweep(file).content.constants:
-        msg = f"--fidelity {fidelity}: study {name} compares variants of one fidelity; leave --fidelity out"
+    if fidelity not in FIDELITIES:
+        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
         raise InputError(msg)
-    return {"fidelity": fidelity}
+    sweep, changed = load_sweep(file), {"fidelity": fidelity}
+    shipped = sweep.content.constants.get("fidelity")
+    if shipped == fidelity:
+        return changed
+    try:
+        changes_all = shipped is not None and not _scenes(expand(with_constants(sweep, changed))) & _scenes(
+            expand(sweep)
+        )
+    except InputError as error:
+        msg = f"--fidelity {fidelity}: study {name} cannot be run at it ({error}); leave --fidelity out"
+        raise InputError(msg) from None
+    if not changes_all:
+        msg = f"--fidelity {fidelity}: study {name} sets the fidelity of its runs itself; leave --fidelity out"
+        raise InputError(msg)
+    return changed
+
+
+def _scenes(points: Sequence[Point]) -> set[str]:
+    return {point.scene_sha256 for point in points}
 
 
 def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:

@@ -78,7 +78,8 @@ def add(commands: Commands) -> None:
         summary="what is done, running, failed, missing",
         text="""
 From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was told to
-stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it.""",
+stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it. `simulated s` is how far a
+run came, `checkpoint s` from where it would go on.""",
         examples="""\
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
@@ -289,9 +290,17 @@ def _with_queue(runs: list[RunStatus], directory: Path) -> tuple[list[RunStatus]
     return [merged(run, tasks.get(run.name)) for run in runs], {"jobs": jobs, "error": None, "tasks": plain(tasks)}
 
 
+_ENDED_EARLY = ("failed", "interrupted", "stopped")
+
+
 def _status_table(runs: Sequence[RunStatus]) -> str:
     header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
     rows = [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs]
+    if any(run.state in _ENDED_EARLY for run in runs):
+        # What was computed after it is computed again.
+        header.insert(4, "checkpoint s")
+        for row, run in zip(rows, runs, strict=True):
+            row.insert(4, run.checkpoint_s if run.state in _ENDED_EARLY else None)
     if any(run.job for run in runs):
         header.insert(2, "job")
         for row, run in zip(rows, runs, strict=True):

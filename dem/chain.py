@@ -47,7 +47,7 @@ class Strain(Part):
     """
 
     type: Literal["strain"]
-    speed_m_per_s: float = Field(0.005, gt=0, le=1, description="speed of the moved end [m/s]")
+    speed_m_per_s: float = Field(0.005, gt=0, description="speed of the moved end [m/s]")
     distance_m: Length = Field(..., description="how far it moves at most [m]; the phase ends when the chain parts")
     tied_at: Literal["tip", "axis"] = Field(
         "tip", description="where on the end barbs: at their tips, or where they cross the chain's axis"

@@ -15,7 +15,7 @@ from typing import Any
 
 from dem.errors import InputError
 from dem.parts import FIDELITIES
-from dem.plan import plan
+from dem.plan import Plan, plan
 from dem.scene import Scene, parse_scene
 
 SHIPPED = Path(__file__).resolve().parent.parent / "results" / "accuracy" / "work_precision.csv"
@@ -119,13 +119,13 @@ class Choice:
     """The fidelity chosen.
 
     Args:
-        scene: the scene with it.
+        planned: the plan of the scene with it, its wall times corrected by what was measured.
         expected: what it is expected to bring.
         why: which limit it answers.
         notes: what is to be known about it, one line each.
     """
 
-    scene: Scene
+    planned: Plan
     expected: Expectation
     why: str
     notes: tuple[str, ...]
@@ -248,22 +248,21 @@ def choose(
     Raises:
         InputError: no fidelity keeps the limit, or the two contradict each other; the message says which gives way.
     """
-    scenes: dict[str, Scene] = {}
+    plans: dict[str, Plan] = {}
     expected: list[Expectation] = []
     refused: list[InputError] = []
     for one in table.fidelities:
         try:
-            scenes[one.fidelity] = _with_fidelity(scene, one.fidelity)
+            plans[one.fidelity] = plan(_with_fidelity(scene, one.fidelity)).corrected(one.ratio)
         except InputError as error:  # such as two rows in a section that is square
             refused.append(error)
             continue
-        hours = one.ratio * plan(scenes[one.fidelity]).wall_s / 3600
-        expected.append(Expectation(measured=one, hours=hours))
+        expected.append(Expectation(measured=one, hours=plans[one.fidelity].wall_s / 3600))
     if not expected:
         raise refused[0]
     picked, why = pick(expected, max_error=max_error, max_hours=max_hours)
     return Choice(
-        scene=scenes[picked.measured.fidelity],
+        planned=plans[picked.measured.fidelity],
         expected=picked,
         why=why,
         notes=(*map(str, refused), *_notes(scene, table, picked.measured, max_error)),

@@ -49,6 +49,11 @@ class Cylinder:
         """Distance [m] of the wall's flats from the axis, a little less than the radius."""
         return self.corner_radius * math.cos(math.pi / self.facets)
 
+    @property
+    def bottom(self) -> float:
+        """Height [m] of the wall's lower edge at the start, below the floor."""
+        return -0.1 * self.radius
+
     def radii(self, heights: Array) -> Array:
         """Radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
@@ -67,7 +72,7 @@ def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
         Ids of its bodies: the wall from below, and the floor last.
     """
     # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
-    bottoms = [-0.1 * cylinder.radius, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
+    bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
     rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
     bodies = []
     for k, ring in enumerate(rings):

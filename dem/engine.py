@@ -378,7 +378,7 @@ class Engine:
 
     def strain(self, limit: float) -> Strain:
         """How far contacts and hinges are strained at present, and who has contacts deeper than a limit [m]."""
-        return measure_strain(self._yade, self._assembly, self._law, limit)
+        return measure_strain(self._yade, self._assembly, self.fixtures, self._law, limit)
 
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""

@@ -31,7 +31,7 @@ class Fixtures:
         self, yade: Yade, cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None = None
     ) -> None:
         self._yade = yade
-        self._top = cylinder.height
+        self._top, self._bottom = cylinder.height, cylinder.bottom
         self._planar = channel is not None
         self.container = add_container(yade, cylinder) if channel is None else add_channel(yade, channel)
         """Ids of the container's bodies that are there, the floor last."""
@@ -150,6 +150,20 @@ class Fixtures:
     @property
     def _totals(self) -> Array:
         return np.array([[s[0], s[1], s[2]] for s in self._sums]).reshape(-1, 3)
+
+    def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
+        """What smarticles can hold on to, in scenes with hooks: ids of its bodies, and how far it was raised [m].
+
+        Raised against the floor, since the start.
+        """
+        if not self.hooks:
+            return {}
+        floor, wall = float(self.floor.pos[2]), self.container[:-1]
+        found: dict[str, tuple[Sequence[int], float]] = {
+            "the lower hook": (self.hooks[0], 0.0),
+            "the upper hook": (self.hooks[1], self.upper_height - floor - self._upper_start),
+        }
+        return found | ({"the wall": (wall, self.wall_bottom - floor - self._bottom)} if wall else {})
 
     # -- what smarticles may do --------------------------------------------------------------------------------
 

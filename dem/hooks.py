@@ -183,6 +183,14 @@ def _check_bars(hooks: Hooks) -> None:
 
 def _check_room(scene: Scene, hooks: Hooks) -> None:
     cylinder, top = scene.cylinder, hooks.upper_height_m + hooks.side_m / 2
+    pulled = next((k for k, phase in enumerate(scene.phases) if isinstance(phase, PullHook)), None)
+    highest = scene.ample_height()
+    if pulled is not None and top - hooks.side_m > highest:
+        msg = (
+            f"hooks.upper_height_m: {hooks.upper_height_m:g} m is above all that {scene.count} smarticles can reach "
+            f"while they are poured, {highest:.3g} m, so that phases.{pulled} (pull-hook) would feel nothing; lower it"
+        )
+        raise ValueError(msg)
     if top > cylinder.height:
         msg = (
             f"hooks.upper_height_m: {hooks.upper_height_m:g} m is outside the container, whose wall ends at "
@@ -200,3 +208,19 @@ def _check_room(scene: Scene, hooks: Hooks) -> None:
             f"less than {most:.4g} m"
         )
         raise ValueError(msg)
+
+
+def hook_warnings(scene: Scene) -> tuple[str, ...]:
+    """Hooks that one smarticle can hold both of, in a scene that pulls one, as one line with the way out."""
+    hooks = scene.hooks
+    if hooks is None or not any(isinstance(phase, PullHook) for phase in scene.phases):
+        return ()
+    across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
+    inside = scene.smarticle.middle_length_m - scene.sphere_diameter
+    if across >= inside:
+        return ()
+    return (
+        f"hooks.upper_height_m: the hooks are {across:.3g} m from outside to outside, less than a smarticle's inner "
+        f"length, {inside:.3g} m: one smarticle can hold both hooks, and then only the contacts give way; set them at "
+        f"least {1.005 * (inside - hooks.side_m):.3g} m apart, or measure it as it is",
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -73,7 +73,13 @@ _NUMBERS = (int, float, float | None, int | None, tuple[float, float])
 
 
 def _kind(annotation: Any) -> str:
-    return "a number" if annotation in _NUMBERS else "a value of its kind"
+    """What a key takes, in words; `annotation` is the type of its field."""
+    if annotation in _NUMBERS:
+        return "a number"
+    if get_origin(annotation) is Literal:
+        return " or ".join(map(repr, get_args(annotation)))
+    models = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type) and issubclass(kind, Part)]
+    return "keys and values" if models else "text" if annotation is str else "a value of its kind"
 
 
 def in_hinge_range(angle: float) -> float:

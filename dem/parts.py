@@ -124,10 +124,12 @@ class Container(Part):
     def _size_of_tiers(cls, data: Any) -> Any:
         # What needs one radius and one height takes the widest and the whole one.
         try:
-            tiers = data["tiers"]
-            size = {"radius_m": tiers[0]["radius_m"], "height_m": math.fsum(tier["height_m"] for tier in tiers)}
+            radii, heights = ([0.0 + tier[key] for tier in data["tiers"]] for key in ("radius_m", "height_m"))
+            size = {"radius_m": radii[0], "height_m": math.fsum(heights)}
         except (KeyError, IndexError, TypeError):
             return data  # there are none, or validation says what is wrong with them
+        if min(*radii, *heights) <= 0:
+            return data
         return size | {key: value for key, value in data.items() if value is not None}
 
     @model_validator(mode="after")
@@ -370,7 +372,9 @@ class Recording(Part):
     )
     series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
-        False, description="whether to record energies and the work of the container as well as the motors'"
+        False,
+        strict=True,
+        description="whether to record energies and the work of the container as well as the motors'",
     )
     dissipation_interval_s: float | None = Field(
         None,

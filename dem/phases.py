@@ -33,7 +33,8 @@ class Stage(Protocol):
     """One phase while it runs."""
 
     memory: Memory
-    """All that the stage remembers: plain data, JSON-able without loss."""
+    """All that the stage remembers: plain data, JSON-able without loss; what is to be told of it at its end stands
+    under `warning`."""
 
     def proceed(self, engine: Engine) -> float:
         """Do what is due now.
@@ -156,7 +157,7 @@ class Pulling:
         memory, phase = self.memory, self._phase
         if memory["end"] is None:
             arrival = engine.time + phase.distance_m / phase.speed_m_per_s
-            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True)
+            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True, felt=_felt_above(engine))
             engine.weld()
             engine.fixtures.raise_upper(phase.speed_m_per_s)
             self._note(engine)
@@ -167,7 +168,13 @@ class Pulling:
         if memory["raising"]:
             memory["raising"] = False
             engine.fixtures.stop()
-        return _time_left(engine, memory["end"])
+        left = _time_left(engine, memory["end"])
+        if not left and memory.get("felt") == _felt_above(engine):
+            memory["warning"] = (
+                "no smarticle touched the upper hook while it was raised, and its force is 0 N throughout; lower "
+                "hooks.upper_height_m or raise count"
+            )
+        return left
 
     def _overloaded(self, engine: Engine) -> bool:
         """Whether the hook took more than it may since the last look, on average."""
@@ -177,6 +184,12 @@ class Pulling:
 
     def _note(self, engine: Engine) -> None:
         self.memory.update(force_sum=float(engine.fixtures.hook_sums[1, 2]), step=engine.steps)
+
+
+def _felt_above(engine: Engine) -> list[float]:
+    """All that the upper hook has felt so far, summed over steps [N]: unchanged where nothing touches it."""
+    felt: list[float] = engine.fixtures.hook_sums[1].tolist()
+    return felt
 
 
 def _time_left(engine: Engine, end: float) -> float:

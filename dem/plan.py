@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 from dem.actuation import actuated
-from dem.actuation_checks import actuation_warnings
-from dem.chain import Arrange
+from dem.advice import warnings_of
 from dem.construction import in_order
+from dem.durations import expected_duration, known_duration
 from dem.effects import Adds, Decision, decide
 from dem.parts import Deposit
 from dem.scene import Scene
@@ -20,9 +19,8 @@ from dem.timestep import stable_step, time_steps
 COST_PER_SPHERE_STEP = 3.3e-7
 # A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
 ARTICULATED_SHARE = 1.7
-# A pour costs about half of the same time in the full pile, since the pile grows from nothing; 0.1 s per layer.
+# A pour costs about half of the same time in the full pile, since the pile grows from nothing.
 POUR_SHARE = 0.5
-LAYER_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class PlannedPhase:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything `smarticles plan` says."""
+    """Everything `smarticles plan` says; `correction` is the factor that its wall times have been corrected by."""
 
     name: str
     count: int
@@ -55,6 +53,12 @@ class Plan:
     wall_s: float
     warnings: tuple[str, ...]
     planar: bool = False
+    correction: float = 1.0
+
+    def corrected(self, factor: float) -> Self:
+        """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
+        phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
+        return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`."""
@@ -62,6 +66,7 @@ class Plan:
 
     def to_text(self) -> str:
         """A table for the terminal."""
+        corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
@@ -76,7 +81,7 @@ class Plan:
             lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_told(phase.wall_s):>22}")
         lines += [
             f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_told(self.wall_s):>22}",
-            "(one core; machines differ by a factor of two)",
+            f"(one core{corrected}; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why, and what it adds",
         ]
@@ -110,15 +115,10 @@ def plan(scene: Scene) -> Plan:
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
-        if isinstance(phase, Deposit):
-            estimate = LAYER_SECONDS * math.ceil(scene.count / phase.per_layer) + 0.2
-            phases.append(PlannedPhase(index, phase.type, None, estimate, POUR_SHARE * rate * estimate, dt))
-        elif isinstance(phase, Arrange):
-            phases.append(PlannedPhase(index, phase.type, 0.0, 0.0, 0.0, dt))
-        else:
-            estimate = phase.duration_s
-            wall = rate * estimate * (ARTICULATED_SHARE if actuated(phase) else 1.0)
-            phases.append(PlannedPhase(index, phase.type, estimate, estimate, wall, dt))
+        estimate = expected_duration(phase, scene.count)
+        share = POUR_SHARE if isinstance(phase, Deposit) else ARTICULATED_SHARE if actuated(phase) else 1.0
+        wall = rate * estimate * share
+        phases.append(PlannedPhase(index, phase.type, known_duration(phase), estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
     return Plan(
@@ -134,6 +134,6 @@ def plan(scene: Scene) -> Plan:
         engines=in_order(Adds.together(effect.adds for effect in effects).engines),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
-        warnings=actuation_warnings(scene),
+        warnings=warnings_of(scene),
         planar=scene.plane is not None,
     )

@@ -37,6 +37,8 @@ class Progress:
     _start: float = 0.0
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
+    _checkpoint: float | None = None
+    _seen: tuple[float, int] | None = None
 
     def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
         """A phase begins, or is gone on with.
@@ -57,8 +59,17 @@ class Progress:
         start = "\r\x1b[K" if self.show else ""
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
+    def checkpointed(self, time: float) -> None:
+        """There is a checkpoint of a simulated time [s], from which the run would go on; told at once."""
+        self._checkpoint = time
+        if self._seen is not None:
+            phi, count = self._seen
+            self._last = -math.inf
+            self.update(time=time, phi=phi, count=count)
+
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Simulated time [s], packing fraction [1] and smarticles present."""
+        self._seen = (phi, count)
         now = _now()
         if now - self._last < INTERVAL:
             return
@@ -72,6 +83,7 @@ class Progress:
             "phi": shown_phi,
             "count": count,
             "wall_s": now - self._begun,
+            "checkpoint_s": self._checkpoint,
         }
         temporary = self.folder / ".progress.partial.json"
         try:

@@ -18,7 +18,7 @@ import meshio
 import numpy as np
 
 from dem import effects
-from dem.actuation_checks import actuation_warnings
+from dem.advice import warnings_of
 from dem.checkpoint import has_checkpoint, read_checkpoint
 from dem.engine import Engine
 from dem.errors import InputError, RunError
@@ -135,9 +135,8 @@ def _run(
             yade=yade,
             time_steps=steps,
         )
-        for warning in actuation_warnings(scene):
-            log.warning("%s", warning)
-            bar.warn(warning)
+        for warning in warnings_of(scene):
+            simulation.warn(warning)
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()
@@ -164,8 +163,7 @@ def _run(
     except Exception as error:
         # A defect of ours: the run directory must still say that the run has ended.
         log.exception("unexpected error")
-        cause = f"unexpected {type(error).__name__}: {error}"
-        mark_failed(out, status="failed", cause=cause, time=0.0, checkpoint=None)
+        _mark_ended(simulation, out, log, status="failed", cause=f"unexpected {type(error).__name__}: {error}")
         raise
     finally:
         bar.finish()
@@ -196,8 +194,7 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
         return
     checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
     if warning:
-        log.warning("%s", warning)
-        simulation.recorder.progress.warn(warning)
+        simulation.warn(warning)
     simulation.restore(checkpoint)
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 

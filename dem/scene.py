@@ -28,8 +28,9 @@ from dem.hooks import Hooks, check_hooks, with_hook_defaults, with_pull_defaults
 from dem.overrides import apply_override
 from dem.part import REFERENCE_ASPECT_RATIO, Part
 from dem.particle import Particle, SphereChain, chain_mean_width, mean_width
-from dem.parts import FIDELITIES, Contact, Container, Fidelity, Motor, Phase, Recording, Smarticle
+from dem.parts import FIDELITIES, Contact, Container, Deposit, Fidelity, Motor, Phase, Recording, Smarticle
 from dem.plane import Channel, Plane, check_plane
+from dem.refusal import first_line
 from dem.release import check_release
 from dem.yaml_text import load_yaml
 
@@ -145,6 +146,23 @@ class Scene(Part):
                     f"(half full is {most}); lower the count or {way_out}"
                 )
                 raise ValueError(msg)
+            self._check_first_layer(height)
+
+    def _check_first_layer(self, height: float) -> None:
+        """The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top."""
+        pour = self.phases[0]
+        assert isinstance(pour, Deposit)  # checked before
+        slab = pour.layer_height_w * self.smarticle.middle_length_m
+        least = 2 * self.particle.radius + slab + self.particle.reach
+        if height < least:
+            key = "container.height_m" if self.container.tiers is None else "container.tiers"
+            what = "it" if self.container.tiers is None else "height_m of the top tier"
+            msg = (
+                f"{key}: {height:g} m of wall is too low for one layer of the pour, spread over "
+                f"phases.0.layer_height_w = {pour.layer_height_w:g} w, which reaches {least:.4g} m; raise {what} by at "
+                f"least {least - height:.3g} m or lower layer_height_w"
+            )
+            raise ValueError(msg)
 
     def _check_recording(self) -> None:
         series = self.recording.series_interval_s
@@ -186,26 +204,28 @@ class Scene(Part):
             bottom += below.height_m
             if tier.radius_m < below.radius_m:
                 upper.append((bottom, tier.radius_m))
+        hooks_top = 0.0 if self.hooks is None else self.hooks.upper_height_m + self.hooks.side_m / 2
         return Cylinder(
             radius=container.radius_m,
-            height=self._ample_height if container.height_m is None else container.height_m,
+            height=self.ample_height(hooks_top) if container.height_m is None else container.height_m,
             facets=self.fidelity.wall_facets,
             upper=tuple(upper),
         )
 
-    @property
-    def _ample_height(self) -> float:
+    def ample_height(self, hooks_top: float = 0.0) -> float:
         """Height [m] of a wall that is enough for the loosest pile, hooks in it, and a layer being poured.
 
         A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0,
         0.7 and 1.4, with d the mean width of the section); half of that is taken as the loosest.
+
+        Args:
+            hooks_top: height of the hooks' top [m]; 0 without hooks.
         """
         boxes = self.smarticle.boxes
         loosest = 1.2 * self.sphere_diameter / float(boxes.lengths.sum())
         pile = self.count * boxes.volume / (math.pi * self.container.radius_m**2 * loosest)
-        top = 0.0 if self.hooks is None else self.hooks.upper_height_m + self.hooks.side_m / 2
         # What is poured may come to lie on a hook.
-        return max(pile, top) + 4 * self.particle.reach + 6 * boxes.middle_length
+        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * boxes.middle_length
 
     @property
     def sphere_diameter(self) -> float:
@@ -291,7 +311,7 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        msg = f"{source}: {_first_line(error, data)}"
+        msg = f"{source}: {first_line(error, data)}"
         raise InputError(msg) from None
 
 
@@ -344,46 +364,3 @@ def json_schema() -> dict[str, Any]:
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
     return schema
-
-
-def _first_line(error: ValidationError, data: Any) -> str:
-    """The first of pydantic's errors as `key: what, value; way out`, and how many more there are."""
-    # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
-    # Nor is a list too short whose items are there, but wrong.
-    errors = [
-        found
-        for found in error.errors()
-        if found["type"] != "default_factory_not_called" and not (found["type"] == "too_short" and found["input"])
-    ]
-    first = errors[0]
-    place = _key(first["loc"], data)
-    text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "missing":
-        text = "missing; it has no default"
-    elif first["type"] == "union_tag_invalid":
-        text = f"type: {first['ctx']['tag']!r} is not known; known: {first['ctx']['expected_tags']}"
-    elif first["type"] == "union_tag_not_found":
-        text = f"type: missing, got {first['input']!r}; write which one it is, see `smarticles schema`"
-    elif first["type"] == "model_attributes_type":
-        text = f"expected keys and values, {{type: …}}, got {first['input']!r}"
-    elif first["type"] != "value_error":
-        text = f"{text[0].lower()}{text[1:]}, got {first['input']!r}"
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return f"{place}: {text}{more}" if place else f"{text}{more}"
-
-
-def _key(steps: Sequence[int | str], data: Any) -> str:
-    """Pydantic's path to a value as the key of the scene file.
-
-    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
-    """
-    here, keys = data, []
-    for step in steps:
-        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
-            continue
-        keys.append(str(step))
-        if isinstance(here, Mapping):
-            here = here.get(step)
-        elif isinstance(here, list) and isinstance(step, int):
-            here = here[step] if step < len(here) else None  # one that is missing
-    return ".".join(keys)

@@ -123,8 +123,15 @@ class Simulation:
             self.engine.time,
             entry["wall_s"],
         )
+        if warning := self._stage.memory.get("warning"):
+            self.warn(f"phases.{self._phase} ({phase.type}): {warning}")
         self._stage = None
         self._phase += 1
+
+    def warn(self, message: str) -> None:
+        """Tell the log and the person at the terminal."""
+        self.log.warning("%s", message)
+        self.recorder.progress.warn(message)
 
     def _advance(self) -> None:
         """Advance to the target step, recording what is due on the way."""
@@ -169,10 +176,14 @@ class Simulation:
             "cpu_s": self.cpu,
         }
         write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
-        self.checkpointed = self.engine.time
+        self._note_checkpoint()
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
             raise StopRequestedError(msg)
+
+    def _note_checkpoint(self) -> None:
+        self.checkpointed = self.engine.time
+        self.recorder.progress.checkpointed(self.engine.time)
 
     def _check_space(self) -> None:
         # YADE does not notice a full disk when it saves, and would then load what it could not write.
@@ -195,7 +206,7 @@ class Simulation:
             self.engine.load(saved, state["engine"])
         finally:
             saved.unlink(missing_ok=True)
-        self.checkpointed = self.engine.time
+        self._note_checkpoint()
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
         self.engine.set_time_step(self.time_steps[self._phase])

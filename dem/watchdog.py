@@ -16,6 +16,7 @@ from dem.strain import Strain
 Array = NDArray[np.float64]
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
+BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 
 @dataclass(kw_only=True)
@@ -110,13 +111,24 @@ class Watchdog:
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
         """
-        refuse(
-            strain.deep,
-            time,
+        cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {strain.deepest:.3g} m), so that links pass through "
-            "each other or through the container",
-            "raise fidelity.stiffness_N_per_m, or load the pile less",
+            "each other or through the container"
         )
+        way_out = "raise fidelity.stiffness_N_per_m, or load the pile less"
+        if strain.held:
+            # However stiff: between the two, a contact is all that can give way.
+            first = strain.held[0]
+            cause += (
+                f"; smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
+                f"{first.apart:.3g} m"
+            )
+            way_out = (
+                "set hooks.upper_height_m and lower_height_m further apart than w"
+                if first.between == BOTH_HOOKS
+                else "give the hook more room: a smaller hooks.length_m or a wider container"
+            )
+        refuse(strain.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
         """Compare the energy with what it may be after all that was seen before.

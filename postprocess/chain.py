@@ -15,29 +15,24 @@ import pandas as pd
 
 from postprocess import chain_figures
 from postprocess.chain_findings import findings, sensitivity
-from postprocess.chain_runs import (
-    AT_PEAK,
-    CARRIES,
-    CONFINEMENT,
-    COUNT,
-    FRACTURE,
-    LOSS,
-    PEAK,
-    QUANTITIES,
-    SPEED,
-    STIFFNESS,
-    VARIANT,
-    WALL,
-    WIDENING,
-    YIELD,
-    chain_row,
-    points,
-)
+from postprocess.chain_runs import CONFINEMENT, COUNT, SPEED, VARIANT, chain_row, points
 from postprocess.findings import CRITERION, Finding, findings_table, without_criterion
 from postprocess.manifest import RunManifest
 from postprocess.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.origin import SAVOIE, Origin, make_folder
 from postprocess.points import told_means, told_number
+from postprocess.strain import (
+    AT_PEAK,
+    CARRIES,
+    FRACTURE,
+    LOSS,
+    PEAK,
+    QUANTITIES,
+    STIFFNESS,
+    WALL,
+    WIDENING,
+    YIELD,
+)
 from postprocess.study_report import StudyReport
 from postprocess.study_runs import SEED, SEEDS, collect_runs, refuse_repeats, told_range
 

@@ -10,18 +10,15 @@ import numpy as np
 
 from postprocess import figures
 from postprocess.chain_findings import COUNTS, RANGE
-from postprocess.chain_runs import (
-    BASELINE,
-    CONFINEMENT,
-    COUNT,
+from postprocess.chain_runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from postprocess.manifest import RunManifest
+from postprocess.points import marked
+from postprocess.strain import (
     FRACTURE,
     PEAK,
-    VARIANT,
     Pull,
     read_pull,
 )
-from postprocess.manifest import RunManifest
-from postprocess.points import marked
 from postprocess.study_figures import draw_means, finished, marker
 
 if TYPE_CHECKING:

@@ -7,24 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from postprocess.chain_runs import (
+from postprocess.chain_runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
+from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
+from postprocess.strain import (
     AT_PEAK,
-    BASELINE,
     BEND,
-    CONFINEMENT,
-    COUNT,
     DROP,
     FRACTURE,
     PEAK,
     SLIP_WIDENING,
     STIFFNESS,
-    VARIANT,
     WALL,
     WIDENING,
     YIELD,
 )
-from postprocess.findings import Finding, Verdict, all_of, judge, negative, told
-from postprocess.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from postprocess.study_runs import SEED
 
 RANGE = (0.52, 0.65)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -22,6 +21,7 @@ from postprocess.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_fractio
 from postprocess.pull import PULL, has_pull, pull_columns
 from postprocess.series import Series, read_series
 from postprocess.spread import free_pile
+from postprocess.strain import STRAIN, has_strain, strain_columns
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -59,6 +59,13 @@ _SERIES_COLUMNS = {
     "hook_upper_force_N": "upper hook force",
     "hook_lower_force_N": "lower hook force",
     "hook_upper_z_m": "upper hook z",
+    "string_fixed_force_N": "fixed string force",
+    "string_pulled_force_N": "pulled string force",
+    "channel_lower_force_N": "lower wall force",
+    "channel_upper_force_N": "upper wall force",
+    "pulled_m": "pulled",
+    "chain_length_m": "chain length",
+    "chain_width_m": "chain width",
 }
 # What the columns of a series of vectors are, by their number.
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
@@ -129,7 +136,7 @@ def summarise_run(
     Each measure has a second column, "… SE", with the standard error of the mean as in
     `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
     those of the last frame alone, without an error, unless asked for at every frame. A phase that pulls a
-    hook has the measures of `pull.pull_columns` as well.
+    hook has the measures of `pull.pull_columns` as well, one that strains a chain those of `strain.strain_columns`.
 
     Args:
         directory: A run directory.
@@ -160,12 +167,20 @@ def summarise_run(
             quantity, _, unit = name.rpartition(" [")
             summary[name] = mean.value
             summary[f"{quantity} SE [{unit}"] = mean.standard_error
-        index = part[0].phase
-        if manifest.phases[index].type == PULL and series is not None and has_pull(series, index):
-            # Of the whole phase, not of its last frames.
-            summary |= pull_columns(manifest, series, index)
+        if series is not None:
+            summary |= _test_columns(manifest, series, part[0].phase)
         summaries.append(summary)
     return pd.DataFrame(summaries)
+
+
+def _test_columns(manifest: RunManifest, series: Series, phase: int) -> dict[str, float]:
+    """What a phase tells that tests the pile or a chain: of the whole phase, not of its last frames."""
+    kind = manifest.phases[phase].type
+    if kind == PULL and has_pull(series, phase):
+        return pull_columns(manifest, series, phase)
+    if kind == STRAIN and has_strain(series):
+        return strain_columns(manifest)
+    return {}
 
 
 def packing_change(
@@ -278,9 +293,9 @@ def _rows(
             "phase type": manifest.phases[frame.phase].type,
         }
         row |= _shape_columns(frame, manifest)
-        if not manifest.walled(manifest.phases[-1].index):
+        if not (manifest.planar or manifest.walled(manifest.phases[-1].index)):
             row |= _free_columns(frame, manifest)
-        for definition in definitions:
+        for definition in definitions if not manifest.planar else ():
             wanted = take_costly or definition not in COSTLY_DEFINITIONS
             phi = _phi(frame, manifest, definition) if wanted else float("nan")
             row[f"phi {definition} [-]"] = phi
@@ -304,11 +319,14 @@ def _labels(manifest: RunManifest) -> dict[str, object]:
 
 
 def _shape_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
+    if manifest.planar:
+        # All lie at one height, and each in the plane of all others.
+        return {"smarticles [-]": frame.count, "contacts mean [-]": float(frame.contacts.mean())}
     levels = heights(frame.vertices, floor_z=frame.floor_z)
     tangle = entanglement(frame.vertices)
     return {
         "smarticles [-]": frame.count,
-        "escaped [-]": math.nan if manifest.planar else _escaped(frame, manifest.container_radius),
+        "escaped [-]": _escaped(frame, manifest.container_radius),
         "com height [m]": levels.mean_com,
         "second-highest com height [m]": levels.second_highest_com,
         f"top {levels.percentile:g} % height [m]": levels.top,

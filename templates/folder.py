@@ -47,6 +47,7 @@ class RunStatus:
         time_s: simulated time [s], or None.
         wall_s: wall time so far [s], or None.
         job: number of the queue's task that computes it, or did last, or None.
+        checkpoint_s: simulated time of its newest checkpoint [s], from which it can go on, or None.
     """
 
     name: str
@@ -57,6 +58,7 @@ class RunStatus:
     time_s: float | None = None
     wall_s: float | None = None
     job: str | None = None
+    checkpoint_s: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -98,6 +100,7 @@ def run_status(directory: Path, *, name: str | None = None, active: bool = False
         phase=progress.get("phase"),
         time_s=(failed or progress).get("time_s"),
         wall_s=progress.get("wall_s"),
+        checkpoint_s=(failed or progress).get("checkpoint_s"),
     )
 
 
@@ -282,9 +285,10 @@ def _manifest(
     versions: Mapping[str, str],
     expected_s: Callable[[Scene], float],
 ) -> dict[str, Any]:
-    files = {str(sweep.path): sweep.text, str(sweep.template): sweep.template_text}
-    if sweep.table_path is not None and sweep.table_text is not None:
-        files[str(sweep.table_path)] = sweep.table_text
+    # By the names that they have seen from the sweep file, wherever that lies on this machine.
+    files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}
+    if sweep.content.points.table is not None and sweep.table_text is not None:
+        files[sweep.content.points.table.file] = sweep.table_text
     return {
         "format": FORMAT,
         "name": sweep.content.name,

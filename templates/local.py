@@ -24,7 +24,7 @@ from templates.texts import read_json
 Ending = Literal["done", "kept", "failed", "interrupted"]
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
-"""(scene file, run directory, whether to resume) -> the command of one run."""
+"""(scene file, run directory, whether to resume) -> the command of one run, started in the sweep's directory."""
 
 # Threads that find no free core spin: one thread per run, set before its interpreter starts.
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
@@ -122,11 +122,10 @@ def slots_here() -> int:
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:
-    """The command that runs one scene into one run directory, with this interpreter."""
+    """The command that runs one scene into one run directory, with this interpreter; its words are recorded there."""
     # -P: a file called like a library in the working directory must not be imported.
     return (
-        *(sys.executable, "-P", "-m", "cli", "run", str(scene.resolve())),
-        *("--out", str(directory.resolve())),
+        *(sys.executable, "-P", "-m", "cli", "run", str(scene), "--out", str(directory)),
         *(("--resume",) if resume else ()),
     )
 
@@ -234,13 +233,15 @@ class _Runner:
         resume = self.folder.can_resume(entry)
         if not resume:
             self.folder.set_aside(entry)
-        directory, log = self.folder.run(entry), self.folder.log(entry)
+        home, directory, log = self.folder.path, self.folder.run(entry), self.folder.log(entry)
         for parent in (directory.parent, log.parent):
             parent.mkdir(parents=True, exist_ok=True)
         output = log.open("wb")
         try:
             process = subprocess.Popen(
-                self.command(self.folder.scene(entry), directory, resume),
+                # Seen from the sweep's directory, so that a run's record does not name this machine's folders.
+                self.command(self.folder.scene(entry).relative_to(home), directory.relative_to(home), resume),
+                cwd=home,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -335,11 +336,14 @@ class _Runner:
 
 def _environment() -> dict[str, str]:
     environment = {**os.environ, **ONE_THREAD}
+    # Runs start in another directory.
+    paths = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
     root = Path(__file__).resolve().parent.parent
     if "site-packages" not in root.parts and "dist-packages" not in root.parts:
         # A source tree that is not installed: runs use the same code as this process.
-        paths = [str(root), environment.get("PYTHONPATH", "")]
-        environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+        paths.insert(0, str(root))
+    if paths:
+        environment["PYTHONPATH"] = os.pathsep.join(paths)
     return environment
 
 

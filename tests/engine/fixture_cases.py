@@ -11,7 +11,10 @@ from cases import load, pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine import Engine
+from dem.errors import RunError
 from dem.phases import begin
+from dem.progress import Progress
+from dem.run import build_recorder
 from dem.scene import Scene
 from dem.series import SeriesWriter
 from dem.timestep import contact_law, time_step
@@ -95,6 +98,39 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
         "expected": scene.smarticle.middle_length_m * round(pull / engine.time_step) * engine.time_step
         + scene.smarticle.middle_length_m * 200 * engine.time_step,
         "weight": particle.boxes.mass * scene.gravity_m_per_s2,
+    }
+
+
+def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
+    """A U round both hooks, one barb below the lower and one above the upper, which is raised until a contact is deep.
+
+    Args:
+        limit: overlap at which to stop [m].
+    """
+    scene = load(data)
+    engine = build(scene)
+    lower, upper = scene.hooks.crosses
+    # The middle link stands at the end of two bars, which the barbs lie along.
+    standing = Rotation.from_euler("yz", [-90, 90], degrees=True)
+    middle = standing.apply(engine.particle.centres[engine.particle.links == 1])[:, 0].mean()
+    beside = upper.length / 2 + engine.particle.radius + 1e-4
+    add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
+    before = engine.strain(limit)
+    engine.fixtures.raise_upper(0.05)
+    strain, watchdog = before, build_recorder(scene, engine, Path(), Progress(Path(), 1, show=False)).watchdog
+    while not strain.deep.any() and engine.time < 1:
+        engine.advance(20)
+        strain = engine.strain(limit)
+    try:
+        watchdog.check_depths(strain, time=engine.time)
+        said = ""
+    except RunError as error:
+        said = str(error)
+    return {
+        "before": before.held,
+        "held": [(held.smarticle, held.between, held.apart) for held in strain.held],
+        "raised": engine.fixtures.upper_height - upper.height,
+        "said": said,
     }
 
 

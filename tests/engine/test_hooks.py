@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -133,3 +134,49 @@ def test_a_scene_without_hooks_builds_and_records_nothing_of_them(
         "hook_lower_force_N",
         "hook_upper_z_m",
     }
+
+
+def test_a_smarticle_that_both_hooks_hold_is_named(simulate: Simulate, scene_data: SceneData) -> None:
+    hooks = {"lower_height_m": 0.02, "upper_height_m": 0.025}
+    found = simulate(fixture_cases.bracket, scene_data({"count": 1, "hooks": hooks}), limit=6.1e-4)
+    assert found["before"] == ()
+    ((number, between, apart),) = found["held"]
+    assert (number, between) == (0, ("the lower hook", "the upper hook"))
+    assert apart == pytest.approx(found["raised"], rel=1e-9)
+    # The slack between barbs and bars, and what two contacts give way.
+    slack = 0.0117 - 1.218e-3 - 5.5e-3
+    assert slack < apart < slack + 3 * 6.1e-4
+    assert re.fullmatch(
+        r"at t = .* s: 1 smarticle\(s\) \(0\): contacts more than .*; smarticle 0 is held by the lower hook and the "
+        r"upper hook, which have moved apart by 0\.00\d+ m; set hooks\.upper_height_m and lower_height_m further apart "
+        r"than w",
+        found["said"],
+    )
+
+
+def whole(worker: Any, out: Path, **changes: Any) -> tuple[dict[str, Any], str]:
+    data = {
+        "schema_version": 1,
+        "seed": 2,
+        "fidelity": "draft",
+        "count": 6,
+        "container": {"radius_m": 0.0145},
+        "hooks": {},
+        "phases": [{"type": "deposit"}, {"type": "pull-hook", "distance_m": 0.005, "speed_m_per_s": 0.1}],
+    }
+    answer = worker.submit(cases.run, data | changes, str(out)).result(300)
+    return answer, (out / "log.txt").read_text(encoding="utf-8")
+
+
+def test_a_hook_that_nothing_touched_is_told_at_the_end_of_its_pull(worker: Any, tmp_path: Path) -> None:
+    told = "WARNING phases.1 (pull-hook): no smarticle touched the upper hook while it was raised"
+    recording = {"frame_interval_s": 8.0}
+    answer, log = whole(worker, tmp_path / "above", hooks={"upper_height_m": 0.06}, recording=recording)
+    assert answer["error"] is None, answer
+    assert log.count(told) == 1
+    # What is known before is told before, once.
+    assert log.count("WARNING recording.frame_interval_s: 8 s is longer than the whole run, about 0.35 s") == 1
+    assert log.index("recording.frame_interval_s") < log.index("phase 0 deposit begins")
+    answer, log = whole(worker, tmp_path / "within", hooks={"lower_height_m": 3e-3, "upper_height_m": 6e-3})
+    assert answer["error"] is None, answer
+    assert told not in log

@@ -78,7 +78,7 @@ def test_a_wall_that_is_not_clear_stays_where_it_is(simulate: Simulate, scene_da
     assert lifted["rise"] == pytest.approx(0.05 * 0.06, rel=0.02)
     assert lifted["crept"] == 0
     assert not lifted["enclosed"]
-    cleared = simulate(fixture_cases.lift_a_little, scene_data(), speed=1.0, duration=0.06)
+    cleared = simulate(fixture_cases.lift_a_little, scene_data(), speed=0.6, duration=0.1)
     assert not cleared["walled"]
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import io
+import json
 import random
 import re
 import signal
 import subprocess
 import time
+import zipfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 from processes import TIMEOUT_S, complete, differing, finish, frame_times, results, start
 
@@ -156,6 +160,20 @@ def damage(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
+
+
+def test_a_killed_run_tells_from_where_it_would_go_on(halfway: tuple[Path, Path, Path]) -> None:
+    killed = halfway[2]
+    told = json.loads((killed / "progress.json").read_text())
+    saved = []
+    for name in ("checkpoint.zip", "checkpoint.previous.zip"):
+        # Killed between two renames, it has one of them only.
+        if (killed / name).exists():
+            with zipfile.ZipFile(killed / name) as archive, np.load(io.BytesIO(archive.read("series.npz"))) as columns:
+                saved.append(float(columns["time_s"][-1]))
+    # Killed before it could tell of the newest one.
+    assert told["checkpoint_s"] in [pytest.approx(time) for time in saved]
+    assert told["checkpoint_s"] <= told["time_s"]
 
 
 def test_a_damaged_checkpoint_falls_back_to_the_one_before(halfway: tuple[Path, Path, Path], tmp_path: Path) -> None:

@@ -105,6 +105,22 @@ def test_status_of_one_run(tmp_path: Path, write_run: WriteRun, smarticles: Smar
     assert said.out.splitlines()[1].split()[:2] == ["alone", "done"]
 
 
+def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "alone", status="unfinished")
+    told = {"phase": "shake", "phase_index": 2, "time_s": 3.51, "wall_s": 20.0, "checkpoint_s": 3.2}
+    (run / "progress.json").write_text(json.dumps(told))
+    header, row = smarticles("status", run).out.splitlines()[:2]
+    assert [word.strip() for word in header.split("  ") if word] == [
+        *("run", "state", "phase", "simulated s", "checkpoint s", "wall s", "cause")
+    ]
+    assert row.split() == ["alone", "stopped", "shake", "3.51", "3.2", "20"]
+    assert json.loads(smarticles("status", run, "--json").out)["runs"][0]["checkpoint_s"] == 3.2
+    # Where all went well, nobody asks.
+    assert "checkpoint s" not in smarticles("status", write_run(tmp_path / "done")).out
+
+
 def test_status_of_something_else_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("status", tmp_path)
     assert said.status == 2
@@ -135,7 +151,7 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     lines = said.err.splitlines()
     assert lines[:2] == ["n6 finished before", "n5 started"]
     assert lines[2].startswith("n5 failed after 0:0")
-    assert lines[3].startswith(f"smarticles: error: {out}: 1 of 2 runs are missing: n5: {scene}: count: ")
+    assert lines[3].startswith(f"smarticles: error: {out}: 1 of 2 runs are missing: n5: scenes/n5.yaml: count: ")
     assert "-5" in lines[3]
     assert lines[3].endswith(f"start them again: smarticles resume {out}")
     assert (out / "runs" / "n5.stopped-1" / "run.json").exists()
@@ -283,8 +299,9 @@ def test_the_study_of_procedures_is_analysed(
         (["--quick"], "study sensitivity has no quick variant; leave --quick out"),
         (
             ["--fidelity", "reference"],
-            "--fidelity reference: study sensitivity compares variants of one fidelity; leave",
+            "--fidelity reference: study sensitivity sets the fidelity of its runs itself; leave --fidelity out",
         ),
+        (["--fidelity", "fine"], "--fidelity fine: is not known; known: draft, standard, reference"),
     ],
 )
 def test_what_a_study_does_not_have_is_refused(
@@ -294,6 +311,33 @@ def test_what_a_study_does_not_have_is_refused(
     assert said.status == 2
     assert said.err.startswith(f"smarticles: error: {message}")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_fidelity_at_which_a_study_cannot_be_run_is_refused_by_its_option(
+    tmp_path: Path, smarticles: Smarticles
+) -> None:
+    said = smarticles("study", "chain", "--quick", "--fidelity", "reference", "--out", tmp_path / "out")
+    assert said.status == 2
+    assert said.err.startswith("smarticles: error: --fidelity reference: study chain cannot be run at it (")
+    assert said.err.endswith("fidelity.rows: 2 rows of spheres out of the plane; use 1); leave --fidelity out\n")
+    assert len(said.err.splitlines()) == 1
+
+
+def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
+    sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def file_of(name: str, *, quick: bool = False) -> Path:
+        return sweep_file
+
+    monkeypatch.setattr("templates.study.study_file", file_of)
+    sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
+    out = sweep_file.parent / "out"
+    said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)
+    assert (said.status, out.exists()) == (2, False)
+    assert said.err == (
+        "smarticles: error: --fidelity draft: study gravish sets the fidelity of its runs itself; leave --fidelity "
+        "out\n"
+    )
 
 
 @pytest.mark.parametrize("study", ["sensitivity", "sensitivity-section"])

@@ -48,36 +48,36 @@ def refused(data: SceneData, *phases: dict[str, Any], **changes: Any) -> str:
 RANGE = "outside -15° … 105°, the range of the hinges"
 FORMS: list[tuple[dict[str, Any], str]] = [
     # -- which motions a phase has
-    (actuate(), "phases.1: barbs: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)"),
+    (actuate(), "phases.1.barbs: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)"),
     (
         actuate(barb_2=RAMP),
-        "phases.1: barb_1: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)",
+        "phases.1.barb_1: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)",
     ),
     (
         actuate(barb_1=RAMP),
-        "phases.1: barb_2: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)",
+        "phases.1.barb_2: missing; give barbs, or both barb_1 and barb_2 ({type: hold} for one that stays)",
     ),
     (
         actuate(RAMP, barb_1=RAMP),
-        "phases.1: barbs: one motion for both barbs, but barb_1 or barb_2 is given as well; leave one or the other out",
+        "phases.1.barbs: one motion for both barbs, but barb_1 or barb_2 is given as well; leave one or the other out",
     ),
     # -- how long they last
     (
         actuate(SINE),
-        "phases.1: duration_s: missing, and the motion has no end of its own; give the phase or the motion one",
+        "phases.1.duration_s: missing, and the motion has no end of its own; give the phase or the motion one",
     ),
     (
         actuate(barb_1=HOLD, barb_2=RAMP),
-        "phases.1: duration_s: missing, and the motion has no end of its own; give the phase or the motion one",
+        "phases.1.duration_s: missing, and the motion has no end of its own; give the phase or the motion one",
     ),
     (
         actuate(RAMP, duration_s=2),
-        "phases.1: barbs: the motion ends after 1 s, before duration_s = 2 s; "
+        "phases.1.barbs: the motion ends after 1 s, before duration_s = 2 s; "
         "shorten the phase or end the motion with a step that holds",
     ),
     (
         actuate(barb_1=RAMP, barb_2={**HOLD, "duration_s": 3}),
-        "phases.1: barb_1: the motion ends after 1 s, before duration_s = 3 s; "
+        "phases.1.barb_1: the motion ends after 1 s, before duration_s = 3 s; "
         "shorten the phase or end the motion with a step that holds",
     ),
     (
@@ -93,18 +93,18 @@ FORMS: list[tuple[dict[str, Any], str]] = [
     # -- offsets and shares
     (
         actuate(RAMP, offsets="random"),
-        "phases.1: offsets: random, but barbs (ramp) has no period; use 'none', a sine, a triangle or a sequence "
+        "phases.1.offsets: random, but barbs (ramp) has no period; use 'none', a sine, a triangle or a sequence "
         "with repeat",
     ),
     (
         actuate(barb_1=SINE, barb_2=sequence(RAMP, HOLD), duration_s=2, offsets="random"),
-        "phases.1: offsets: random, but barb_2 (sequence) has no period; use 'none', a sine, a triangle or a sequence "
+        "phases.1.offsets: random, but barb_2 (sequence) has no period; use 'none', a sine, a triangle or a sequence "
         "with repeat",
     ),
-    (actuate(HOLD, duration_s=2, offsets="random"), "phases.1: offsets: random, but both barbs hold; use 'none'"),
+    (actuate(HOLD, duration_s=2, offsets="random"), "phases.1.offsets: random, but both barbs hold; use 'none'"),
     (
         actuate(RAMP, offsets="some"),
-        "phases.1.offsets: input should be 'none' or 'random', got 'some'",
+        "phases.1.offsets: 'some' is not known; use 'none' or 'random'",
     ),
     (
         actuate(RAMP, active_fraction=0.04),
@@ -114,10 +114,10 @@ FORMS: list[tuple[dict[str, Any], str]] = [
         {**OSCILLATION, "active_fraction": 0.04},
         "phases.1.active_fraction: 0.04 of 10 smarticles is none; use e.g. 0.1",
     ),
-    (actuate(RAMP, active_fraction=0), "phases.1.active_fraction: input should be greater than 0, got 0"),
+    (actuate(RAMP, active_fraction=0), "phases.1.active_fraction: 0 is out of range; use more than 0"),
     (
         actuate(RAMP, active_fraction=1.1),
-        "phases.1.active_fraction: input should be less than or equal to 1, got 1.1",
+        "phases.1.active_fraction: 1.1 is out of range; use at most 1",
     ),
     # -- range of the hinges
     (actuate({**RAMP, "to_deg": 110}), f"phases.1.barbs.to_deg: 110° is {RANGE}"),
@@ -181,17 +181,20 @@ FORMS: list[tuple[dict[str, Any], str]] = [
         actuate(sequence(RAMP, {"type": "ramp", "to_deg": 3})),
         "phases.1.barbs.steps.1.duration_s: missing; it has no default",
     ),
-    (actuate(barb_1=HOLD, barb_2={**RAMP, "to_deg": None}), "phases.1.barb_2.to_deg: input should be a valid number, "),
+    (
+        actuate(barb_1=HOLD, barb_2={**RAMP, "to_deg": None}),
+        "phases.1.barb_2.to_deg: null is not a number; give one in deg",
+    ),
     (
         actuate({"type": "jump"}),
-        "phases.1.barbs: type: 'jump' is not known; known: 'hold', 'ramp', 'return', 'sine', 'triangle', 'sequence'",
+        "phases.1.barbs.type: 'jump' is not known; known: 'hold', 'ramp', 'return', 'sine', 'triangle', 'sequence'",
     ),
     (
         actuate(sequence(HOLD, RAMP)),
-        "phases.1.barbs: steps.0: hold has no end; give it a duration_s, as each step but the last needs one",
+        "phases.1.barbs.steps.0: hold has no end; give it a duration_s, as each step but the last needs one",
     ),
     ({"type": "internal-oscillation"}, "phases.1.theta_deg: missing; it has no default"),
-    ({**OSCILLATION, "theta_deg": 0}, "phases.1.theta_deg: input should be greater than 0, got 0"),
+    ({**OSCILLATION, "theta_deg": 0}, "phases.1.theta_deg: 0 deg is out of range; use more than 0 deg"),
 ]
 
 
@@ -202,21 +205,27 @@ def test_bad_phase(scene_data: SceneData, phase: dict[str, Any], expected: str) 
 
 
 MOTORS: list[tuple[dict[str, Any], str]] = [
-    ({"motor__torque_limit_N_m": 0}, "motor.torque_limit_N_m: input should be greater than 0, got 0"),
-    ({"motor__torque_limit_N_m": -1e-5}, "motor.torque_limit_N_m: input should be greater than 0, got -1e-05"),
-    ({"motor__speed_limit_rad_per_s": 0}, "motor.speed_limit_rad_per_s: input should be greater than 0, got 0"),
-    ({"motor__stiffness_N_m_per_rad": -1}, "motor.stiffness_N_m_per_rad: input should be greater than 0, got -1"),
-    ({"motor__law": "brake"}, "motor.law: input should be 'halt', 'stall', 'slip' or 'servo', got 'brake'"),
+    ({"motor__torque_limit_N_m": 0}, "motor.torque_limit_N_m: 0 N m is out of range; use more than 0 N m"),
+    ({"motor__torque_limit_N_m": -1e-5}, "motor.torque_limit_N_m: -1e-05 N m is out of range; use more than 0 N m"),
+    (
+        {"motor__speed_limit_rad_per_s": 0},
+        "motor.speed_limit_rad_per_s: 0 rad/s is out of range; use more than 0 rad/s",
+    ),
+    (
+        {"motor__stiffness_N_m_per_rad": -1},
+        "motor.stiffness_N_m_per_rad: -1 N m/rad is out of range; use more than 0 N m/rad",
+    ),
+    ({"motor__law": "brake"}, "motor.law: 'brake' is not known; use 'halt', 'stall', 'slip' or 'servo'"),
     ({"motor__torque_limit": 1}, "motor: unknown key 'torque_limit'; did you mean 'torque_limit_N_m'?"),
     (
         {"motor__torque_limit_N_m": "1e-5"},
-        "motor: torque_limit_N_m: got the text '1e-5', expected a number; leave out the quotes and the unit",
+        "motor.torque_limit_N_m: got the text '1e-5', expected a number; leave out the quotes and the unit",
     ),
     (
         {"fidelity": {"hinge_stiffness_N_per_m": 0}},
-        "fidelity.hinge_stiffness_N_per_m: input should be greater than 0, got 0",
+        "fidelity.hinge_stiffness_N_per_m: 0 N/m is out of range; use more than 0 N/m",
     ),
-    ({"fidelity": {"control_interval_s": 0}}, "fidelity.control_interval_s: input should be greater than 0, got 0"),
+    ({"fidelity": {"control_interval_s": 0}}, "fidelity.control_interval_s: 0 s is out of range; use more than 0 s"),
     (
         {"fidelity": {"control_interval_s": 0.005}},
         "fidelity.control_interval_s: 0.005 s is longer than recording.series_interval_s = 0.004 s; use e.g. 0.004 s",

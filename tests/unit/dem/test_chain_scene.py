@@ -117,7 +117,7 @@ def test_a_chain_has_parted_when_a_line_separates_two_neighbours() -> None:
         ({"smarticle__angles_deg": [80, 90]}, "smarticle.angles_deg: a chain is laid out of U shapes, not of (80, 90)"),
         ({"phases__1__distance_m": 100}, "phases.1.distance_m: 100 means 100 m"),
         ({"motor__law": "halt", "motor__damping_N_m_s_per_rad": 1e-3}, "law is halt, which has none; use law: servo"),
-        ({"motor__strength_spread": 1.0}, "motor.strength_spread: input should be less than 1"),
+        ({"motor__strength_spread": 1.0}, "motor.strength_spread: 1.0 is out of range; use less than 1"),
         ({"fidelity__rows": 2, "fidelity__diameter_m": 0.004}, "fidelity.rows: 2 rows of spheres out of the plane"),
     ],
 )

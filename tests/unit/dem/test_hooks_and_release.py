@@ -29,6 +29,7 @@ W, T2 = 0.0117, 0.5e-3
 DEPOSIT = {"type": "deposit"}
 PULL = {"type": "pull-hook"}
 REMOVE = {"type": "remove-container"}
+RELAX = {"type": "relax", "duration_s": 0.1}
 SHAKE = {"type": "shake", "duration_s": 0.1}
 TIERS = [{"radius_m": 0.0234, "height_m": 0.012}, {"radius_m": 0.018, "height_m": 0.012}]
 
@@ -120,20 +121,32 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [DEPOSIT, PULL]}, "phases.1: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {}` "),
     (
         {"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": 0}]},
-        "phases.1.speed_m_per_s: input should be greater",
+        "phases.1.speed_m_per_s: 0 m/s is out of range; use more than 0 m/s",
     ),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": -1}]}, "phases.1.speed_m_per_s: input should be "),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]}, "phases.1.distance_m: input should be greater"),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": -1}]},
+        "phases.1.speed_m_per_s: -1 m/s is out of range",
+    ),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]},
+        "phases.1.distance_m: 0 m is out of range; use more than 0 m",
+    ),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m: 23.4 means 23.4 m"),
     (
         {"hooks": {}, "phases": [DEPOSIT, {**PULL, "duration_s": 1}]},
-        "phases.1: duration_s: 1 s is too short to raise the hook by distance_m = 0.0234 m at speed_m_per_s = "
+        "phases.1.duration_s: 1 s is too short to raise the hook by distance_m = 0.0234 m at speed_m_per_s = "
         "0.0117 m/s; use at least 2 s",
     ),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which: input should be 'upper', got "),
-    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": 0}]}, "phases.1.speed_m_per_s: input should be greater than 0"),
-    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s: input should be greater than"),
-    ({"phases": [DEPOSIT, {**REMOVE, "parts": "floor"}]}, "phases.1.parts: input should be 'wall', got 'floor'"),
+    (
+        {"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]},
+        "phases.1.which: 'lower' is not known; use 'upper'",
+    ),
+    (
+        {"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": 0}]},
+        "phases.1.speed_m_per_s: 0 m/s is out of range; use more than",
+    ),
+    ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s: -0.1 m/s is out of range; "),
+    ({"phases": [DEPOSIT, {**REMOVE, "parts": "floor"}]}, "phases.1.parts: 'floor' is not known; use 'wall'"),
     (
         {"phases": [DEPOSIT, REMOVE, SHAKE, REMOVE]},
         "phases.3: remove-container, but phases.1 did so already; leave one of them out",
@@ -159,20 +172,35 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"hooks": {"upper_height_m": 0.2}, "container.height_m": 0.1},
         "hooks.upper_height_m: 0.2 m is outside the container, whose wall ends at 0.1 m; use at most 0.09975 m",
     ),
+    (
+        {"hooks": {"upper_height_m": 0.3}, "phases": [DEPOSIT, RELAX, PULL]},
+        "hooks.upper_height_m: 0.3 m is above all that 10 smarticles can reach while they are poured, 0.108 m, so that "
+        "phases.2 (pull-hook) would feel nothing; lower it",
+    ),
+    (
+        {"container": {"tiers": [{**tier, "height_m": 0.01} for tier in TIERS]}},
+        "container.tiers: 0.02 m of wall is too low for one layer of the pour, spread over phases.0.layer_height_w = 1 "
+        "w, which reaches 0.02192 m; raise height_m of the top tier by at least 0.00192 m or lower layer_height_w",
+    ),
+    (
+        {"container.height_m": 0.02},
+        "container.height_m: 0.02 m of wall is too low for one layer of the pour, spread over phases.0.layer_height_w "
+        "= 1 w, which reaches 0.02192 m; raise it by at least 0.00192 m or lower layer_height_w",
+    ),
     ({"hooks": {"side_m": 0.02}}, "hooks.side_m: 0.02 m is more than length_m = 0.0117 m; bars are long and thin"),
     ({"hooks": {"length_m": 11.7}}, "hooks.length_m: 11.7 means 11.7 m, which no smarticle scene needs; "),
     ({"hooks": {"sides_m": 1}}, "hooks: unknown key 'sides_m'; did you mean 'side_m'?"),
-    ({"hooks": True}, "hooks: got the boolean true, expected a value of its kind"),
-    ({"hooks": [1]}, "hooks: input should be a valid dictionary"),
+    ({"hooks": True}, "hooks: got the boolean true, expected keys and values"),
+    ({"hooks": [1]}, "hooks: [1] is not keys and values; write them as {key: value}"),
     (
         {"container": {"tiers": [TIERS[1], TIERS[0]]}},
-        "container: tiers.1.radius_m: 0.0234 m is wider than the tier below, 0.018 m; a mould is filled from the top "
+        "container.tiers.1.radius_m: 0.0234 m is wider than the tier below, 0.018 m; a mould is filled from the top "
         "and lifted off: order tiers from wide to narrow",
     ),
-    ({"container": {"tiers": []}}, "container.tiers: tuple should have at least 1 item"),
+    ({"container": {"tiers": []}}, "container.tiers: an empty list; give at least 1 item"),
     (
         {"container": {"tiers": TIERS, "radius_m": 0.02}},
-        "container: radius_m: 0.02 m, but tiers make it 0.0234 m; leave radius_m out",
+        "container.radius_m: 0.02 m, but tiers make it 0.0234 m; leave radius_m out",
     ),
     (
         {"container": {"tiers": [*TIERS, {"radius_m": 0.005, "height_m": 0.01}]}},
@@ -206,11 +234,11 @@ def test_an_error_in_the_smarticle_is_one_error(scene_data: SceneData) -> None:
     data = scene_data({"smarticle.middle_length_m": -1, "hooks": {}, "phases": [DEPOSIT, PULL]})
     with pytest.raises(InputError) as caught:
         parse_scene(data, source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: input should be greater than 0, got -1"
+    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: -1 m is out of range; use more than 0 m"
 
 
 def test_a_hook_may_be_pulled_out_over_the_wall(make_scene: MakeScene) -> None:
-    make_scene({"hooks": {}, "container.height_m": 0.02, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
+    make_scene({"hooks": {}, "container.height_m": 0.03, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
 
 
 def test_the_wall_is_high_enough_for_the_hooks(make_scene: MakeScene) -> None:
@@ -294,3 +322,13 @@ def test_watchdog_knows_the_tiers() -> None:
     DOG.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
     with pytest.raises(RunError, match="left through the wall"):
         DOG.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)
+
+
+def test_a_layer_that_fits_by_either_way_out_is_let_pass(make_scene: MakeScene) -> None:
+    make_scene({"container.height_m": 0.02193})
+    make_scene({"container.height_m": 0.02, "phases.0.layer_height_w": 0.8})
+
+
+def test_a_high_hook_that_nobody_pulls_is_let_pass(make_scene: MakeScene) -> None:
+    make_scene({"hooks": {"upper_height_m": 0.3}})
+    make_scene({"hooks": {"upper_height_m": 0.1}, "phases": [DEPOSIT, RELAX, PULL]})

@@ -41,10 +41,31 @@ def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
         "phi": 0.123,
         "count": 270,
         "wall_s": 5.0,
+        "checkpoint_s": None,
     }
     assert [path.name for path in tmp_path.iterdir()] == ["progress.json"]
     bar.finish()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
+    def told() -> tuple[float, float | None]:
+        data = json.loads((tmp_path / "progress.json").read_text())
+        return data["time_s"], data["checkpoint_s"]
+
+    bar = Progress(tmp_path, 2, show=False)
+    bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
+    bar.checkpointed(0.1)  # nothing else is known yet
+    assert not (tmp_path / "progress.json").exists()
+    bar.update(time=0.2, phi=0.1, count=2)
+    assert told() == (0.2, 0.1)
+    wall.now += 0.01
+    bar.update(time=0.3, phi=0.1, count=2)
+    bar.checkpointed(0.3)
+    assert told() == (0.3, 0.3)
+    wall.now += 2
+    bar.update(time=0.5, phi=0.1, count=2)
+    assert told() == (0.5, 0.3)
 
 
 def test_unknown_phi_is_null(tmp_path: Path, wall: Wall) -> None:

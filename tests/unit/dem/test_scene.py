@@ -174,7 +174,7 @@ def test_every_field_says_what_it_is_and_in_which_unit() -> None:
         model.__name__ for model in seen
     }
     assert {"Motor", "Actuate", "ShapeChange", "InternalOscillation", "Sequence", "Sine"} <= {m.__name__ for m in seen}
-    units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N/m", "m/s", "m/s²", "rad/s", "N m", "N m/rad"}
+    units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N", "N/m", "m/s", "m/s²", "rad/s", "N m", "N m/rad"}
     units |= {"N s/m", "N m s/rad"}
     numbers = 0
     for model in seen:

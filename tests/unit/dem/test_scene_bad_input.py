@@ -22,21 +22,21 @@ W_IN_MM = (
     "lengths are in metres: for 11.7 mm write 0.0117"
 )
 BAD: list[tuple[dict[str, Any], str]] = [
-    ({"smarticle.middle_length_m": -0.0117}, "smarticle.middle_length_m: input should be greater than 0, got -0.0117"),
-    ({"smarticle.middle_length_m": 0}, "smarticle.middle_length_m: input should be greater than 0, got 0"),
-    ({"smarticle.thickness_normal_m": 0.0}, "smarticle.thickness_normal_m: input should be greater than 0, got 0.0"),
-    ({"smarticle.thickness_in_plane_m": -1}, "smarticle.thickness_in_plane_m: input should be greater than 0, got -1"),
-    ({"container.radius_m": -0.02}, "container.radius_m: input should be greater than 0, got -0.02"),
-    ({"container.height_m": 0}, "container.height_m: input should be greater than 0, got 0"),
+    ({"smarticle.middle_length_m": -0.0117}, "smarticle.middle_length_m: -0.0117 m is out of range; use more than 0 m"),
+    ({"smarticle.middle_length_m": 0}, "smarticle.middle_length_m: 0 m is out of range; use more than 0 m"),
+    ({"smarticle.thickness_normal_m": 0.0}, "smarticle.thickness_normal_m: 0.0 m is out of range; use more than 0 m"),
+    ({"smarticle.thickness_in_plane_m": -1}, "smarticle.thickness_in_plane_m: -1 m is out of range; use more than 0 m"),
+    ({"container.radius_m": -0.02}, "container.radius_m: -0.02 m is out of range; use more than 0 m"),
+    ({"container.height_m": 0}, "container.height_m: 0 m is out of range; use more than 0 m"),
     (
         {"smarticle.middle_length_m": math.nan},
-        "smarticle.middle_length_m: input should be a finite number, got nan",
+        "smarticle.middle_length_m: nan is not a finite number; give one in m",
     ),
-    ({"container.radius_m": math.inf}, "container.radius_m: input should be a finite number, got inf"),
-    ({"gravity_m_per_s2": -math.inf}, "gravity_m_per_s2: input should be a finite number, got -inf"),
-    ({"phases.2.duration_s": math.nan}, "phases.2.duration_s: input should be a finite number, got nan"),
-    ({"smarticle.aspect_ratio": 2.5}, "smarticle.aspect_ratio: input should be less than or equal to 2, got 2.5"),
-    ({"smarticle.aspect_ratio": -0.1}, "smarticle.aspect_ratio: input should be greater than or equal to 0, got -0.1"),
+    ({"container.radius_m": math.inf}, "container.radius_m: inf is not a finite number; give one in m"),
+    ({"gravity_m_per_s2": -math.inf}, "gravity_m_per_s2: -inf is not a finite number; give one in m/s²"),
+    ({"phases.2.duration_s": math.nan}, "phases.2.duration_s: nan is not a finite number; give one in s"),
+    ({"smarticle.aspect_ratio": 2.5}, "smarticle.aspect_ratio: 2.5 is out of range; use at most 2"),
+    ({"smarticle.aspect_ratio": -0.1}, "smarticle.aspect_ratio: -0.1 is out of range; use at least 0"),
     (
         {"smarticle.angles_deg": [120, 90]},
         "smarticle.angles_deg: 120° is outside -15° … 105°, the range of the hinges",
@@ -62,22 +62,22 @@ BAD: list[tuple[dict[str, Any], str]] = [
         "count: 5000 smarticles cannot fit into 0.01 m of container.height_m (half full is 482); "
         "lower the count or leave height_m out",
     ),
-    ({"count": 0}, "count: input should be greater than or equal to 1, got 0"),
-    ({"count": 2.5}, "count: input should be a valid integer, got a number with a fractional part, got 2.5"),
+    ({"count": 0}, "count: 0 is out of range; use at least 1"),
+    ({"count": 2.5}, "count: 2.5 is not a whole number; use e.g. 2"),
     ({"count": "ten"}, "count: got the text 'ten', expected a number; leave out the quotes and the unit"),
-    ({"count": None}, "count: input should be a valid integer, got None"),
+    ({"count": None}, "count: null is not a whole number; give one"),
     ({"count": True}, "count: got the boolean true, expected a number"),
-    ({"seed": -1}, "seed: input should be greater than or equal to 0, got -1"),
-    ({"smarticle.aspect_ratio": True}, "smarticle: aspect_ratio: got the boolean true, expected a number"),
-    ({"contact.friction_wall": False}, "contact: friction_wall: got the boolean false, expected a number"),
+    ({"seed": -1}, "seed: -1 is out of range; use at least 0"),
+    ({"smarticle.aspect_ratio": True}, "smarticle.aspect_ratio: got the boolean true, expected a number"),
+    ({"contact.friction_wall": False}, "contact.friction_wall: got the boolean false, expected a number"),
     (
         {"smarticle.aspect_ratio": "wide"},
-        "smarticle: aspect_ratio: got the text 'wide', expected a number; leave out the quotes and the unit",
+        "smarticle.aspect_ratio: got the text 'wide', expected a number; leave out the quotes and the unit",
     ),
-    ({"contact.friction_wall": -0.1}, "contact.friction_wall: input should be greater than or equal to 0, got -0.1"),
-    ({"contact.restitution": 0}, "contact.restitution: input should be greater than or equal to 0.01, got 0"),
-    ({"contact.restitution": 1.5}, "contact.restitution: input should be less than or equal to 1, got 1.5"),
-    ({"phases.2.frequency_hz": 0}, "phases.2.frequency_hz: input should be greater than 0, got 0"),
+    ({"contact.friction_wall": -0.1}, "contact.friction_wall: -0.1 is out of range; use at least 0"),
+    ({"contact.restitution": 0}, "contact.restitution: 0 is out of range; use at least 0.01"),
+    ({"contact.restitution": 1.5}, "contact.restitution: 1.5 is out of range; use at most 1"),
+    ({"phases.2.frequency_hz": 0}, "phases.2.frequency_hz: 0 Hz is out of range; use more than 0 Hz"),
     (
         {"gravity_m_per_s2": 0},
         "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)",
@@ -98,23 +98,23 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"smarticle.angles_deg": [True, 90]},
-        "smarticle: angles_deg: got the boolean true, expected a number",
+        "smarticle.angles_deg: got the boolean true, expected a number",
     ),
     (
         {"smarticle.aspect_ratio": "0.5"},
-        "smarticle: aspect_ratio: got the text '0.5', expected a number; leave out the quotes and the unit",
+        "smarticle.aspect_ratio: got the text '0.5', expected a number; leave out the quotes and the unit",
     ),
     ({"fidelity": {"base": ["draft"]}}, "fidelity: unknown fidelity ['draft']; known: draft, standard, reference"),
     (
         {"smarticle.aspect_ratio": 2, "smarticle.angles_deg": [105, 105]},
-        "smarticle: angles_deg: at 105° and 105° the barbs of l/w = 2 cross; "
+        "smarticle.angles_deg: at 105° and 105° the barbs of l/w = 2 cross; "
         "use angles nearer to 90° or a smaller aspect_ratio",
     ),
     ({"schema_version": 2}, "schema_version: 2 is not known here; this version reads 1"),
-    ({"schema_version": "1"}, "schema_version: input should be 1, got '1'"),
+    ({"schema_version": "1"}, "schema_version: '1' is not known; use 1"),
     ({"fidelity": "fine"}, "fidelity: unknown fidelity 'fine'; known: draft, standard, reference"),
     ({"fidelity": {"base": "fine"}}, "fidelity: unknown fidelity 'fine'; known: draft, standard, reference"),
-    ({"fidelity": {"rows": 9}}, "fidelity.rows: input should be less than or equal to 4, got 9"),
+    ({"fidelity": {"rows": 9}}, "fidelity.rows: 9 is out of range; use at most 4"),
     (
         {"fidelity": {"rows": 2, "diameter_m": 0.002}},
         "fidelity.rows: 2 rows of 0.002 m do not fit into thickness_normal_m = 0.00127 m; "
@@ -132,14 +132,14 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"phases.1.type": "rest"},
-        "phases.1: type: 'rest' is not known; known: 'deposit', 'relax', 'shake', 'actuate', 'shape-change', "
+        "phases.1.type: 'rest' is not known; known: 'deposit', 'relax', 'shake', 'actuate', 'shape-change', "
         "'internal-oscillation', 'remove-container', 'pull-hook', 'arrange', 'strain'",
     ),
     (
         {"phases.1": {"duration_s": 1}},
-        "phases.1: type: missing, got {'duration_s': 1}; write which one it is, see `smarticles schema`",
+        "phases.1.type: missing in {'duration_s': 1}; write which one it is, see `smarticles schema`",
     ),
-    ({"phases.1": "relax"}, "phases.1: expected keys and values, {type: …}, got 'relax'"),
+    ({"phases.1": "relax"}, "phases.1: 'relax' is not keys and values; write them as {type: …}"),
     ({"smarticle.angles_deg": [90]}, "smarticle.angles_deg.1: missing; it has no default"),
     ({"container": {"tiers": [{"radius_m": 0.03}]}}, "container.tiers.0.height_m: missing; it has no default"),
     (
@@ -195,7 +195,7 @@ def test_container_narrower_than_a_smarticle(make_scene: MakeScene, scene_data: 
 def test_several_errors_show_the_first_and_how_many_more(scene_data: SceneData) -> None:
     with pytest.raises(InputError) as caught:
         parse_scene(scene_data({"seed": -1, "count": 0}), source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: seed: input should be greater than or equal to 0, got -1 (and 1 more)"
+    assert str(caught.value) == "bad.yaml: seed: -1 is out of range; use at least 0 (and 1 more)"
 
 
 @pytest.mark.parametrize(("data", "kind"), [([1], "list"), ("text", "str"), (3, "int")], ids=["list", "text", "3"])
@@ -267,7 +267,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
         ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
         ("smarticle.middle_length_m=11.7", f"bad.yaml: {W_IN_MM}"),
-        ("contact.friction_wall=.nan", "bad.yaml: contact.friction_wall: input should be a finite number, got nan"),
+        ("contact.friction_wall=.nan", "bad.yaml: contact.friction_wall: nan is not a finite number; give one"),
     ],
 )
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:

@@ -67,6 +67,7 @@ class SyntheticRun:
             "internal-oscillation": self.oscillate_time,
             "pull-hook": 2.0,
             "remove-container": 2.0,
+            "strain": 3.0,
         }
 
     def shares(self) -> NDArray[np.float64]:

@@ -10,21 +10,17 @@ import pandas as pd
 import pytest
 
 from postprocess.chain_findings import findings, sensitivity
-from postprocess.chain_runs import (
+from postprocess.chain_runs import CONFINEMENT, COUNT, SPEED, VARIANT
+from postprocess.strain import (
     AT_PEAK,
     BEND,
-    CONFINEMENT,
-    COUNT,
     DROP,
     FRACTURE,
     IMBALANCE,
     PEAK,
     QUANTITIES,
-    SEED,
     SLIP_WIDENING,
-    SPEED,
     STIFFNESS,
-    VARIANT,
     WALL,
     WIDENING,
     YIELD,
@@ -32,6 +28,7 @@ from postprocess.chain_runs import (
     first_drop,
     measured,
 )
+from postprocess.study_runs import SEED
 
 
 def pull(*, yields: bool, jolt: float = 0.0) -> Pull:

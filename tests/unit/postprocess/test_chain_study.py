@@ -17,10 +17,11 @@ from synthetic import SyntheticRun, write_manifest
 from dem.errors import InputError
 from postprocess import chain_figures
 from postprocess.chain import analyse
-from postprocess.chain_runs import CONFINEMENT, COUNT, FRACTURE, PEAK, STIFFNESS, VARIANT
+from postprocess.chain_runs import CONFINEMENT, COUNT, VARIANT
 from postprocess.findings import CRITERION
 from postprocess.origin import SAVOIE
 from postprocess.points import marked
+from postprocess.strain import FRACTURE, PEAK, STIFFNESS
 from postprocess.study_report import StudyReport
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}

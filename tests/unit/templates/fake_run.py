@@ -26,6 +26,7 @@ def main() -> int:
     sha256 = re.search(r"# sha256 (\w+)", scene.read_text())
     assert sha256 is not None
     (directory / "run.json").write_text(json.dumps({"scene_sha256": sha256[1]}))
+    (directory / "searched").write_text(os.environ.get("PYTHONPATH", ""))
     (directory / "threads").write_text(os.environ["OMP_NUM_THREADS"])
     held = [str(fd.readlink()) for fd in descriptors() if fd.is_symlink()]
     (directory / "held").write_text("\n".join(held))

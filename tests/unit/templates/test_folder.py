@@ -21,7 +21,9 @@ def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> 
     assert content["name"] == "test"
     assert content["command"] == "smarticles sweep sweep.yaml --out out"
     assert content["versions"] == {"smarticles": "0"}
-    files = {Path(name).name: text for name, text in content["files"].items()}
+    # By the names they have seen from the sweep file: none of this machine's folders.
+    files = content["files"]
+    assert set(files) == {"sweep.yaml", "scene.yaml.j2"}
     assert files["sweep.yaml"] == SWEEP
     assert "{{ count }}" in files["scene.yaml.j2"]
     assert content["points"][0]["name"] == "n10_seed1"
@@ -136,9 +138,11 @@ def write_run(directory: Path, **files: dict[str, object]) -> Path:
 
 def test_states_of_a_run(tmp_path: Path) -> None:
     manifest: dict[str, object] = {"scene_sha256": "x"}
-    progress: dict[str, object] = {"phase": "shake", "time_s": 1.5, "wall_s": 20.0}
+    progress: dict[str, object] = {"phase": "shake", "time_s": 1.5, "wall_s": 20.0, "checkpoint_s": 1.2}
     done = write_run(tmp_path / "a", run=manifest, done={"time_s": 6.0, "wall_s": 99.0})
-    failed = write_run(tmp_path / "b", run=manifest, failed={"status": "failed", "cause": "why", "time_s": 2.0})
+    failed = write_run(
+        tmp_path / "b", run=manifest, failed={"status": "failed", "cause": "why", "time_s": 2.0, "checkpoint_s": 1.6}
+    )
     interrupted = write_run(tmp_path / "c", run=manifest, failed={"status": "interrupted"})
     killed = write_run(tmp_path / "d", run=manifest, progress=progress)
     empty = write_run(tmp_path / "e")
@@ -149,6 +153,8 @@ def test_states_of_a_run(tmp_path: Path) -> None:
     assert (found[0].time_s, found[0].wall_s) == (6.0, 99.0)
     assert (found[1].cause, found[1].time_s) == ("why", 2.0)
     assert (found[3].phase, found[3].time_s, found[3].wall_s) == ("shake", 1.5, 20.0)
+    # From where they would go on.
+    assert [status.checkpoint_s for status in found[:4]] == [None, 1.6, None, 1.2]
     assert count_states(found)["missing"] == 2
     assert json.loads(json.dumps(found[3].to_dict()))["state"] == "stopped"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -262,7 +263,7 @@ def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
     assert not (folder.path / "runs").exists()
 
 
-def test_the_command_of_a_run_is_this_interpreter_and_absolute_paths() -> None:
+def test_the_command_of_a_run_is_this_interpreter_and_the_paths_that_it_is_given() -> None:
     command = smarticles_command(Path("a scene.yaml"), Path("out"), False)
     assert smarticles_command(Path("a scene.yaml"), Path("out"), True) == (*command, "--resume")
     assert command == (
@@ -271,7 +272,24 @@ def test_the_command_of_a_run_is_this_interpreter_and_absolute_paths() -> None:
         "-m",
         "cli",
         "run",
-        str(Path.cwd() / "a scene.yaml"),
+        "a scene.yaml",
         "--out",
-        str(Path.cwd() / "out"),
+        "out",
     )
+
+
+def test_runs_are_told_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, str]] = []
+
+    def noting(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
+        told.append((str(scene), str(directory)))
+        return fake()(scene, directory, resume)
+
+    # What the user gave for imports still means what it meant where it was given.
+    monkeypatch.setenv("PYTHONPATH", f"lib{os.pathsep}{folder.path}")
+    outcomes = run_folder(folder, Watcher(), command=noting, timing=QUICK)
+    assert sorted(told) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
+    assert [outcome.cause for outcome in outcomes] == [None] * 4
+    assert all(folder.is_done(entry) for entry in folder.entries)
+    searched = (folder.run(folder.entries[0]) / "searched").read_text().split(os.pathsep)
+    assert searched[-2:] == [str(Path.cwd() / "lib"), str(folder.path)]

@@ -1,0 +1,135 @@
+"""What is wrong with a scene that pydantic refuses: one line with key, value with its unit, and the way out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+# Words that may end a key, and how the unit that they spell is written.
+_UNITS = {
+    **{word: word for word in ("m", "s", "g", "w", "N", "kg", "rad", "deg")},
+    **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
+}
+# A message that begins with a key is about that key, below the place that pydantic tells.
+_OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
+_MOST = 60  # characters of a value that are shown
+
+
+def first_line(error: ValidationError, data: Any) -> str:
+    """The first of pydantic's errors as `key: value and what is wrong with it; way out`, and how many more there are.
+
+    Args:
+        error: what pydantic found.
+        data: what it was given.
+    """
+    # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
+    # Nor is a list too short whose items are there, but wrong.
+    errors = [
+        found
+        for found in error.errors()
+        if found["type"] != "default_factory_not_called" and not (found["type"] == "too_short" and found["input"])
+    ]
+    first = errors[0]
+    place = _key(first["loc"], data)
+    text = _text(first["type"], first["msg"], first["input"], first.get("ctx", {}), unit_of(place))
+    if place:
+        place += "." if _OWN_KEY.match(text) else ": "
+    return place + text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
+
+
+def unit_of(key: str) -> str:
+    """The unit that the end of a key spells, `m/s` of `phases.2.speed_m_per_s`; empty where it spells none."""
+    words: list[str] = []
+    for word in reversed(key.rpartition(".")[2].split("_")[1:]):
+        if word not in _UNITS:
+            break
+        words.insert(0, _UNITS[word])
+    return " ".join(words).replace(" / ", "/")
+
+
+def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:
+    """What is wrong with a value and what to do about it; `kind`, `message` and `context` are pydantic's."""
+    if kind in _BOUNDS:
+        name, words = _BOUNDS[kind]
+        return f"{_shown(value)} {unit}".rstrip() + f" is out of range; use {words} {context[name]:g} {unit}".rstrip()
+    if kind in _TOLD:
+        return _TOLD[kind](_shown(value), value, context, unit)
+    if kind == "value_error":
+        return message.removeprefix("Value error, ")
+    return f"{message[0].lower()}{message[1:]}, got {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    """A value as YAML would have it."""
+    named = {None: "null", True: "true", False: "false"}
+    text = named[value] if value is None or isinstance(value, bool) else repr(value)
+    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
+
+
+def _not_a_number(shown: str, unit: str, what: str = "a number") -> str:
+    return f"{shown} is not {what}; give one" + (f" in {unit}" if unit else "")
+
+
+def _items(count: int) -> str:
+    return f"{count} item" + ("s" if count > 1 else "")
+
+
+_BOUNDS = {
+    "greater_than": ("gt", "more than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+
+_TOLD: Mapping[str, Callable[[str, Any, Mapping[str, Any], str], str]] = {
+    "missing": lambda *_: "missing; it has no default",
+    "finite_number": lambda shown, _v, _c, unit: _not_a_number(shown, unit, "a finite number"),
+    "float_type": lambda shown, _v, _c, unit: _not_a_number(shown, unit),
+    "int_type": lambda shown, _v, _c, unit: _not_a_number(shown, unit, "a whole number"),
+    "int_from_float": lambda shown, value, _c, _u: f"{shown} is not a whole number; use e.g. {round(value)}",
+    "int_parsing_size": lambda shown, *_: f"{shown} is out of range; use a smaller one",
+    "bool_type": lambda shown, *_: f"{shown} is neither true nor false; use one of them",
+    "bool_parsing": lambda shown, *_: f"{shown} is neither true nor false; use one of them",
+    "string_type": lambda shown, *_: f"{shown} is not text; write it in quotes",
+    "string_too_short": lambda shown, _v, context, _u: (
+        f"{shown} is too short; use {context['min_length']} or more characters"
+    ),
+    "string_too_long": lambda shown, value, context, _u: (
+        f"{shown} has {len(value)} characters; use at most {context['max_length']}"
+    ),
+    "literal_error": lambda shown, _v, context, _u: f"{shown} is not known; use {context['expected']}",
+    "too_short": lambda _s, _v, context, _u: f"an empty list; give at least {_items(context['min_length'])}",
+    "too_long": lambda shown, value, context, _u: (
+        f"{shown} has {_items(len(value))}; give at most {_items(context['max_length'])}"
+    ),
+    "tuple_type": lambda shown, *_: f"{shown} is not a list; write its items in brackets, [ … ]",
+    "dict_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{key: value}}",
+    "model_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{key: value}}",
+    "model_attributes_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{type: …}}",
+    "union_tag_not_found": lambda shown, *_: (
+        f"type: missing in {shown}; write which one it is, see `smarticles schema`"
+    ),
+    "union_tag_invalid": lambda _s, _v, context, _u: (
+        f"type: {context['tag']!r} is not known; known: {context['expected_tags']}"
+    ),
+}
+
+
+def _key(steps: Sequence[int | str], data: Any) -> str:
+    """Pydantic's path to a value as the key of the scene file.
+
+    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
+    """
+    here, keys = data, []
+    for step in steps:
+        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
+            continue
+        keys.append(str(step))
+        if isinstance(here, Mapping):
+            here = here.get(step)
+        elif isinstance(here, list) and isinstance(step, int):
+            here = here[step] if step < len(here) else None  # one that is missing
+    return ".".join(keys)
