@@ -21,7 +21,7 @@ TORQUE_LIMIT = 1.607e-5  # N m, the paper's
 def no_torque(out: Path) -> list[Check]:
     """τ_max = 0."""
     run = whole(scene(turn(40, 0.3), motor={"torque_limit_N_m": 0.0}), out)
-    return [says(run.text, "motor.torque_limit_N_m", "greater than 0", "got 0.0")]
+    return [says(run.text, "motor.torque_limit_N_m", "0.0 N m", "more than 0 N m")]
 
 
 def weak_motors(out: Path, *, law: str, count: int) -> list[Check]:

@@ -12,7 +12,7 @@ from dem.container import Cylinder
 from dem.errors import RunError
 from dem.particle import Boxes
 from dem.state import State
-from dem.strain import Strain
+from dem.strain import Held, Strain
 from dem.watchdog import Watchdog
 
 BOXES = Boxes(
@@ -115,6 +115,27 @@ def test_deep_contacts_are_named() -> None:
     assert str(caught.value) == (
         "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
         "pass through each other or through the container; raise fidelity.stiffness_N_per_m, or load the pile less"
+    )
+
+
+@pytest.mark.parametrize(
+    ("between", "way_out"),
+    [
+        (("the lower hook", "the upper hook"), "set hooks.upper_height_m and lower_height_m further apart than w"),
+        (("the upper hook", "the wall"), "give the hook more room: a smaller hooks.length_m or a wider container"),
+    ],
+)
+def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
+    between: tuple[str, str], way_out: str
+) -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
+    deep = np.array([False, True, False, True])
+    with pytest.raises(RunError) as caught:
+        dog.check_depths(Strain(7e-4, deep, 0.0, (Held(3, between, 0.0051),)), time=1.25)
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
+        f"pass through each other or through the container; smarticle 3 is held by {between[0]} and {between[1]}, "
+        f"which have moved apart by 0.0051 m; {way_out}"
     )
 
 
