@@ -195,7 +195,7 @@ def test_names_and_units_agree() -> None:
     suffixes = {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad"}
     suffixes |= {"_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s", "_N_m": "N m"}
     suffixes |= {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
-    suffixes |= {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad", "_hz": "Hz", "_m": "m", "_s": "s"}
+    suffixes |= {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad", "_hz": "Hz", "_N": "N", "_m": "m", "_s": "s"}
     checked = set()
     for model in models(Scene):
         for name, field in model.model_fields.items():
