@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -39,7 +40,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         **{name: f"share of the volume of the {tier} tier inside the pile before" for tier, name in FILLED.items()},
         **{name: f"the same of the {tier} tier after the walls went" for tier, name in FILLED_AFTER.items()},
         **{
-            name: f"of what was inside the pile in the {tier} tier, the share that still is"
+            name: f"of what was inside the pile in the {tier} tier, the share that still is; empty below a ball"
             for tier, name in KEPT.items()
         },
         **{name: f"share of the pile's material in the {tier} tier before" for tier, name in MATERIAL.items()},
@@ -86,18 +87,21 @@ def casting_row(run: RunManifest) -> dict[str, object]:
     start = removal(run).start or before.time
     after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
     one, other = (above_floor(frame.vertices, frame.floor_z) for frame in (before, after))
-    found = cast(one, other, tiers, thickness=run.sphere_diameter, ball=BALL * run.middle_length)
+    ball = BALL * run.middle_length
+    found = cast(one, other, tiers, thickness=run.sphere_diameter, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
+    filled = found.filled_before * volumes
+    # Of less than the ball that tells inside from outside, a share says nothing.
+    kept = np.where(filled > 4 / 3 * math.pi * ball**3, found.kept, math.nan)
     row = labels(run)
     for k, tier in enumerate(TIERS):
         row |= {
             FILLED[tier]: found.filled_before[k],
             FILLED_AFTER[tier]: found.filled_after[k],
-            KEPT[tier]: found.kept[k],
+            KEPT[tier]: kept[k],
             MATERIAL[tier]: found.material_before[k],
             MATERIAL_AFTER[tier]: found.material_after[k],
         }
-    filled = found.filled_before * volumes
     levels = heights(one), heights(other)
     return row | {
         NECK: 1 - found.material_before.sum(),

@@ -1,5 +1,7 @@
 """The study of casting, from piles that were laid by hand into a mould."""
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,6 +88,18 @@ def test_a_run_tells_what_each_tier_holds_before_and_after(runs):
     assert row[HEIGHT] == pytest.approx(13.5 * 1.27e-3, rel=0.05)
     still = casting_row(read_run(runs[0]))
     assert (still[OVERLAP], still[WHOLE_KEPT]) == (1, 1)
+
+
+def test_of_a_tier_that_holds_less_than_the_ball_no_share_is_told(tmp_path):
+    pile = crossed(9)  # 11.4 mm high: all in the lower two tiers
+    upright = pile[-1:].copy()
+    upright[..., 2] = 0.0115 + np.array([0.005, 0, 0, 0.005])  # but for the ends of two barbs
+    pile = np.concatenate([pile, upright])
+    made = write_released(tmp_path, "static", before=pile, after=pile, tiers=MOULD, aspect_ratio=0.8)
+    row = casting_row(read_run(made))
+    assert 0 < row[FILLED["upper"]] < 0.05
+    assert (row[KEPT["lower"]], row[KEPT["middle"]], row[WHOLE_KEPT]) == (1, 1, 1)
+    assert math.isnan(row[KEPT["upper"]])
 
 
 def test_the_study_compares_procedures_by_pairs(runs, tmp_path, monkeypatch):
