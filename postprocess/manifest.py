@@ -67,7 +67,7 @@ class RunManifest:
         channel_width: Distance of the two walls in the plane [m]; None without.
         sphere_diameter: Diameter of the spheres that stand for a smarticle [m].
         spheres_per_smarticle: Number of those spheres.
-        time_step: [s].
+        time_step: The shortest of its phases [s].
         phases: The phases in order.
         status: "done", "failed", "interrupted" or "unfinished".
         cause: Why the run failed or was interrupted; None otherwise.
