@@ -211,9 +211,10 @@ def _check_room(scene: Scene, hooks: Hooks) -> None:
 
 
 def hook_warnings(scene: Scene) -> tuple[str, ...]:
-    """Hooks that one smarticle can hold both of, in a scene that pulls one, as one line with the way out."""
+    """Hooks that one smarticle can hold both of, where one is pulled with any force, as one line with the way out."""
     hooks = scene.hooks
-    if hooks is None or not any(isinstance(phase, PullHook) for phase in scene.phases):
+    unlimited = [phase for phase in scene.phases if isinstance(phase, PullHook) and phase.force_limit_N is None]
+    if hooks is None or not unlimited:
         return ()
     across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
     inside = scene.smarticle.middle_length_m - scene.sphere_diameter
@@ -222,5 +223,5 @@ def hook_warnings(scene: Scene) -> tuple[str, ...]:
     return (
         f"hooks.upper_height_m: the hooks are {across:.3g} m from outside to outside, less than a smarticle's inner "
         f"length, {inside:.3g} m: one smarticle can hold both hooks, and then only the contacts give way; set them at "
-        f"least {1.005 * (inside - hooks.side_m):.3g} m apart, or measure it as it is",
+        f"least {1.005 * (inside - hooks.side_m):.3g} m apart, or give pull-hook a force_limit_N",
     )

@@ -64,9 +64,10 @@ def test_hooks_that_one_smarticle_can_hold_are_told(make_scene: MakeScene) -> No
     assert told == (
         "hooks.upper_height_m: the hooks are 0.0055 m from outside to outside, less than a smarticle's inner length, "
         "0.0104 m: one smarticle can hold both hooks, and then only the contacts give way; set them at least 0.00995 m "
-        "apart, or measure it as it is"
+        "apart, or give pull-hook a force_limit_N"
     )
-    # Hooks that stay where they are pull nothing apart.
+    # A pull that stops in time, and hooks that stay where they are, pull nothing apart.
+    assert hooked(make_scene, [DEPOSIT, RELAX, PULL | {"force_limit_N": 0.2}]) == ()
     assert hooked(make_scene, [DEPOSIT, RELAX]) == ()
 
 
