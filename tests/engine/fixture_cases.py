@@ -117,7 +117,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
     before = engine.strain(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, engine, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
         strain = engine.strain(limit)

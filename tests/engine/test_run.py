@@ -109,7 +109,10 @@ def test_finished_run_holds_what_made_it_and_what_came_out(finished: tuple[Path,
         "thickness_in_plane_m": 0.5e-3,
         "container_radius_m": 0.0234,
         "spheres_per_smarticle": len(scene.particle.centres),
-        "phases": [{"index": k, "type": kind} for k, kind in enumerate(("deposit", "relax", "shake", "relax"))],
+        "phases": [
+            {"index": k, "type": kind, "time_step_s": manifest["time_step_s"]}
+            for k, kind in enumerate(("deposit", "relax", "shake", "relax"))
+        ],
     }
     assert {key: manifest[key] for key in expected} == expected
     assert manifest["barb_length_m"] == pytest.approx(0.7 * 0.0117)
