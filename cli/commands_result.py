@@ -171,12 +171,18 @@ def _notes(table: pd.DataFrame) -> list[str]:
     """What a table shows that a person could take for a result."""
     if "hook work [J]" not in table.columns:
         return []
-    untouched = table[(table["hook work [J]"] == 0) & (table["hook peak force over n W_s [-]"] == 0)]
-    return [
-        f"{row['run']}: nothing touched the hook that phase {row['phase']} ({row['phase type']}) raised, its force is "
-        "0 N throughout; lower hooks.upper_height_m or raise count"
-        for row in untouched.to_dict("records")
-    ]
+    notes = []
+    for row in table.to_dict("records"):
+        where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
+        if row["hook work [J]"] == 0 and row["hook peak force over n W_s [-]"] == 0:
+            notes.append(
+                f"{where}: nothing touched the hook while it was raised, its force is 0 N throughout; lower "
+                "hooks.upper_height_m or raise count"
+            )
+        if row["hook held fast [-]"] == 1:
+            way = 1e3 * row["hook raised at the end [m]"]
+            notes.append(f"{where}: force_limit_N stopped the hook after {way:.3g} mm; its peak is a lower bound")
+    return notes
 
 
 def _table(table: pd.DataFrame, shown: Sequence[_Shown]) -> str:

@@ -18,7 +18,7 @@ from postprocess.geometry import centres_of_mass
 from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measure import summarise_run
 from postprocess.procedures_runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
-from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, held_at, peak, read_pull, weight_of_one
+from postprocess.pull import END, FREE, PULL, WINDOW, Pull, freed, held_at, held_fast, peak, read_pull, weight_of_one
 from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.series import Series, read_series
 from postprocess.study_runs import ASPECT, DEFINITION, SEED, duration
@@ -114,8 +114,7 @@ def fracture_row(run: RunManifest) -> dict[str, object]:
     }
     pull = read_pull(run, series, pulled.index)
     row |= _of_pull(run, pull)
-    # A hook that nothing stops arrives within a time step.
-    row[HELD_FAST] = float(pull.raised[-1] < 0.99 * asked.number("distance_m", positive=True))
+    row[HELD_FAST] = float(held_fast(pull, asked))
     row[LIMIT] = _limit(asked) / run.count / weight_of_one(run)
     row["escaped at the end [-]"] = table["escaped [-]"].iloc[-1]
     row["frames averaged [-]"] = int(before["frames averaged"])

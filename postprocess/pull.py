@@ -15,7 +15,7 @@ import numpy as np
 
 from dem.errors import InputError
 from postprocess.manifest import RunManifest
-from postprocess.scene_file import read_scene
+from postprocess.scene_file import Settings, read_phases, read_scene
 from postprocess.series import Series
 
 if TYPE_CHECKING:
@@ -167,6 +167,20 @@ def freed(pull: Pull, window: float = WINDOW) -> float:
     return float(times[held[-1] + 1])
 
 
+def held_fast(pull: Pull, asked: Settings) -> bool:
+    """Whether the hook was stopped by its force limit on the way, so that its peak is a lower bound.
+
+    Args:
+        pull: A whole pull.
+        asked: What the scene says of the phase.
+
+    Raises:
+        InputError: The scene does not say how far.
+    """
+    # A hook that nothing stops arrives within a time step.
+    return bool(pull.raised[-1] < 0.99 * asked.number("distance_m", positive=True))
+
+
 def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, float]:
     """Measures of a pull for a table, forces over the weight of all smarticles, n W_s.
 
@@ -175,6 +189,8 @@ def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, floa
     """
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
+    ended = run.phases[phase].end is not None
+    held = float(held_fast(pull, read_phases(run.directory)[phase])) if ended else math.nan
     return {
         "hook peak force over n W_s [-]": highest.force / weight / run.count,
         "hook peak time [s]": highest.time,
@@ -183,6 +199,8 @@ def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, floa
         "hook work [J]": pull.work,
         "hook free time [s]": freed(pull),
         "hook load at the end [smarticles]": pull.left / weight,
+        "hook raised at the end [m]": float(pull.raised[-1]),
+        "hook held fast [-]": held,
     }
 
 

@@ -94,6 +94,15 @@ def test_a_hook_that_nothing_touched_is_told(
     assert len(found) == notes
     if notes:
         assert found == [
-            f"note: {run}: nothing touched the hook that phase 2 (pull-hook) raised, its force is 0 N throughout; "
-            "lower hooks.upper_height_m or raise count"
+            f"note: {run}: phase 2 (pull-hook): nothing touched the hook while it was raised, its force is 0 N "
+            "throughout; lower hooks.upper_height_m or raise count"
         ]
+
+
+def test_a_hook_that_its_limit_stopped_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    force = {"limit": 1e-3, "stops": 0.5}
+    held = write_hooked_run(tmp_path / "a", SyntheticRun(phases=AFTER_REST), lambda t: 1e-3 * np.ones_like(t), **force)
+    found = [line for line in told(capsys, held) if line.startswith("note: ")]
+    assert found == [
+        f"note: {held}: phase 2 (pull-hook): force_limit_N stopped the hook after 5.85 mm; its peak is a lower bound"
+    ]
