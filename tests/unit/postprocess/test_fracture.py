@@ -273,7 +273,11 @@ def test_what_a_held_pile_leaves_unknown_changes_no_verdict():
     table = as_in_the_paper()
     assert verdicts(holding(table, SHAPE))[:2] == ["found", "found"]
     assert verdicts(holding(table, EXTERNAL))[:2] == ["not resolved", "found"]
-    assert verdicts(holding(table[table[THETA] != 5], INTERNAL))[1] == "not resolved"
+    internal = holding(table[table[THETA] != 5], INTERNAL)
+    assert verdicts(internal)[1] == "not resolved"
+    # Slopes over all and over θ, and where the peak is.
+    assert verdicts(internal)[3:] == ["not resolved"] * 3
+    assert verdicts(holding(table, EXTERNAL))[3:] == ["found", "not resolved", "found"]
     table[PEAK] = 2 - table[PEAK]
     assert verdicts(table)[0] == "not found"
     assert verdicts(holding(table, SHAPE))[0] == "not resolved"
