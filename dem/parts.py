@@ -389,6 +389,10 @@ class Recording(Part):
         "that a resumed run has the same bits; runs with other intervals differ in their last bits",
     )
 
+    def samples_in(self, interval_s: float | None) -> int:
+        """Samples of the series in one of the other intervals [s]; 0 for none."""
+        return round((interval_s or 0.0) / self.series_interval_s)
+
     @property
     def energies(self) -> bool:
         """Whether energies are recorded: asked for, or needed by the account."""

@@ -321,9 +321,9 @@ def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
         ),
         progress=progress,
         interval=recording.series_interval_s,
-        frame_every=round(recording.frame_interval_s / recording.series_interval_s),
+        frame_every=recording.samples_in(recording.frame_interval_s),
         spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
-        sphere_every=round((recording.sphere_interval_s or 0.0) / recording.series_interval_s),
+        sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
 
 

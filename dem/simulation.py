@@ -135,21 +135,17 @@ class Simulation:
 
     def _advance(self) -> None:
         """Advance to the target step, recording what is due on the way."""
-        engine, recorder = self.engine, self.recorder
+        engine, recorder, recording = self.engine, self.recorder, self.scene.recording
         while engine.steps < self._target:
             engine.advance(min(self._target, recorder.next_step) - engine.steps)
             if engine.steps == recorder.next_step:
-                due = self._checkpoint_every and recorder.samples % self._checkpoint_every == 0
+                every = recording.samples_in(recording.checkpoint_interval_s)
+                due = every and recorder.samples % every == 0
                 recorder.record(engine, self._phase)
                 if due:
                     self._checkpoint()
 
     # -- checkpoints -------------------------------------------------------------------------------------------
-
-    @property
-    def _checkpoint_every(self) -> int:
-        """Samples between checkpoints, 0 for none."""
-        return round((self.scene.recording.checkpoint_interval_s or 0.0) / self.scene.recording.series_interval_s)
 
     def _checkpoint(self) -> None:
         saved = self.folder / ".engine.partial.yade"

@@ -30,14 +30,12 @@ def told_less(differences: Mapping[str, SeedMean], between: str) -> str:
     return between.join(f"less {name} {told(effect, 3)}" for name, effect in differences.items())
 
 
-def compared(differences: Mapping[str, SeedMean], sign: int, *, between: str = "; ") -> tuple[str, Verdict]:
+def compared(differences: Mapping[str, SeedMean], sign: int) -> tuple[str, Verdict]:
     """Whether something is above (sign 1) or below (−1) each of others: numbers and verdict.
 
     Args:
         differences: It less each of the others, by their names.
         sign: 1 or −1.
-        between: Stands between the numbers.
     """
-    return told_less(differences, between), all_of(
-        [judge(effect if sign > 0 else negative(effect)) for effect in differences.values()]
-    )
+    verdicts = [judge(effect if sign > 0 else negative(effect)) for effect in differences.values()]
+    return told_less(differences, "; "), all_of(verdicts)

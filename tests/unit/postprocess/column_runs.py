@@ -6,10 +6,10 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from series_file import write_series
 from synthetic import RADIUS, SyntheticRun, W, u_shape, write_frame, write_manifest
 
 F = 30.0
@@ -69,16 +69,13 @@ def _write_series(directory: Path, column: Column, table: NDArray[np.float64]) -
     times, phases, left, sunk = table.T
     # Everything bounces within a period while it is shaken.
     bounce = np.where(phases == len(column.phases) - 1, 0.1 * np.sin(2 * np.pi * F * times), 0.0)
-    with h5py.File(directory / "series.h5", "w") as file:
-        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": column.seed})
-        for name, values, unit in (
-            ("time_s", times, "s"),
-            ("phase", phases.astype(np.int64), "1"),
-            ("com_height_m", H0 * (sunk + bounce), "m"),
-            ("outside_count", _outside(column, left), "1"),
-        ):
-            file[name] = values
-            file[name].attrs.update({"unit": unit, "description": name})
+    columns = {
+        "time_s": (times, "s"),
+        "phase": (phases.astype(np.int64), "1"),
+        "com_height_m": (H0 * (sunk + bounce), "m"),
+        "outside_count": (_outside(column, left), "1"),
+    }
+    write_series(directory, columns, seed=column.seed)
 
 
 def _write_frames(directory: Path, column: Column, table: NDArray[np.float64]) -> None:

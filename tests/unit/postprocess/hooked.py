@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from series_file import write_series
 from synthetic import SyntheticRun, W, write_run
 
 GRAVITY = 9.81
@@ -65,9 +65,5 @@ def write_hooked_run(
         "container_z_m": (np.full(len(times), run.floor_z), "m"),
         "container_work_J": (work, "J"),
     }
-    with h5py.File(directory / "series.h5", "w") as file:
-        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": run.seed})
-        for name, (values, unit) in columns.items():
-            file[name] = values
-            file[name].attrs.update({"unit": unit, "description": name})
+    write_series(directory, columns, seed=run.seed)
     return directory

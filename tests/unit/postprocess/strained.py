@@ -4,9 +4,9 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
+from series_file import write_series
 from synthetic import SyntheticRun, write_run
 
 LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
@@ -34,9 +34,5 @@ def write_strained_run(directory: Path, force: Callable[[NDArray[np.float64]], N
         "chain_length_m": (LENGTH * (1 + strains), "m"),
         "chain_width_m": (WIDTH * (1 + 0.1 * strains), "m"),
     }
-    with h5py.File(directory / "series.h5", "w") as file:
-        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": run.seed})
-        for name, (values, unit) in columns.items():
-            file[name] = values
-            file[name].attrs.update({"unit": unit, "description": name})
+    write_series(directory, columns, seed=run.seed)
     return directory

@@ -7,12 +7,12 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import h5py
 import meshio
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from series_file import write_series
 
 W, T1, T2, RADIUS = 0.0117, 0.00127, 0.0005, 0.0234
 PHASES = ("deposit", "relax", "shake", "relax")
@@ -219,22 +219,18 @@ def _write_scene(directory: Path, run: SyntheticRun) -> None:
 
 
 def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64]) -> None:
-    with h5py.File(directory / "series.h5", "w") as file:
-        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": run.seed})
-        columns = {
-            "time_s": (rows[:, 0], "s"),
-            "phase": (rows[:, 1].astype(np.int64), "-"),
-            "packing_fraction": (rows[:, 2], "-"),
-            "com_height_m": (rows[:, 3], "m"),
-        }
-        moved = [kind for kind in run.phases if kind in ACTUATED]
-        if moved:
-            angle = np.full((len(rows), 2), math.pi / 2)
-            columns |= {"commanded_angle_rad": (angle, "rad"), "angle_rad": (angle, "rad")}
-            columns |= {"tracking_error_rad": (np.full(len(rows), math.nan), "rad")}
-        if run.work is not None:
-            columns["motor_work_J" if moved else "container_work_J"] = (run.work * rows[:, 4], "J")
-        columns |= {name: (np.full(len(rows), value), unit) for name, value, unit in run.more}
-        for name, (values, unit) in columns.items():
-            file[name] = values
-            file[name].attrs.update({"unit": unit, "description": name})
+    columns = {
+        "time_s": (rows[:, 0], "s"),
+        "phase": (rows[:, 1].astype(np.int64), "-"),
+        "packing_fraction": (rows[:, 2], "-"),
+        "com_height_m": (rows[:, 3], "m"),
+    }
+    moved = [kind for kind in run.phases if kind in ACTUATED]
+    if moved:
+        angle = np.full((len(rows), 2), math.pi / 2)
+        columns |= {"commanded_angle_rad": (angle, "rad"), "angle_rad": (angle, "rad")}
+        columns |= {"tracking_error_rad": (np.full(len(rows), math.nan), "rad")}
+    if run.work is not None:
+        columns["motor_work_J" if moved else "container_work_J"] = (run.work * rows[:, 4], "J")
+    columns |= {name: (np.full(len(rows), value), unit) for name, value, unit in run.more}
+    write_series(directory, columns, seed=run.seed)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from series_file import write_series
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
@@ -44,20 +44,16 @@ def write_pull(directory: Path, *, variant: str, count: int, ratio: float, seed:
     forces = np.where(strains <= 0.4, stiffness * strains, 0.0)
     along = np.stack([forces, 0 * forces, 0 * forces], axis=1)
     columns = {
-        "time_s": strains * 10,
-        "phase": np.zeros(len(strains), dtype=np.int64),
-        "string_pulled_force_N": along,
-        "string_fixed_force_N": -along,
-        "channel_lower_force_N": 0 * along,
-        "channel_upper_force_N": 0 * along,
-        "chain_length_m": 0.2 * (1 + strains),
-        "chain_width_m": np.full(len(strains), WIDTH),
+        "time_s": (strains * 10, "s"),
+        "phase": (np.zeros(len(strains), dtype=np.int64), "1"),
+        "string_pulled_force_N": (along, "N"),
+        "string_fixed_force_N": (-along, "N"),
+        "channel_lower_force_N": (0 * along, "N"),
+        "channel_upper_force_N": (0 * along, "N"),
+        "chain_length_m": (0.2 * (1 + strains), "m"),
+        "chain_width_m": (np.full(len(strains), WIDTH), "m"),
     }
-    with h5py.File(directory / "series.h5", "w") as file:
-        file.attrs.update({"format": 1, "scene_sha256": "0" * 64, "seed": seed})
-        for name, values in columns.items():
-            file[name] = values
-            file[name].attrs.update({"unit": "-", "description": name})
+    write_series(directory, columns, seed=seed)
     return directory
 
 

@@ -16,7 +16,7 @@ from postprocess.bisection import least_reaching
 from postprocess.findings import CRITERION, without_criterion
 from postprocess.manifest import RunManifest, read_run
 from postprocess.markdown import meaning_lines, table_lines
-from postprocess.pairs import compared, mean_difference, pairs
+from postprocess.pairs import compared, mean_difference, pairs, told_less
 from postprocess.points import averaged, marked, ordered, seeds_of, told_means, told_number
 from postprocess.seeds import mean_over_seeds
 from postprocess.study_runs import ASPECT, SEED, SEEDS, refuse_mixed_counts, refuse_mixture
@@ -96,7 +96,7 @@ def test_one_must_be_clearly_beyond_each_of_the_others() -> None:
         "found",
     )
     assert compared({"a": far}, -1)[1] == "not found"
-    ours, verdict = compared({"a": far, "b": near}, 1, between=", ")
+    ours, (_, verdict) = told_less({"a": far, "b": near}, ", "), compared({"a": far, "b": near}, 1)
     assert (", less b" in ours, verdict) == (True, "not resolved")
 
 
