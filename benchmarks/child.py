@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from dem.scene import dump_scene, parse_scene
+from dem.scene.scene import dump_scene, parse_scene
 
 
 def run_child(folder: Path, name: str, data: dict[str, Any], *, threads: int = 1) -> resource.struct_rusage:
@@ -27,7 +27,7 @@ def run_child(folder: Path, name: str, data: dict[str, Any], *, threads: int = 1
     """
     path = folder / f"{name}.yaml"
     path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")
-    command = [sys.executable, "-m", "cli", "run", str(path), "--out", str(folder / name)]
+    command = [sys.executable, "-m", "smarticles", "run", str(path), "--out", str(folder / name)]
     command += ["--threads", str(threads)]
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(child.pid, 0)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.child import last_phase_cost, run_child
-from postprocess.measure import summarise_run
+from postprocess.measures.table import summarise_run
 
 
 def threads_cost(folder: Path, *, count: int, fidelity: str, threads: int, seed: int) -> dict[str, float]:

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from dem.engine import Engine
-from dem.placement import place_layer
-from dem.run import build_engine
-from dem.scene import Scene, parse_scene
-from dem.timestep import time_step
+from dem.body.placement import place_layer
+from dem.engine.yade.engine import Engine
+from dem.physics.stability import time_step
+from dem.run.run import build_engine
+from dem.scene.scene import Scene, parse_scene
 
 REPEATS = 50
 STEPS = 2000

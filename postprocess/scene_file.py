@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from postprocess.errors import refuse
-from postprocess.region import Cylinder
+from postprocess.measures.region import Cylinder
 
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 

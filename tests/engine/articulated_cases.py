@@ -14,13 +14,13 @@ import cases
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.container import Cylinder
-from dem.engine import Engine
-from dem.placement import place_layer
-from dem.run import motor_law
-from dem.scene import Scene
-from dem.timestep import contact_law, hinge_law, time_step
-from verification.bench import bodies, drive
+from dem.body.placement import place_layer
+from dem.engine.yade.engine import Engine
+from dem.physics.stability import contact_law, hinge_law, time_step
+from dem.run.run import motor_law
+from dem.scene.scene import Scene
+from dem.setting.container import Cylinder
+from smarticles.verification.bench import bodies, drive
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 

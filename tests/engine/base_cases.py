@@ -10,12 +10,12 @@ import numpy as np
 from cases import add, advance_watched, build, load, pour
 from fixture_cases import damped
 
-from dem.engine import Engine
+from dem.engine.yade.engine import Engine
 from dem.errors import RunError
-from dem.phases import begin, shake_amplitude
-from dem.scene import Scene
-from dem.series import SeriesWriter
-from dem.timestep import time_step
+from dem.phases.stages import begin, shake_amplitude
+from dem.physics.stability import time_step
+from dem.record.series import SeriesWriter
+from dem.scene.scene import Scene
 
 
 def last_shake(scene: Scene) -> tuple[float, float]:

@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.container import Cylinder
-from dem.engine import Engine
+from dem.body.placement import Poses, place_layer
+from dem.engine.yade.engine import Engine
+from dem.engine.yade.library import yade_version
 from dem.errors import InputError, RunError
-from dem.library import yade_version
-from dem.parts import shake_amplitude
-from dem.placement import Poses, place_layer
-from dem.run import run_scene
-from dem.scene import Scene
-from dem.series import SeriesWriter
-from dem.timestep import ContactLaw, contact_law, stable_time_step, time_step
-from stability.hand import load
-from verification.bench import add, advance_watched, body_rotations, push
-from verification.floor import resting
+from dem.physics.stability import ContactLaw, contact_law, stable_time_step, time_step
+from dem.record.series import SeriesWriter
+from dem.run.run import run_scene
+from dem.scene.scene import Scene
+from dem.setting.container import Cylinder
+from dem.setting.parts import shake_amplitude
+from smarticles.verification.bench import add, advance_watched, body_rotations, push
+from smarticles.verification.hard.hand import load
+from smarticles.verification.known.floor import resting
 
 
 def build(

@@ -10,13 +10,13 @@ import numpy as np
 from cases import add, load
 from scipy.spatial.transform import Rotation
 
-from dem import run
-from dem.chain import Tie, chain_of
-from dem.engine import Engine
-from dem.phases import begin
-from dem.scene import Scene
-from dem.strings import StringLaw
-from dem.timestep import time_step
+from dem.engine.yade.engine import Engine
+from dem.phases.chain import Tie, chain_of
+from dem.phases.stages import begin
+from dem.physics.stability import time_step
+from dem.physics.strings import StringLaw
+from dem.run import run
+from dem.scene.scene import Scene
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 

@@ -14,12 +14,12 @@ import h5py
 import meshio
 import numpy as np
 
-from dem.effects import Adds, decide
-from dem.engine import Engine
-from dem.plan import plan
-from dem.recorder import Recorder
-from dem.run import build_engine
-from dem.timestep import time_step
+from dem.engine.yade.engine import Engine
+from dem.physics.stability import time_step
+from dem.plan.effects import Adds, decide
+from dem.plan.outlook import plan
+from dem.run.recorder import Recorder
+from dem.run.run import build_engine
 
 # What every run directory holds, whatever the scene calls for.
 OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}

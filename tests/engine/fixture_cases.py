@@ -10,15 +10,15 @@ import numpy as np
 from cases import load, pour
 from scipy.spatial.transform import Rotation
 
-from dem.engine import Engine
+from dem.engine.yade.engine import Engine
 from dem.errors import RunError
-from dem.phases import begin
-from dem.progress import Progress
-from dem.run import build_recorder
-from dem.scene import Scene
-from dem.series import SeriesWriter
-from dem.timestep import contact_law, time_step
-from verification.bench import FLAT, add, advance_watched
+from dem.phases.stages import begin
+from dem.physics.stability import contact_law, time_step
+from dem.record.progress import Progress
+from dem.record.series import SeriesWriter
+from dem.run.run import build_recorder
+from dem.scene.scene import Scene
+from smarticles.verification.bench import FLAT, add, advance_watched
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 

@@ -18,9 +18,9 @@ from articulated_cases import (
 )
 from scipy.spatial.transform import Rotation
 
-from dem.timestep import contact_law, hinge_law, hinged_stable_time_step
-from verification.bench import Targets, bodies, drive, hold
-from verification.hinge import upright
+from dem.physics.stability import contact_law, hinge_law, hinged_stable_time_step
+from smarticles.verification.bench import Targets, bodies, drive, hold
+from smarticles.verification.known.hinge import upright
 
 
 def gait(

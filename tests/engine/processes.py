@@ -12,7 +12,7 @@ TIMEOUT_S = 120.0  # for one process; it needs 3 s on a free core
 
 
 def start(scene: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "cli", "run", str(scene), "--out", str(out)]
+    command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(out)]
     if (out / "run.json").exists():
         command.append("--resume")
     # A batch system may say so; a run has one thread all the same, and the same bits.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli import doctor
+from smarticles import doctor
 
 pytestmark = pytest.mark.engine
 

@@ -1,7 +1,7 @@
 """Effects on demand: a scene is made of what it calls for and of nothing else, and no strength has no consequence.
 
 What exists is read from YADE's own lists, from the files of the run and from Python's profiler, and is compared with
-what `dem.effects` declares; so an effect that builds more than it says, or says more than it builds, is found.
+what `dem.plan.effects` declares; so an effect that builds more than it says, or says more than it builds, is found.
 """
 
 from __future__ import annotations

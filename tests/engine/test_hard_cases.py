@@ -1,4 +1,4 @@
-"""Hard cases end right, or in an error that says why; never in nonsense. The cases are in `stability.cases`."""
+"""Hard cases end right, or in an error that says why; never in nonsense. The cases are in `smarticles.verification.hard.cases`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stability.cases import CASES, checked
+from smarticles.verification.hard.cases import CASES, checked
 
 pytestmark = pytest.mark.engine
 

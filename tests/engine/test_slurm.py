@@ -67,7 +67,7 @@ def slurm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SlurmHere]:
 @pytest.fixture
 def smarticles(slurm: SlurmHere) -> Callable[..., str]:
     def call(*words: str | Path) -> str:
-        return slurm.call(sys.executable, "-m", "cli", *map(str, words))
+        return slurm.call(sys.executable, "-m", "smarticles", *map(str, words))
 
     return call
 
@@ -168,7 +168,15 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
     (tmp_path / "here.toml").write_text(
         CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent")
     )
-    command = [sys.executable, "-m", "cli", "sweep", str(tmp_path / "sweep.yaml"), "--out", str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        "-m",
+        "smarticles",
+        "sweep",
+        str(tmp_path / "sweep.yaml"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
     command += ["--submit", "slurm", "--cluster", str(tmp_path / "here.toml")]
     done = subprocess.run(command, env=slurm.environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1

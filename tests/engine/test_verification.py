@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from postprocess.convergence import observed_order
-from postprocess.verification import BAND
-from verification import floor, hinge, impact
-from verification.answer import Case, Check, Ladder
-from verification.catalogue import CASES, LADDERS
+from postprocess.statistics.convergence import observed_order
+from smarticles.verification.answer import Case, Check, Ladder
+from smarticles.verification.catalogue import CASES, LADDERS
+from smarticles.verification.known import floor, hinge, impact
+from smarticles.verification.report import BAND
 
 pytestmark = pytest.mark.engine
 

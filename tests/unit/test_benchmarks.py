@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from benchmarks import effects, twins
-from dem.effects import EFFECTS, decide
-from dem.scene import parse_scene
-from dem.timestep import time_step
+from dem.physics.stability import time_step
+from dem.plan.effects import EFFECTS, decide
+from dem.scene.scene import parse_scene
 
 PAIRS = effects.pairs(0.4, 2e-5)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.timestep import damping_ratio, restitution_of
-from verification.answer import Check
-from verification.bench import BALL_MASS, BALL_RADIUS, ball
-from verification.catalogue import CASES, LADDERS
-from verification.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
+from dem.physics.stability import damping_ratio, restitution_of
+from smarticles.verification.answer import Check
+from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball
+from smarticles.verification.catalogue import CASES, LADDERS
+from smarticles.verification.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
 
 def test_names_are_unique() -> None:

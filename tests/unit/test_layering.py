@@ -82,7 +82,7 @@ def test_postprocess_knows_neither_yade_nor_the_simulator() -> None:
     for path in of("postprocess"):
         found = names(path)
         assert not among(found, "yade", "templates", "cli", "verification"), path
-        assert not among(found, "dem") - among(found, "dem.errors", "dem.files"), path
+        assert not among(found, "dem") - among(found, "dem.errors", "dem.record.files"), path
 
 
 def test_verification_knows_the_simulator_and_draws_nothing() -> None:
@@ -94,7 +94,7 @@ def test_verification_knows_the_simulator_and_draws_nothing() -> None:
 def test_stability_knows_the_simulator_and_its_bench() -> None:
     for path in of("stability"):
         # Its figure is drawn from a table, in a process of its own.
-        allowed = {"postprocess.figures"} if path.name == "figure.py" else set()
+        allowed = {"postprocess.report.figures"} if path.name == "figure.py" else set()
         assert not among(names(path), "yade", "pyvista", "vtk", "postprocess", "templates", "cli") - allowed, path
 
 
@@ -102,15 +102,17 @@ def test_templates_know_only_the_scene() -> None:
     for path in of("templates"):
         found = names(path)
         assert not among(found, "yade", "pyvista", "vtk", "postprocess", "cli"), path
-        allowed = among(found, "dem.scene", "dem.parts", "dem.errors", "dem.files", "dem.yaml_text")
+        allowed = among(
+            found, "dem.scene.scene", "dem.setting.parts", "dem.errors", "dem.record.files", "dem.scene.yaml_text"
+        )
         assert not among(found, "dem") - allowed, path
 
 
 def test_command_line_loads_nothing_heavy_at_import() -> None:
     for path in of("cli"):
         found = names(path, only_at_import=True)
-        assert not among(found, "yade", "pyvista", "vtk", "dem.engine", "dem.run"), path
-        assert not among(found, "postprocess.render", "postprocess.stage"), path
+        assert not among(found, "yade", "pyvista", "vtk", "dem.engine.yade.engine", "dem.run.run"), path
+        assert not among(found, "postprocess.pictures.render", "postprocess.pictures.stage"), path
 
 
 MODULES = [

@@ -7,7 +7,7 @@ import math
 import pandas as pd
 import pytest
 
-from stability.onset import SETTINGS, onsets
+from smarticles.verification.hard.onset import SETTINGS, onsets
 
 STACK = "welded stack, l/w = 0.7, draft"
 PILE = "welded pile, l/w = 0.7, draft"

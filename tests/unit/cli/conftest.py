@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_cases import SCENE, SWEEP, Said, Smarticles, WriteRun
 
-from cli.main import main
+from smarticles.main import main
 
 SYNTHETIC = Path(__file__).parents[1] / "postprocess" / "synthetic.py"
 

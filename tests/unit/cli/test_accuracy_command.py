@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles, WriteRun
 
-from templates.folder import open_folder
+from templates.sweep.folder import open_folder
 
 SCENE = """\
 schema_version: 1
@@ -102,7 +102,7 @@ def test_a_ladder_is_an_ordinary_sweep(base: Path, tmp_path: Path, smarticles: S
 def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
     base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
     out = tmp_path / "ladder"
     written(base, out, smarticles)
     finish(out, write_run)
@@ -131,8 +131,8 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
 def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
     base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
-    monkeypatch.setattr("postprocess.accuracy_figure.draw", lambda *_, **__: [])
+    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
+    monkeypatch.setattr("studies.accuracy.figure.draw", lambda *_, **__: [])
     out = tmp_path / "ladder"
     written(base, out, smarticles, "--seeds", "1,2")
     finish(out, write_run)
@@ -197,7 +197,7 @@ def test_limits_of_a_plan_that_make_no_sense_are_status_2(
 def test_without_a_table_the_planner_says_how_to_make_one(
     base: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dem.choice.SHIPPED", tmp_path / "none.csv")
+    monkeypatch.setattr("dem.plan.choice.SHIPPED", tmp_path / "none.csv")
     said = smarticles("plan", base, "--max-hours", "4")
     assert said.status == 2
     assert "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv" in said.err

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli import doctor
+from smarticles import doctor
 
 YADE = {"version": "2023.02a", "path": "/somewhere/yade", "speed": 0.0981}
 PYVISTA = {"version": "0.49", "vtk": "9.7.2", "window": "vtkEGLRenderWindow", "contrast": 50.0}

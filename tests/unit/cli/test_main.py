@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
-from cli.main import build_parser, guarded
-from cli.stopping import orderly_stop
 from dem.errors import InputError, RunError
+from smarticles.main import build_parser, guarded
+from smarticles.stopping import orderly_stop
 
 COMMANDS = {
     "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
@@ -180,7 +180,7 @@ def test_ignored_signals_stay_ignored_here_but_not_in_children() -> None:
 
 
 def command(*words: str) -> list[str]:
-    return [sys.executable, "-m", "cli", *words]
+    return [sys.executable, "-m", "smarticles", *words]
 
 
 def test_a_closed_pipe_is_no_error() -> None:
@@ -195,7 +195,7 @@ def test_a_closed_pipe_is_no_error() -> None:
 
 def test_nothing_heavy_is_imported_to_show_help() -> None:
     script = (
-        "import sys; from cli.main import main; main(['--help']); "
+        "import sys; from smarticles.main import main; main(['--help']); "
         "print([name for name in ('yade', 'pyvista', 'pandas', 'numpy', 'pydantic', 'rich') "
         "if name in sys.modules], file=sys.stderr)"
     )

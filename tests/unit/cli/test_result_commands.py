@@ -9,9 +9,9 @@ from pathlib import Path
 from command_cases import Smarticles, WriteRun
 from PIL import Image
 
-from cli.layout import Cell, columns
-from postprocess.camera import VIEWS
-from postprocess.colouring import COLOURINGS
+from postprocess.pictures.camera import VIEWS
+from postprocess.pictures.colouring import COLOURINGS
+from smarticles.layout import Cell, columns
 
 
 def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:

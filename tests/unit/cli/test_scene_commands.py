@@ -69,6 +69,6 @@ def test_threads_are_those_asked_for_whatever_the_batch_system_says(
     def run_scene(*_: object, **__: object) -> None:
         seen.append(os.environ["OMP_NUM_THREADS"])
 
-    monkeypatch.setattr("dem.run.run_scene", run_scene)
+    monkeypatch.setattr("dem.run.run.run_scene", run_scene)
     assert smarticles("run", scene_file, "--out", scene_file.parent / "out", *options).status == 0
     assert seen == [threads]

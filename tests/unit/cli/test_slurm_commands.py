@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from command_cases import SWEEP, Smarticles
 
-from templates import folder as folder_module
-from templates import slurm
+from templates.slurm import slurm
+from templates.sweep import folder as folder_module
 
 LARGE = ("--cluster", "example-large")
 

@@ -9,11 +9,11 @@ import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
 
 from dem.errors import InputError
-from dem.rundir import claimed
-from templates.expand import expand
-from templates.folder import create_folder, open_folder
-from templates.study import study_file
-from templates.sweep import load_sweep, with_constants
+from dem.record.rundir import claimed
+from studies.shipped import study_file
+from templates.sweep.expand import expand
+from templates.sweep.folder import create_folder, open_folder
+from templates.sweep.sweep import load_sweep, with_constants
 
 
 def finish(directory: Path) -> None:
@@ -276,8 +276,8 @@ def test_the_study_of_procedures_is_analysed(
         manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
         manifest["scene_sha256"] = point.scene_sha256
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
-    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
-    monkeypatch.setattr("postprocess.procedures_figures.draw", lambda *_, **__: [])
+    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
+    monkeypatch.setattr("studies.procedures.figures.draw", lambda *_, **__: [])
     said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()
@@ -329,7 +329,7 @@ def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
     def file_of(name: str, *, quick: bool = False) -> Path:
         return sweep_file
 
-    monkeypatch.setattr("templates.study.study_file", file_of)
+    monkeypatch.setattr("studies.shipped.study_file", file_of)
     sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
     out = sweep_file.parent / "out"
     said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)
@@ -362,7 +362,7 @@ def test_a_study_of_sensitivity_is_analysed(
         manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
         manifest["scene_sha256"] = point.scene_sha256
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
-    monkeypatch.setattr("cli.commands_study._draw", lambda *_: None)
+    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
     said = smarticles("study", study, "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from command_cases import Smarticles
 
-from cli import commands_verify
+from smarticles.commands import verify as commands_verify
 
 
 class Child:
@@ -59,7 +59,7 @@ def test_answers_that_are_met(child: Any, smarticles: Smarticles, tmp_path: Path
     one = child()
     said = smarticles("verify", "--out", tmp_path / "new")
     assert said.status == 0, said.err
-    assert one.command[1:3] == ["-m", "verification"]
+    assert one.command[1:3] == ["-m", "smarticles.verification"]
     header = said.out.strip().splitlines()[0].split()
     assert header == ["case", "quantity", "unit", "theory", "measured", "error", "tolerance", "ok"]
     assert "20 contacts" in said.out

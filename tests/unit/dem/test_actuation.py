@@ -14,10 +14,10 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from dem.actuation import Actuate, Drive, InternalOscillation, ShapeChange, actuated, drive
-from dem.motion import Triangle
-from dem.parts import FIDELITIES, Motor
-from dem.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.phases.actuation import Actuate, Drive, InternalOscillation, ShapeChange, actuated, drive
+from dem.scene.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.setting.motion import Triangle
+from dem.setting.parts import FIDELITIES, Motor
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

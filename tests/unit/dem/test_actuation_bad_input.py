@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-import dem.scene
-from dem.actuation_checks import actuation_warnings, overshoot
+import dem.scene.scene
 from dem.errors import InputError
-from dem.plan import plan
-from dem.scene import Scene, parse_scene
+from dem.phases.actuation_checks import actuation_warnings, overshoot
+from dem.plan.outlook import plan
+from dem.scene.scene import Scene, parse_scene
 
 SceneData = Callable[..., dict[str, Any]]
 
@@ -364,8 +364,8 @@ def test_scene_without_actuated_phases_is_not_asked(scene_data: SceneData, monke
     checked(scene_data, relax, **bare)
     refused(scene_data, SHAPE_CHANGE, **bare)
     # Not even a particle is made for it.
-    monkeypatch.setattr(dem.scene.Scene, "particle", property(lambda self: 1 / 0))
-    monkeypatch.setattr(dem.scene.Scene, "_check_container", lambda self: None)
+    monkeypatch.setattr(dem.scene.scene.Scene, "particle", property(lambda self: 1 / 0))
+    monkeypatch.setattr(dem.scene.scene.Scene, "_check_container", lambda self: None)
     checked(scene_data, relax)
     with pytest.raises(ZeroDivisionError):
         checked(scene_data, SHAPE_CHANGE)

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from dem.advice import warnings_of
-from dem.durations import run_duration
-from dem.plan import plan
-from dem.scene import Scene
+from dem.plan.advice import warnings_of
+from dem.plan.durations import run_duration
+from dem.plan.outlook import plan
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 DEPOSIT, RELAX, PULL = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}, {"type": "pull-hook"}

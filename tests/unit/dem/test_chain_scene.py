@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import yaml
 
-from dem.actuation_checks import overshoot
-from dem.chain import chain_of, parted
+from dem.body.state import State
 from dem.errors import InputError
-from dem.motor import MotorLaw, Motors
-from dem.plan import plan
-from dem.scene import Scene, dump_scene, parse_scene
-from dem.state import State
-from dem.strings import StringLaw
-from dem.timestep import stable_step, time_step
+from dem.phases.actuation_checks import overshoot
+from dem.phases.chain import chain_of, parted
+from dem.physics.motor import MotorLaw, Motors
+from dem.physics.stability import stable_step, time_step
+from dem.physics.strings import StringLaw
+from dem.plan.outlook import plan
+from dem.scene.scene import Scene, dump_scene, parse_scene
 
 
 def chain(**changes: Any) -> Scene:

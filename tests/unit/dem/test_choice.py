@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dem import choice
-from dem.choice import Error, Expectation, Measured, choose, pick, read_table
 from dem.errors import InputError
-from dem.plan import plan
-from dem.scene import Scene, parse_scene
+from dem.plan import choice
+from dem.plan.choice import Error, Expectation, Measured, choose, pick, read_table
+from dem.plan.outlook import plan
+from dem.scene.scene import Scene, parse_scene
 
 HEADER = (
     "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.frames import FrameWriter, frame_mesh, sphere_mesh
-from dem.motor import MotorLaw, Motors
-from dem.particle import Boxes, Particle, SphereChain
-from dem.state import State
+from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.state import State
+from dem.physics.motor import MotorLaw, Motors
+from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
 
 W, RATIO = 0.0117, 0.7
 BOXES = Boxes(middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
-from dem.particle import Boxes
-from dem.series import SeriesWriter, packing_fraction
-from dem.state import State
+from dem.body.particle import Boxes
+from dem.body.state import State
+from dem.record.series import SeriesWriter, packing_fraction
 
 RADIUS, G = 0.0234, 9.81
 BOXES = Boxes(

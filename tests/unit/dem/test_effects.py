@@ -8,7 +8,10 @@ from typing import Any
 
 import pytest
 
-from dem.columns import (
+from dem.engine.yade.construction import ORDER
+from dem.plan.effects import EFFECTS, Adds, decide
+from dem.plan.outlook import plan
+from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
     HOOK_COLUMNS,
@@ -17,10 +20,7 @@ from dem.columns import (
     RELEASE_COLUMNS,
     STRAIN_COLUMNS,
 )
-from dem.construction import ORDER
-from dem.effects import EFFECTS, Adds, decide
-from dem.plan import plan
-from dem.scene import Scene
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 DEPOSIT = {"type": "deposit"}

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from dem.errors import RunError
-from dem.files import write_json, write_text, write_whole
-from dem.frames import FrameWriter
+from dem.record.files import write_json, write_text, write_whole
+from dem.record.frames import FrameWriter
 
 ROOT = Path(__file__).resolve().parents[3]
 FULL = (
@@ -116,7 +116,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from dem.errors import RunError
-from dem.series import SeriesWriter
+from dem.record.series import SeriesWriter
 
 def write(length):
     writer = SeriesWriter(Path(sys.argv[1]), 0.0234, {"seed": 1})

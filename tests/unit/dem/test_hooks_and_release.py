@@ -12,16 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dem.container import Cylinder
+from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.placement import place_layer
+from dem.body.state import State
 from dem.errors import InputError, RunError
-from dem.hooks import Cross, PullHook
-from dem.particle import Boxes, Particle, SphereChain
-from dem.placement import place_layer
-from dem.plan import plan
-from dem.release import RemoveContainer
-from dem.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
-from dem.state import State
-from dem.watchdog import Watchdog
+from dem.phases.release import RemoveContainer
+from dem.plan.outlook import plan
+from dem.run.watchdog import Watchdog
+from dem.scene.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.setting.container import Cylinder
+from dem.setting.hooks import Cross, PullHook
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from dem.motion import Motion
+from dem.setting.motion import Motion
 
 ADAPTER: TypeAdapter[Motion] = TypeAdapter(Motion)
 

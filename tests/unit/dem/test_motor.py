@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dem.motor import MotorLaw, Motors
+from dem.physics.motor import MotorLaw, Motors
 
 HALT = MotorLaw(torque_limit=1.6e-5, speed_limit=6.0, stiffness=3e-3, law="halt")
 SLIP = replace(HALT, law="slip")

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
+from dem.body.particle import Boxes, Particle, SphereChain, chain_mean_width, mean_width
 from dem.errors import InputError
-from dem.particle import Boxes, Particle, SphereChain, chain_mean_width, mean_width
 
 W, T1, T2, RHO = 0.0117, 1.27e-3, 0.5e-3, 7850.0
 U = (90.0, 90.0)

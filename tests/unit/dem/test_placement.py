@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
-from dem.container import Cylinder
+from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.placement import Poses, place_layer
 from dem.errors import RunError
-from dem.particle import Boxes, Particle, SphereChain
-from dem.placement import Poses, place_layer
+from dem.setting.container import Cylinder
 
 RADIUS, BOTTOM, HEIGHT = 0.0234, 0.01, 0.0117
 NOTHING = np.empty((0, 3))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dem import progress as module
-from dem.progress import Progress
+from dem.record import progress as module
+from dem.record.progress import Progress
 
 
 class Wall:

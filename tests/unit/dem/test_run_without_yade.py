@@ -9,11 +9,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from dem.engine import Engine
+from dem.engine.yade.engine import Engine
+from dem.engine.yade.library import import_yade
 from dem.errors import RunError
-from dem.library import import_yade
-from dem.run import run_scene
-from dem.scene import Scene
+from dem.run.run import run_scene
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 

@@ -12,8 +12,8 @@ import pytest
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from dem.scene import Scene, derive_seed, dump_scene, json_schema, load_scene, parse_scene, scene_hash
-from dem.timestep import time_step
+from dem.physics.stability import time_step
+from dem.scene.scene import Scene, derive_seed, dump_scene, json_schema, load_scene, parse_scene, scene_hash
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dem.errors import InputError
-from dem.scene import Scene, load_scene, parse_scene
+from dem.scene.scene import Scene, load_scene, parse_scene
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

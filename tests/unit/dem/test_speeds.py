@@ -10,8 +10,8 @@ import pytest
 from test_chain_scene import chain
 
 from dem.errors import InputError
-from dem.scene import Scene
-from dem.timestep import MOST_PER_STEP, time_step, time_steps
+from dem.physics.stability import MOST_PER_STEP, time_step, time_steps
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 DEPOSIT = {"type": "deposit"}

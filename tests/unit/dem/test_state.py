@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from dem.particle import Boxes, Particle, SphereChain
-from dem.state import State
+from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.state import State
 
 ANGLE = st.floats(-15, 105)
 SEED = st.integers(0, 2**32 - 1)

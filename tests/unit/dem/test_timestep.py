@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from dem.errors import InputError
-from dem.scene import Scene
-from dem.timestep import (
+from dem.physics.stability import (
     CONTACTS_AT_A_TIP,
     contact_law,
     damping_ratio,
@@ -24,6 +23,7 @@ from dem.timestep import (
     time_steps,
     typical_effective_mass,
 )
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 

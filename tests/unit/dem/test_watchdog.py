@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dem.container import Cylinder
+from dem.body.particle import Boxes
+from dem.body.state import State
+from dem.engine.yade.strain import Held, Strain
 from dem.errors import RunError
-from dem.particle import Boxes
-from dem.state import State
-from dem.strain import Held, Strain
-from dem.watchdog import Watchdog
+from dem.run.watchdog import Watchdog
+from dem.setting.container import Cylinder
 
 BOXES = Boxes(
     middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850

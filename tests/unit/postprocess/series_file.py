@@ -1,4 +1,4 @@
-"""The series of a synthetic run, as `dem.series` writes it."""
+"""The series of a synthetic run, as `dem.record.series` writes it."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -12,10 +12,10 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess import accuracy_figure
-from postprocess.accuracy import analyse_accuracy
-from postprocess.accuracy_advice import advise, told_closing
-from postprocess.accuracy_runs import (
+from postprocess.statistics.points import marked
+from studies.accuracy import figure as accuracy_figure
+from studies.accuracy.advice import advise, told_closing
+from studies.accuracy.runs import (
     ACTIVITY,
     COMPARED,
     COST,
@@ -29,8 +29,8 @@ from postprocess.accuracy_runs import (
     Rung,
     work_precision,
 )
-from postprocess.points import marked
-from postprocess.study_runs import ASPECT, DEFINITION, SEED, VARIANT
+from studies.accuracy.study import analyse_accuracy
+from studies.base.runs import ASPECT, DEFINITION, SEED, VARIANT
 
 PHI_F = f"phi_f {DEFINITION} [-]"
 STEPS = [

@@ -8,9 +8,10 @@ import pytest
 from released import stack, write_released
 
 from dem.errors import InputError
-from postprocess import casting_figures
-from postprocess.casting import analyse
-from postprocess.casting_runs import (
+from postprocess.manifest import read_run
+from postprocess.scene_file import read_tiers
+from studies.casting import figures as casting_figures
+from studies.casting.runs import (
     FILLED,
     FILLED_AFTER,
     HEIGHT,
@@ -23,9 +24,8 @@ from postprocess.casting_runs import (
     WHOLE_KEPT,
     casting_row,
 )
-from postprocess.manifest import read_run
-from postprocess.procedures_runs import PROCEDURE
-from postprocess.scene_file import read_tiers
+from studies.casting.study import analyse
+from studies.procedures.runs import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [

@@ -9,9 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from postprocess.chain_findings import findings, sensitivity
-from postprocess.chain_runs import CONFINEMENT, COUNT, SPEED, VARIANT
-from postprocess.strain import (
+from postprocess.measures.strain import (
     AT_PEAK,
     BEND,
     DROP,
@@ -28,7 +26,9 @@ from postprocess.strain import (
     first_drop,
     measured,
 )
-from postprocess.study_runs import SEED
+from studies.base.runs import SEED
+from studies.chain.findings import findings, sensitivity
+from studies.chain.runs import CONFINEMENT, COUNT, SPEED, VARIANT
 
 
 def pull(*, yields: bool, jolt: float = 0.0) -> Pull:

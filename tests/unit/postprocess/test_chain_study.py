@@ -15,14 +15,14 @@ from series_file import write_series
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
-from postprocess import chain_figures
-from postprocess.chain import analyse
-from postprocess.chain_runs import CONFINEMENT, COUNT, VARIANT
-from postprocess.findings import CRITERION
-from postprocess.origin import SAVOIE
-from postprocess.points import marked
-from postprocess.strain import FRACTURE, PEAK, STIFFNESS
-from postprocess.study_report import StudyReport
+from postprocess.measures.strain import FRACTURE, PEAK, STIFFNESS
+from postprocess.statistics.findings import CRITERION
+from postprocess.statistics.points import marked
+from studies.base.origin import SAVOIE
+from studies.base.report import StudyReport
+from studies.chain import figures as chain_figures
+from studies.chain.runs import CONFINEMENT, COUNT, VARIANT
+from studies.chain.study import analyse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}
 WIDTH = 0.0520  # m, of the chain, in channels that are wider by 1/0.52 or 1/0.65

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dem.errors import InputError
-from postprocess.clusters import contact_clusters, entanglement_clusters
 from postprocess.errors import UndefinedMeasureError
+from postprocess.measures.clusters import contact_clusters, entanglement_clusters
 
 D = 1e-3
 

@@ -10,10 +10,12 @@ from column_runs import H0, PHASES, Column, F, write_column
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess import collapse_figures
-from postprocess.collapse import analyse
-from postprocess.collapse_findings import findings
-from postprocess.collapse_law import (
+from postprocess.manifest import read_run
+from studies.base.runs import ASPECT, SEED, SEEDS
+from studies.collapse import figures as collapse_figures
+from studies.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
+from studies.collapse.findings import findings
+from studies.collapse.law import (
     ACTIVATION,
     AT_LEAST,
     CENSORED,
@@ -26,11 +28,9 @@ from postprocess.collapse_law import (
     levels,
     slope_through_origin,
 )
-from postprocess.collapse_reference import read_collapse_reference, reference_delta
-from postprocess.collapse_runs import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
-from postprocess.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
-from postprocess.manifest import read_run
-from postprocess.study_runs import ASPECT, SEED, SEEDS
+from studies.collapse.reference import read_collapse_reference, reference_delta
+from studies.collapse.runs import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
+from studies.collapse.study import analyse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}
 DELTAS = {0.13: 6.0, 0.40: 9.0, 1.02: 7.5}

@@ -4,7 +4,7 @@ from scipy.optimize import lsq_linear
 
 from dem.errors import InputError
 from postprocess import contact_pairs, neighbours_in_contact
-from postprocess.contacts import segment_distances
+from postprocess.measures.contacts import segment_distances
 
 
 def oracle_distance(p0, p1, q0, q1):

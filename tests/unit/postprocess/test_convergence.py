@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dem.errors import InputError
-from postprocess.convergence import observed_order
+from postprocess.statistics.convergence import observed_order
 
 STEPS = np.array([8e-6, 4e-6, 2e-6, 1e-6])
 

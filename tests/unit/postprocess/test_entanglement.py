@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import crossing_pairs, has_plane, link_crossings, linking_pairs
-from postprocess.entanglement import entanglement
+from postprocess.measures.entanglement import entanglement
 
 U = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
 

@@ -11,12 +11,14 @@ from hooked import HELD as GOES_ON
 from PIL import Image
 from synthetic import SyntheticRun, W
 
-from cli.studies import STUDIES, Analysis
 from dem.errors import InputError
-from postprocess import fracture_figures
-from postprocess.fracture import analyse
-from postprocess.fracture_findings import findings
-from postprocess.fracture_runs import (
+from postprocess.measures.pull import WINDOW
+from postprocess.statistics.points import marked
+from smarticles.commands.studies import STUDIES, Analysis
+from studies.base.runs import ASPECT, SEED, SEEDS
+from studies.fracture import figures as fracture_figures
+from studies.fracture.findings import findings
+from studies.fracture.runs import (
     ABOVE,
     ACCOUNT,
     BEFORE,
@@ -33,10 +35,8 @@ from postprocess.fracture_runs import (
     WINDOWS,
     WORK,
 )
-from postprocess.points import marked
-from postprocess.procedures_runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
-from postprocess.pull import WINDOW
-from postprocess.study_runs import ASPECT, SEED, SEEDS
+from studies.fracture.study import analyse
+from studies.procedures.runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out 'my study'"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}

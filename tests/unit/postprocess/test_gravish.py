@@ -10,16 +10,17 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess import gravish_answers, gravish_figures
-from postprocess.gravish import analyse_gravish
-from postprocess.gravish_answers import (
+from studies.base.runs import DEFINITION
+from studies.gravish import answers as gravish_answers
+from studies.gravish import figures as gravish_figures
+from studies.gravish.answers import (
     answers,
     deviations_from_reference,
     steps_between_ratios,
     summarise_runs,
 )
-from postprocess.gravish_reference import DIGITISING_ERROR, read_reference
-from postprocess.study_runs import DEFINITION
+from studies.gravish.reference import DIGITISING_ERROR, read_reference
+from studies.gravish.study import analyse_gravish
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
 CHEAP = (DEFINITION, "top-percentile")

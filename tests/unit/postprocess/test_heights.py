@@ -5,7 +5,7 @@ import pytest
 
 from dem.errors import InputError
 from postprocess import UndefinedMeasureError, centres_of_mass, material_height
-from postprocess.heights import heights
+from postprocess.measures.heights import heights
 
 
 def test_centre_of_mass_weighs_links_by_length(shape):

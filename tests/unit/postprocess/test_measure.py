@@ -18,7 +18,7 @@ from postprocess import (
     summarise_run,
     write_table,
 )
-from postprocess.packing import COSTLY_DEFINITIONS
+from postprocess.measures.packing import COSTLY_DEFINITIONS
 
 CHEAP = [name for name in postprocess.DEFINITIONS if name not in COSTLY_DEFINITIONS]
 PHI = "phi second-highest-com [-]"

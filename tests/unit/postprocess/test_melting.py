@@ -9,10 +9,11 @@ from released import stack, write_released
 from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess import melting_figures
 from postprocess.manifest import read_run
-from postprocess.melting import analyse
-from postprocess.melting_runs import (
+from postprocess.measures.spread import centre_of_mass
+from studies.base.runs import SEED
+from studies.melting import figures as melting_figures
+from studies.melting.runs import (
     BASE,
     CONTACT,
     HEIGHT,
@@ -24,9 +25,8 @@ from postprocess.melting_runs import (
     TOPPLED,
     measure_melting,
 )
-from postprocess.procedures_runs import PROCEDURE
-from postprocess.spread import centre_of_mass
-from postprocess.study_runs import SEED
+from studies.melting.study import analyse
+from studies.procedures.runs import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 AWAY = np.array([0.05, 0.0, 0.0])

@@ -7,9 +7,9 @@ import pytest
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
-from postprocess.mould import cast
-from postprocess.outline import outlines
-from postprocess.region import Cylinder
+from postprocess.measures.mould import cast
+from postprocess.measures.outline import outlines
+from postprocess.measures.region import Cylinder
 
 T = 1e-3
 BALL = 4e-3

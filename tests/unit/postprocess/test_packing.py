@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import DEFINITIONS, UndefinedMeasureError, packing_fraction
-from postprocess.region import Cylinder, inner_region
-from postprocess.voronoi import local_packing
-from postprocess.voxel import solid_fraction
+from postprocess.measures.region import Cylinder, inner_region
+from postprocess.measures.voronoi import local_packing
+from postprocess.measures.voxel import solid_fraction
 
 T1, T2 = 0.11, 0.05
 SOLID = T1 * T2 * 2.4

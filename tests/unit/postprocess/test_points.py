@@ -12,14 +12,14 @@ import pytest
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
-from postprocess.bisection import least_reaching
-from postprocess.findings import CRITERION, without_criterion
 from postprocess.manifest import RunManifest, read_run
-from postprocess.markdown import meaning_lines, table_lines
-from postprocess.pairs import compared, mean_difference, pairs, told_less
-from postprocess.points import averaged, marked, ordered, seeds_of, told_means, told_number
-from postprocess.seeds import mean_over_seeds
-from postprocess.study_runs import ASPECT, SEED, SEEDS, refuse_mixed_counts, refuse_mixture
+from postprocess.report.markdown import meaning_lines, table_lines
+from postprocess.statistics.bisection import least_reaching
+from postprocess.statistics.findings import CRITERION, without_criterion
+from postprocess.statistics.pairs import compared, mean_difference, pairs, told_less
+from postprocess.statistics.points import averaged, marked, ordered, seeds_of, told_means, told_number
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.base.runs import ASPECT, SEED, SEEDS, refuse_mixed_counts, refuse_mixture
 
 FORCE = "force [N]"
 

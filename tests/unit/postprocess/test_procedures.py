@@ -12,10 +12,10 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess import procedures_figures
-from postprocess.points import marked
-from postprocess.procedures import analyse_procedures, told_points
-from postprocess.procedures_runs import (
+from postprocess.statistics.points import marked
+from studies.base.runs import ASPECT, SEED, SEEDS
+from studies.procedures import figures as procedures_figures
+from studies.procedures.runs import (
     CROSSINGS,
     ENERGY,
     HALF,
@@ -27,7 +27,7 @@ from postprocess.procedures_runs import (
     THETA,
     half_compaction,
 )
-from postprocess.study_runs import ASPECT, SEED, SEEDS
+from studies.procedures.study import analyse_procedures, told_points
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study procedures --out 'my study'"}
 ACTIVITY = {"external": "shake", "shape-change": "shape-change", "internal": "internal-oscillation"}

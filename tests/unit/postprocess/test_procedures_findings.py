@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from postprocess.findings import findings_table
-from postprocess.procedures_findings import findings
-from postprocess.procedures_runs import (
+from postprocess.statistics.findings import findings_table
+from studies.base.runs import ASPECT, SEED
+from studies.procedures.findings import findings
+from studies.procedures.runs import (
     CROSSINGS,
     ENERGY,
     EXTERNAL,
@@ -24,7 +25,6 @@ from postprocess.procedures_runs import (
     STRAIGHT,
     THETA,
 )
-from postprocess.study_runs import ASPECT, SEED
 
 ASPECTS = (0.4, 0.55, 0.7, 0.85, 1.0)
 AMPLITUDES = {0.4: (5, 10, 15), 0.5: (5, 10, 15, 20), 0.7: (5, 10, 15, 20, 30), 1.0: (5, 10, 15, 20, 30)}

@@ -8,11 +8,9 @@ import pytest
 from hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 from synthetic import SyntheticRun, write_run
 
-from cli.main import main
 from dem.errors import InputError
 from postprocess.manifest import read_run
-from postprocess.measure import summarise_run
-from postprocess.pull import (
+from postprocess.measures.pull import (
     END,
     FREE,
     WINDOW,
@@ -24,7 +22,9 @@ from postprocess.pull import (
     read_pull,
     weight_of_one,
 )
+from postprocess.measures.table import summarise_run
 from postprocess.series import read_series
+from smarticles.main import main
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
 DURATION, DISTANCE = 2.0, 2.0 * SPEED

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress, ttest_ind
 
-from postprocess.seeds import Difference, Scatter, difference, mean_over_seeds, pooled_scatter, slope_within
+from postprocess.statistics.seeds import Difference, Scatter, difference, mean_over_seeds, pooled_scatter, slope_within
 
 
 def test_half_width_is_student_t():

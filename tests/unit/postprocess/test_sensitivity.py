@@ -12,9 +12,9 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess import sensitivity_figure
-from postprocess.sensitivity import analyse_sensitivity
-from postprocess.study_runs import DEFINITION
+from studies.base.runs import DEFINITION
+from studies.sensitivity import figure as sensitivity_figure
+from studies.sensitivity.study import analyse_sensitivity
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study sensitivity --out 'my study'"}

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
-from postprocess.spread import (
+from postprocess.measures.spread import (
     OUTSIDE,
     centre_of_mass,
     free_pile,

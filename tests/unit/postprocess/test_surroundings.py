@@ -10,11 +10,11 @@ from PIL import Image
 from synthetic import RADIUS, SyntheticRun, W, write_run
 
 from dem.errors import InputError
-from postprocess.camera import MILLIMETRE, Look, extent, wall_corners
 from postprocess.frames import read_frames
 from postprocess.manifest import read_run
-from postprocess.render import render_run
-from postprocess.surroundings import Lift, Surroundings, read_surroundings
+from postprocess.pictures.camera import MILLIMETRE, Look, extent, wall_corners
+from postprocess.pictures.render import render_run
+from postprocess.pictures.surroundings import Lift, Surroundings, read_surroundings
 
 TIERS = ((RADIUS, 0.006), (0.018, 0.014), (0.0125, 0.074))  # radius and top
 

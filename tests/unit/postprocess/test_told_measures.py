@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from strained import LENGTH, SPEED, write_strained_run
 from synthetic import SyntheticRun, write_run
 
-from cli.main import main
 from postprocess import measure_run, summarise_run
-from postprocess.strain import AT_PEAK, FRACTURE, PEAK, WIDENING, YIELD
+from postprocess.measures.strain import AT_PEAK, FRACTURE, PEAK, WIDENING, YIELD
+from smarticles.main import main
 
 HIGHEST = 0.6  # strain up to which the chain below holds
 

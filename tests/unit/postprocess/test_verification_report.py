@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from dem.errors import InputError
-from postprocess.verification import BAND, clump_sentences, order_table, report_verification
+from smarticles.verification.report import BAND, clump_sentences, order_table, report_verification
 
 
 def ladder(name: str, *, scheme: int, observed: float) -> list[dict[str, object]]:

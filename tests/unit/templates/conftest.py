@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from sweep_cases import SCENE, SWEEP, MakeFolder, WriteSweep
 
-from templates.expand import expand
-from templates.folder import Folder, create_folder
-from templates.sweep import load_sweep
+from templates.sweep.expand import expand
+from templates.sweep.folder import Folder, create_folder
+from templates.sweep.sweep import load_sweep
 
 
 @pytest.fixture

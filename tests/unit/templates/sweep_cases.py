@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from templates.folder import Folder
+from templates.sweep.folder import Folder
 
 SCENE = """\
 schema_version: 1

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from templates.cluster import Cluster, format_time, load_cluster, parse_time, shipped_clusters
-from templates.request import Request, Wishes, plan_request
+from templates.slurm.cluster import Cluster, format_time, load_cluster, parse_time, shipped_clusters
+from templates.slurm.request import Request, Wishes, plan_request
 
 FILE = """\
 schema_version = 1

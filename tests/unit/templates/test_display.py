@@ -7,9 +7,9 @@ import io
 import pytest
 from rich.console import Console
 
-from templates.display import LiveDisplay, PlainDisplay, display_for, duration
-from templates.folder import Entry
-from templates.local import Outcome, Progress, Snapshot
+from templates.local.display import LiveDisplay, PlainDisplay, display_for, duration
+from templates.local.local import Outcome, Progress, Snapshot
+from templates.sweep.folder import Entry
 
 SHAKEN = Progress(
     name="lw0.70_seed1",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from templates.estimate import PhaseClock, time_left
+from templates.local.estimate import PhaseClock, time_left
 
 
 @pytest.mark.parametrize(

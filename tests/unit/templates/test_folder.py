@@ -11,8 +11,8 @@ import pytest
 from sweep_cases import SWEEP, MakeFolder
 
 from dem.errors import InputError
-from dem.scene import load_scene, scene_hash
-from templates.folder import Folder, count_states, open_folder, run_status
+from dem.scene.scene import load_scene, scene_hash
+from templates.sweep.folder import Folder, count_states, open_folder, run_status
 
 
 def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> None:

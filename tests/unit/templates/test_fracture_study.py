@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-import templates
-from dem.actuation import InternalOscillation, ShapeChange
-from dem.hooks import PullHook
-from dem.parts import Deposit, Relax, Shake
-from templates.expand import Point, expand
-from templates.study import differences, study_file
-from templates.sweep import load_sweep
+import studies
+from dem.phases.actuation import InternalOscillation, ShapeChange
+from dem.setting.hooks import PullHook
+from dem.setting.parts import Deposit, Relax, Shake
+from studies.shipped import differences, study_file
+from templates.sweep.expand import Point, expand
+from templates.sweep.sweep import load_sweep
 
-STUDIES = Path(templates.__file__).parent / "studies"
+STUDIES = Path(studies.__file__).parent
 W, T2 = 0.0117, 0.5e-3
 
 
@@ -34,7 +34,7 @@ def test_the_points_are_those_asked_for(full: list[Point]) -> None:
 
 
 def test_counts_are_the_papers_or_in_between(full: list[Point]) -> None:
-    with (STUDIES / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (STUDIES / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
         counts = {float(row["l_over_w"]): int(row["n"]) for row in csv.DictReader(file)}
     for point in full:
         ratio = point.scene.smarticle.aspect_ratio

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from dem.actuation import actuated
 from dem.errors import InputError
-from dem.parts import FIDELITIES
-from dem.scene import Scene, load_scene, scene_hash
-from templates.expand import expand
-from templates.ladder import (
+from dem.phases.actuation import actuated
+from dem.scene.scene import Scene, load_scene, scene_hash
+from dem.setting.parts import FIDELITIES
+from studies.accuracy.ladder import (
     ACTIVITIES,
     ACTUATED,
     BASE,
@@ -23,6 +22,7 @@ from templates.ladder import (
     parse_knobs,
     parse_seeds,
 )
+from templates.sweep.expand import expand
 
 SCENE = """\
 schema_version: 1

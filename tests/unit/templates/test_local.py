@@ -15,8 +15,7 @@ import pytest
 from sweep_cases import MakeFolder
 
 from dem.errors import InputError
-from templates.folder import Entry, Folder
-from templates.local import (
+from templates.local.local import (
     Outcome,
     RunCommand,
     Snapshot,
@@ -25,6 +24,7 @@ from templates.local import (
     slots_here,
     smarticles_command,
 )
+from templates.sweep.folder import Entry, Folder
 
 FAKE = Path(__file__).with_name("fake_run.py")
 QUICK = Timing(poll_s=0.01, grace_s=10.0)
@@ -270,7 +270,7 @@ def test_the_command_of_a_run_is_this_interpreter_and_the_paths_that_it_is_given
         sys.executable,
         "-P",
         "-m",
-        "cli",
+        "smarticles",
         "run",
         "a scene.yaml",
         "--out",

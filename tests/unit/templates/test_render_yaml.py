@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dem.errors import InputError
-from templates.render import evaluate, render_text, render_yaml
+from templates.sweep.render import evaluate, render_text, render_yaml
 
 HOSTILE = [
     'a: b\ninjected: "yes"',

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from templates.cluster import Cluster, load_cluster
-from templates.request import Wishes, plan_request
-from templates.script import job_name, render_script
+from templates.slurm.cluster import Cluster, load_cluster
+from templates.slurm.request import Wishes, plan_request
+from templates.slurm.script import job_name, render_script
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden"
 PLAIN = "/home/user/sweeps/friction"

@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-import templates
-from dem.actuation import InternalOscillation, ShapeChange
+import studies
 from dem.errors import InputError
-from dem.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
-from templates.expand import Point, expand
-from templates.study import differences, study_file, study_names
-from templates.sweep import load_sweep
+from dem.phases.actuation import InternalOscillation, ShapeChange
+from dem.setting.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
+from studies.shipped import differences, study_file, study_names
+from templates.sweep.expand import Point, expand
+from templates.sweep.sweep import load_sweep
 
-STUDIES = Path(templates.__file__).parent / "studies"
+STUDIES = Path(studies.__file__).parent
 
 
 def points(*, quick: bool) -> list[Point]:
@@ -25,7 +25,7 @@ def points(*, quick: bool) -> list[Point]:
 
 
 def test_the_full_study_is_the_papers() -> None:
-    with (STUDIES / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (STUDIES / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     found = points(quick=False)
     assert [(p.scene.smarticle.aspect_ratio, p.scene.count, p.scene.seed) for p in found] == [
@@ -46,7 +46,7 @@ def test_the_full_study_is_the_papers() -> None:
 
 def test_the_counts_are_those_of_the_reference() -> None:
     """The layers of the source times the number per layer are its counts."""
-    with (STUDIES / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (STUDIES / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             assert int(row["layers"]) * int(row["per_layer"]) == int(row["n"])
 
@@ -184,5 +184,5 @@ def test_the_quick_procedures_say_how_they_differ() -> None:
 
 def test_every_data_file_of_a_study_is_named_in_its_readme() -> None:
     readme = (STUDIES / "README.md").read_text(encoding="utf-8")
-    for path in STUDIES.glob("*.csv"):
+    for path in STUDIES.glob("*/*.csv"):
         assert path.name in readme

@@ -11,12 +11,12 @@ import pytest
 from sweep_cases import MakeFolder
 
 from dem.errors import InputError, RunError
-from templates import slurm, submission
-from templates.cluster import load_cluster
-from templates.folder import Folder, RunStatus
-from templates.request import Wishes, plan_request
-from templates.slurm import STATES, QueueError, Task, parse_job_id, parse_queue
-from templates.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
+from templates.slurm import slurm, submission
+from templates.slurm.cluster import load_cluster
+from templates.slurm.request import Wishes, plan_request
+from templates.slurm.slurm import STATES, QueueError, Task, parse_job_id, parse_queue
+from templates.slurm.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
+from templates.sweep.folder import Folder, RunStatus
 
 
 @pytest.mark.parametrize(("answer", "number"), [("12\n", 12), ("12;here\n", 12), ("sbatch: warning\n7\n", 7)])

@@ -1,0 +1,111 @@
+"""Random poses of smarticles that overlap neither each other nor the container."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from dem.body.particle import Particle
+from dem.errors import RunError
+
+Array = NDArray[np.float64]
+
+CLEARANCE = 0.02  # free distance kept between surfaces, in sphere diameters
+ATTEMPTS = 200  # poses tried per smarticle before the slab is made higher
+GROWTH = 0.25  # by how much of its height the slab grows then
+MOST_GROWTH = 40  # growths before the layer is given up
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of k smarticles: centres of mass (k, 3) [m] and rotations, body frame to laboratory frame."""
+
+    positions: Array
+    rotations: tuple[Rotation, ...]
+
+
+def place_layer(
+    particle: Particle,
+    *,
+    count: int,
+    radius: float,
+    bottom: float,
+    height: float,
+    obstacles: Array,
+    rng: np.random.Generator,
+    narrower: Callable[[Array], Array] | None = None,
+) -> Poses:
+    """Random, non-overlapping poses in a slab of a cylinder.
+
+    Orientations are uniform over rotations, centres uniform over the disc and the slab's height, both subject to no
+    overlap. A slab that turns out to be too full grows upwards.
+
+    Args:
+        particle: one smarticle.
+        count: how many to place.
+        radius: inner radius of the cylinder [m].
+        bottom: no sphere comes below this height [m].
+        height: height of the slab [m], in which the lowest spheres of the smarticles lie.
+        obstacles: (n, 3) centres of spheres [m], of the same diameter, that are there already.
+        rng: source of randomness.
+        narrower: inner radii of the cylinder [m] at heights [m], where it is narrower in places; it must not be wider
+            higher up.
+
+    Raises:
+        RunError: no room was found.
+    """
+    diameter = particle.chain.diameter
+    apart = diameter * (1 + CLEARANCE)
+    margin = particle.radius * (1 + 2 * CLEARANCE)
+    widest = radius - margin
+    taken = obstacles
+    positions: list[Array] = []
+    rotations: list[Rotation] = []
+    grown = 0
+    while len(positions) < count:
+        tree = cKDTree(taken) if len(taken) else None
+        for _ in range(ATTEMPTS):
+            rotation = Rotation.random(random_state=rng)
+            spheres = rotation.apply(particle.centres)
+            distance, angle, lift = (
+                radius * math.sqrt(rng.random()),
+                2 * math.pi * rng.random(),
+                rng.random(),
+            )
+            lowest = spheres[:, 2].min() - particle.radius
+            centre = np.array(
+                [
+                    distance * math.cos(angle),
+                    distance * math.sin(angle),
+                    bottom + lift * height - lowest,
+                ]
+            )
+            spheres += centre
+            off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
+            if off_axis.max() > widest:
+                continue
+            # As wide as the cylinder is at the tops of the spheres, they touch neither wall nor ceiling.
+            if narrower is not None and (off_axis > narrower(spheres[:, 2] + margin) - margin).any():
+                continue
+            if tree is not None and tree.query(spheres, distance_upper_bound=apart)[0].min() < apart:
+                continue
+            positions.append(centre)
+            rotations.append(rotation)
+            taken = np.concatenate([taken, spheres])
+            break
+        else:
+            height *= 1 + GROWTH
+            grown += 1
+            if grown > MOST_GROWTH:
+                msg = (
+                    f"only {len(positions)} of {count} smarticles of a layer found room in a container of radius "
+                    f"{radius:g} m; lower phases.0.per_layer or widen container.radius_m"
+                )
+                raise RunError(msg)
+    return Poses(np.array(positions), tuple(rotations))

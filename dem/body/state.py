@@ -1,0 +1,138 @@
+"""All smarticles at one instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import LINKS, Boxes, Particle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class State:
+    """Poses and velocities of all links, in the laboratory frame.
+
+    Welded or articulated, a smarticle is three links; link 0 is barb 1, 1 the middle link, 2 barb 2.
+
+    Args:
+        boxes: one smarticle; lengths and masses of the links.
+        link_positions: (N, 3, 3) centres of the links [m].
+        link_rotations: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1].
+        link_velocities: (N, 3, 3) of the links' centres [m/s].
+        link_spins: (N, 3, 3) angular velocities of the links [rad/s].
+    """
+
+    boxes: Boxes
+    link_positions: Array
+    link_rotations: Array
+    link_velocities: Array
+    link_spins: Array
+
+    @classmethod
+    def rigid(
+        cls,
+        boxes: Boxes,
+        positions: Array,
+        rotations: Array,
+        velocities: Array,
+        spins: Array,
+        *,
+        shapes: tuple[Array, Array] | None = None,
+    ) -> State:
+        """Smarticles that are rigid bodies.
+
+        Args:
+            boxes: one smarticle.
+            positions: (N, 3) centres of mass [m].
+            rotations: (N, 3, 3) body frame to laboratory frame [1].
+            velocities: (N, 3) of the centres of mass [m/s].
+            spins: (N, 3) angular velocities [rad/s].
+            shapes: (N, 3, 3) centres [m] and (N, 3, 3, 3) frames of the links in the body frame, each smarticle
+                its own; by default all have the boxes' shape.
+        """
+        centres, frames = shapes or (boxes.link_centres[None], boxes.link_rotations[None])
+        arms = np.einsum("nij,nkj->nki", rotations, centres)
+        turned = np.einsum("nij,nkjm->nkim", rotations, frames)
+        shared = np.repeat(spins[:, None], LINKS, axis=1)
+        return cls(boxes, positions[:, None] + arms, turned, velocities[:, None] + np.cross(shared, arms), shared)
+
+    @property
+    def count(self) -> int:
+        """Smarticles."""
+        return len(self.link_positions)
+
+    @cached_property
+    def positions(self) -> Array:
+        """(N, 3) centres of mass of the smarticles [m]."""
+        return self._mean(self.link_positions)
+
+    @cached_property
+    def velocities(self) -> Array:
+        """(N, 3) velocities of the centres of mass [m/s]."""
+        return self._mean(self.link_velocities)
+
+    def _mean(self, values: Array) -> Array:
+        mean: Array = np.einsum("nkj,k->nj", values, self.boxes.link_masses / self.boxes.mass)
+        return mean
+
+    @cached_property
+    def vertices(self) -> Array:
+        """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; the hinges are the middle link's ends."""
+        half = self.link_rotations[..., 0] * (self.boxes.lengths / 2)[None, :, None]
+        starts, ends = self.link_positions - half, self.link_positions + half
+        return np.stack([ends[:, 0], starts[:, 1], ends[:, 1], ends[:, 2]], axis=1)
+
+    @cached_property
+    def angles(self) -> Array:
+        """(N, 2) angles (α1, α2) of the barbs [rad], from the directions of the links."""
+        middle = self.link_rotations[:, 1]
+        along1 = np.einsum("ni,ni->n", self.link_rotations[:, 0, :, 0], middle[..., 0])
+        across1 = np.einsum("ni,ni->n", self.link_rotations[:, 0, :, 0], middle[..., 1])
+        along2 = np.einsum("ni,ni->n", self.link_rotations[:, 2, :, 0], middle[..., 0])
+        across2 = np.einsum("ni,ni->n", self.link_rotations[:, 2, :, 0], middle[..., 1])
+        return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
+
+    def spheres(self, particle: Particle) -> Array:
+        """(N, S, 3) centres of the spheres [m]."""
+        links = particle.links
+        turned: Array = np.einsum("nsij,sj->nsi", self.link_rotations[:, links], particle.local_centres)
+        centres: Array = turned + self.link_positions[:, links]
+        return centres
+
+    @cached_property
+    def momentum(self) -> Array:
+        """(3,) momentum of all smarticles [kg m/s]."""
+        momentum: Array = self.boxes.mass * self.velocities.sum(axis=0)
+        return momentum
+
+    @cached_property
+    def angular_momentum(self) -> Array:
+        """(3,) angular momentum of all smarticles about the origin [kg m²/s]."""
+        orbital = np.cross(self.link_positions, self.link_velocities) * self.boxes.link_masses[None, :, None]
+        own = np.einsum("nkij,nkj->nki", self.link_rotations, self.boxes.link_inertias * self._local_spins)
+        total: Array = (orbital + own).sum(axis=(0, 1))
+        return total
+
+    @cached_property
+    def kinetic_energy(self) -> float:
+        """Translational and rotational kinetic energy of all links [J]."""
+        boxes = self.boxes
+        translation = (boxes.link_masses[None, :, None] * self.link_velocities**2).sum()
+        rotation = (boxes.link_inertias * self._local_spins**2).sum()
+        return float(0.5 * (translation + rotation))
+
+    @cached_property
+    def _local_spins(self) -> Array:
+        """(N, 3, 3) angular velocities in the links' own frames [rad/s]."""
+        spins: Array = np.einsum("nkij,nki->nkj", self.link_rotations, self.link_spins)
+        return spins
+
+    def potential_energy(self, gravity: float, floor: float) -> float:
+        """Gravitational energy [J] of all smarticles above a height [m], at g [m/s²]."""
+        heights = self.positions[:, 2] - floor
+        return float(self.boxes.mass * gravity * heights.sum())

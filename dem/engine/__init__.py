@@ -1,0 +1,1 @@
+"""The running simulation behind one interface."""

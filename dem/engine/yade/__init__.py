@@ -1,0 +1,1 @@
+"""The engine on YADE: the only package that knows it."""

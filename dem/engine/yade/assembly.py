@@ -1,0 +1,297 @@
+"""How smarticles are made of rigid bodies: welded, one body each, or articulated, three links and two hinges each.
+
+Welding and articulating keep positions, momentum and angular momentum to rounding. Articulating keeps the kinetic
+energy as well; welding takes away that of the links' motion against each other, and says how much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dem.body.particle import LINKS, Particle
+from dem.body.placement import Poses
+from dem.body.state import State
+from dem.engine.yade.clump import Body, clump
+from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
+from dem.engine.yade.library import Yade
+from dem.errors import refuse
+
+Array = NDArray[np.float64]
+
+SMARTICLE_MATERIAL = "smarticle"
+
+
+class Assembly:
+    """All smarticles as bodies of YADE.
+
+    Args:
+        yade: the simulation.
+        particle: one smarticle.
+        hinge_law: stiffness of the hinges; None where none will be needed.
+        planar: whether all motion is confined to the plane z = 0.
+        strengths: (N, 2) factors on what the motors can do [1]; None where all are alike.
+    """
+
+    def __init__(
+        self,
+        yade: Yade,
+        particle: Particle,
+        hinge_law: HingeLaw | None,
+        *,
+        planar: bool = False,
+        strengths: Array | None = None,
+    ) -> None:
+        self._yade = yade
+        self._particle = particle
+        self._hinge_law = hinge_law
+        self._planar = planar
+        self._strengths = strengths
+        self.hinges: Hinges | None = None
+        """The hinges; None while welded."""
+        self._spheres: list[list[int]] = []
+        self._ids: list[int] = []
+        self._to_body: list[Any] = []
+        self._states: list[Any] = []
+        self._smarticle_of: dict[int, int] = {}
+        # Link poses in the frames of welded bodies; of no meaning while articulated.
+        self._arms: Array = np.empty((0, LINKS, 3))
+        self._turns: Array = np.empty((0, LINKS, 3, 3))
+
+    @property
+    def count(self) -> int:
+        """Smarticles."""
+        return len(self._spheres)
+
+    @property
+    def bodies(self) -> Sequence[int]:
+        """Ids of the rigid bodies: one per smarticle, or three, in order."""
+        return self._ids
+
+    @property
+    def smarticle_of(self) -> Mapping[int, int]:
+        """Smarticle by id of sphere."""
+        return self._smarticle_of
+
+    def bind(self) -> None:
+        """Take hold of YADE's objects; loading replaces them all."""
+        bodies = self._yade.omega.bodies
+        self._states = [bodies[body].state for body in self._ids]
+
+    def add(self, poses: Poses) -> None:
+        """Add smarticles of the particle's own shape, at rest."""
+        particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
+        for position, rotation in zip(poses.positions, poses.rotations, strict=True):
+            spheres = [
+                omega.bodies.append(
+                    self._yade.utils.sphere(self._yade.vector(*centre), particle.radius, material=SMARTICLE_MATERIAL)
+                )
+                for centre in particle.centres
+            ]
+            self._smarticle_of.update(dict.fromkeys(spheres, len(self._spheres)))
+            self._spheres.append(spheres)
+            self._clump(
+                Body(
+                    members=spheres,
+                    local=particle.centres,
+                    mass=particle.boxes.mass,
+                    inertia=particle.boxes.inertia,
+                    position=position,
+                    rotation=rotation.as_matrix(),
+                    velocity=still,
+                    angular_momentum=still,
+                    planar=self._planar,
+                )
+            )
+        new = len(poses.positions)
+        boxes = particle.boxes
+        self._arms = np.concatenate([self._arms, np.tile(boxes.link_centres, (new, 1, 1))])
+        self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
+
+    def state(self) -> State:
+        """Poses and velocities of all links.
+
+        Raises:
+            RunError: the simulation has blown up.
+        """
+        rows = []
+        for body, to_body in zip(self._states, self._to_body, strict=True):
+            x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body
+            # Component by component: five times faster than letting NumPy convert YADE's vectors.
+            rows.append((x[0], x[1], x[2], v[0], v[1], v[2], w[0], w[1], w[2], q[0], q[1], q[2], q[3]))
+        table = np.array(rows).reshape(-1, 13)
+        self._check(table)
+        positions, velocities, spins, quaternions = np.split(table, (3, 6, 9), axis=1)
+        rotations = Rotation.from_quat(quaternions).as_matrix() if rows else np.empty((0, 3, 3))
+        boxes = self._particle.boxes
+        if self.hinges is not None:
+            shape = (-1, LINKS, 3)
+            return State(
+                boxes,
+                positions.reshape(shape),
+                rotations.reshape(-1, LINKS, 3, 3),
+                velocities.reshape(shape),
+                spins.reshape(shape),
+            )
+        return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
+
+    def _check(self, table: Array) -> None:
+        broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
+        refuse(
+            broken.reshape(self.count, 1 if self.hinges is None else LINKS).any(axis=1),
+            self._yade.omega.time,
+            "positions or velocities are no numbers, the simulation has blown up",
+            "lower fidelity.time_step_fraction",
+        )
+
+    # -- welding -----------------------------------------------------------------------------------------------
+
+    def articulate(self) -> None:
+        """Split every smarticle into its links, hinged to each other; nothing while articulated already."""
+        if self.hinges is not None:
+            return
+        assert self._hinge_law is not None  # the engine was built for scenes that never articulate
+        boxes, state = self._particle.boxes, self.state()
+        tensors, arms = _tensors(state)
+        spins = np.linalg.solve(tensors, self._angular_momenta()[..., None])[..., 0]
+        inertias = boxes.link_inertias
+        nodes: list[list[list[int]]] = []
+        self._dissolve()
+        for k in range(state.count):
+            nodes.append([])
+            for link in range(LINKS):
+                rotation = state.link_rotations[k, link]
+                own = hinge_nodes(boxes, link)
+                nodes[k].append(add_nodes(self._yade, len(own)))
+                spheres = np.flatnonzero(self._particle.links == link)
+                self._clump(
+                    Body(
+                        members=[*(self._spheres[k][s] for s in spheres), *nodes[k][link]],
+                        local=np.concatenate([self._particle.local_centres[spheres], own]),
+                        mass=boxes.link_masses[link],
+                        inertia=inertias[link],
+                        position=state.link_positions[k, link],
+                        rotation=rotation,
+                        velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
+                        angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
+                        planar=self._planar,
+                    )
+                )
+        self.hinges = Hinges(self._yade, self._hinge_law, nodes, state.angles)
+        self.hinges.make(self._strengths)
+
+    def weld(self) -> float:
+        """Make every smarticle one rigid body of the shape that it has; nothing while welded already.
+
+        Returns:
+            Kinetic energy of the links' motion against each other [J], which is lost.
+        """
+        if self.hinges is None:
+            return 0.0
+        boxes, state = self._particle.boxes, self.state()
+        tensors, arms = _tensors(state)
+        masses = boxes.link_masses[None, :, None]
+        relative = state.link_velocities - state.velocities[:, None]
+        own = self._angular_momenta().reshape(-1, LINKS, 3)
+        momenta = (own + np.cross(arms, masses * relative)).sum(axis=1)
+        if self._planar:
+            moments, axes = tensors[:, [0, 1, 2], [0, 1, 2]], np.tile(np.eye(3), (state.count, 1, 1))
+        else:
+            moments, axes = np.linalg.eigh(tensors)
+            axes[..., 0] *= np.linalg.det(axes)[:, None]
+        before = state.kinetic_energy
+        spheres = state.spheres(self._particle) - state.positions[:, None]
+        self.hinges.remove()
+        self.hinges = None
+        self._dissolve()
+        for k in range(state.count):
+            self._clump(
+                Body(
+                    members=self._spheres[k],
+                    local=spheres[k] @ axes[k],
+                    mass=boxes.mass,
+                    inertia=moments[k],
+                    position=state.positions[k],
+                    rotation=axes[k],
+                    velocity=state.velocities[k],
+                    angular_momentum=momenta[k],
+                    planar=self._planar,
+                )
+            )
+        self._arms = np.einsum("nji,nkj->nki", axes, arms)
+        self._turns = np.einsum("nji,nkjm->nkim", axes, state.link_rotations)
+        return before - self.state().kinetic_energy
+
+    def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
+        """A point of a link while articulated: id of the body, and the point in the body's own frame (3,) [m].
+
+        Args:
+            smarticle: its number.
+            link: 0 barb 1, 1 middle link, 2 barb 2.
+            point: (3,) in the frame of the link [m].
+        """
+        number = LINKS * smarticle + link
+        arm = self._to_body[number] * self._yade.vector(*point)
+        return self._ids[number], np.array([arm[0], arm[1], arm[2]])
+
+    def _clump(self, body: Body) -> None:
+        number, to_body = clump(self._yade, body)
+        self._ids.append(number)
+        self._to_body.append(to_body)
+        self._states.append(self._yade.omega.bodies[number].state)
+
+    def _dissolve(self) -> None:
+        for body in self._ids:
+            self._yade.omega.bodies.erase(body, False)
+        self._ids, self._to_body, self._states = [], [], []
+
+    def _angular_momenta(self) -> Array:
+        """(bodies, 3) about their own centres of mass, laboratory frame [kg m²/s]."""
+        if self._planar:
+            # YADE keeps no angular momentum of what it turns like a sphere.
+            return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
+        return np.array([[m[0], m[1], m[2]] for m in (state.angMom for state in self._states)]).reshape(-1, 3)
+
+    # -- memory ------------------------------------------------------------------------------------------------
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs."""
+        return {
+            "spheres": self._spheres,
+            "bodies": self._ids,
+            "to_body": [[q[0], q[1], q[2], q[3]] for q in self._to_body],
+            "arms": self._arms.tolist(),
+            "turns": self._turns.tolist(),
+            "hinges": None if self.hinges is None else self.hinges.memory,
+        }
+
+    def restore(self, memory: Mapping[str, Any]) -> None:
+        """Go on from where `memory` was taken, in a simulation that was loaded."""
+        self._spheres = [list(spheres) for spheres in memory["spheres"]]
+        self._smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
+        self._ids = list(memory["bodies"])
+        # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
+        self._to_body = [self._yade.quaternion(w, x, y, z) for x, y, z, w in memory["to_body"]]
+        self._arms = np.array(memory["arms"]).reshape(-1, LINKS, 3)
+        self._turns = np.array(memory["turns"]).reshape(-1, LINKS, 3, 3)
+        self.hinges = None
+        if memory["hinges"] is not None:
+            assert self._hinge_law is not None  # a checkpoint belongs to its scene
+            self.hinges = Hinges.restored(self._yade, self._hinge_law, memory["hinges"])
+        self.bind()
+
+
+def _tensors(state: State) -> tuple[Array, Array]:
+    """Inertia tensors of the smarticles (N, 3, 3) [kg m²] and arms of their links (N, 3, 3) [m], laboratory axes."""
+    boxes = state.boxes
+    arms = state.link_positions - state.positions[:, None]
+    own = np.einsum("nkij,kj,nklj->nil", state.link_rotations, boxes.link_inertias, state.link_rotations)
+    squares = (arms**2).sum(axis=-1)
+    offset = np.einsum("k,nk,ij->nij", boxes.link_masses, squares, np.eye(3))
+    offset -= np.einsum("k,nki,nkj->nij", boxes.link_masses, arms, arms)
+    return own + offset, arms

@@ -1,0 +1,272 @@
+"""Hinges between the links of articulated smarticles, made of YADE's bonds.
+
+A hinge is two bonds: a pin, a spring of no length that holds the two links together at the hinge's centre; and a shaft
+along the hinge's axis, which carries the motor's twist, keeps the two links in one plane, and damps the pin's
+vibrations. Both act between nodes that touch nothing else, so that contact knows nothing of hinges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import Boxes
+from dem.engine.yade.library import Yade
+
+Array = NDArray[np.float64]
+
+HINGE_MATERIAL = "hinge"
+NODE_RADIUS = 1e-4  # m; cancels in every force, but YADE wants one
+OFFSET = 1e-9  # m; a spring of exactly no length has no direction
+SHAFT_STIFFNESS = 1e-3  # N/m along the axis; the pin holds, this bond is for what the pin does not
+SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torque is stated in
+# YADE's rotations are first order and feed energy into the pin's fast vibrations, which undamped grow within a second
+# after a hard impact. A damper of a spring and a dashpot in a row takes it away and leaves slow motion alone.
+DAMPER_SHARE = 0.25  # of the pin's stiffness
+DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
+DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
+LOOKS_PER_TILT = 10  # looks of the motor control between corrections of the tilt's drift
+# Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
+SENSE = np.array([1.0, -1.0])
+BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
+
+
+@dataclass(frozen=True, kw_only=True)
+class HingeLaw:
+    """Stiffness of the hinges.
+
+    Args:
+        pin_stiffness: against the links coming apart [N/m].
+        tilt_stiffness: against their leaving the common plane [N m/rad].
+        shaft_stiffness: twist stiffness of the motor's shaft [N m/rad].
+        torque_cap: torque at which a shaft slips [N m]; None: never.
+        shaft_damping: what the motors add to the shafts' stiffness [N m s/rad]; for the stable time step only.
+        damper_time: the dampers' time of relaxation where they are stiff [s]; at least a time step.
+    """
+
+    pin_stiffness: float
+    tilt_stiffness: float
+    shaft_stiffness: float
+    torque_cap: float | None
+    shaft_damping: float = 0.0
+    damper_time: float = DAMPER_TIME
+
+    @property
+    def damper_stiffness(self) -> float:
+        """Of the damper's spring, across the axis [N/m]."""
+        return DAMPER_SHARE * self.pin_stiffness
+
+    @property
+    def damper_viscosity(self) -> float:
+        """Of the damper's dashpot [N s/m]."""
+        return max(DAMPER_VISCOSITY, self.damper_stiffness * self.damper_time)
+
+
+def hinge_nodes(boxes: Boxes, link: int) -> Array:
+    """(n, 3) hinge nodes of a link in its own frame [m].
+
+    A barb has one hinge, at its start, with a node at the centre and one at the end of the axis, half the thickness t1
+    above the plane; the middle link has a node at the centre of each of its two hinges.
+    """
+    half = boxes.lengths[link] / 2
+    if link != 1:
+        return np.array([[-half, 0.0, OFFSET], [-half, 0.0, boxes.thickness_normal / 2]])
+    return np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+
+
+def add_nodes(yade: Yade, count: int) -> list[int]:
+    """Add bodies for hinge nodes: no mass, no bound, no contact."""
+    ids = []
+    for _ in range(count):
+        body = yade.classes.Body()
+        body.shape = yade.classes.GridNode(radius=NODE_RADIUS)
+        body.material = yade.omega.materials[HINGE_MATERIAL]
+        body.mask, body.bounded = 0, False
+        ids.append(yade.omega.bodies.append(body))
+    return ids
+
+
+class Hinges:
+    """All hinges of N articulated smarticles.
+
+    Args:
+        yade: the simulation.
+        law: stiffness.
+        nodes: per smarticle the node ids of its links, as `hinge_nodes` orders them.
+        angles: (N, 2) angles of the barbs where the bonds were made [rad].
+    """
+
+    def __init__(self, yade: Yade, law: HingeLaw, nodes: Sequence[Sequence[Sequence[int]]], angles: Array) -> None:
+        self._yade = yade
+        self._law = law
+        self._nodes = nodes
+        self._angles = angles
+        self._pins: list[Any] = []
+        self._shafts: list[tuple[Any, Any]] = []
+        self._ends: list[tuple[Any, Any]] = []
+        # What YADE works out of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
+        self._loaded: tuple[Array, Array] | None = None
+        self._looks = 0
+
+    def make(self, strengths: Array | None = None) -> None:
+        """Make the bonds, between links that are where they belong.
+
+        Args:
+            strengths: (N, 2) factors on stiffness and cap of the shafts [1]; None: all are alike.
+        """
+        factors = np.ones_like(self._angles) if strengths is None else strengths
+        for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
+            self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
+            self._shaft(barb_end, middle_centre, float(factor))
+        self.bind()
+
+    def bind(self) -> None:
+        """Take hold of YADE's bonds; loading replaces them all."""
+        interactions = self._yade.omega.interactions
+        self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
+        shafts = [interactions[end, middle] for _, end, middle in self._hinges()]
+        self._shafts = [(bond.geom, bond.phys) for bond in shafts]
+        bodies = self._yade.omega.bodies
+        self._ends = [(bodies[end].state, bodies[middle].state) for _, end, middle in self._hinges()]
+
+    def remove(self) -> None:
+        """Remove bonds and nodes."""
+        for links in self._nodes:
+            for node in (node for link in links for node in link):
+                self._yade.omega.bodies.erase(node)
+        self._pins, self._shafts, self._ends = [], [], []
+
+    def _hinges(self) -> Iterator[tuple[int, int, int]]:
+        """Nodes of each hinge: the barb's at the centre and at the end of the axis, the middle link's at the centre."""
+        for links in self._nodes:
+            for hinge, barb in enumerate(BARBS):
+                centre, end = links[barb]
+                yield centre, end, links[1][hinge]
+
+    def _bond(self, first: int, second: int, stiffness: float) -> Any:
+        bond = self._yade.utils.createInteraction(first, second)
+        phys = bond.phys
+        phys.kn, phys.ks, phys.kr, phys.ktw = stiffness, 0.0, 0.0, 0.0
+        phys.momentRotationLaw, phys.fragile, phys.cohesionBroken = False, False, False
+        phys.normalAdhesion, phys.shearAdhesion = 1e9, 0.0
+        phys.maxRollPl = phys.maxTwistPl = -1.0
+        phys.unp = 2 * NODE_RADIUS
+        return bond
+
+    def _shaft(self, end: int, centre: int, strength: float) -> None:
+        law = self._law
+        bond = self._bond(end, centre, SHAFT_STIFFNESS)
+        phys = bond.phys
+        phys.unp = bond.geom.penetrationDepth
+        phys.momentRotationLaw, phys.ktw, phys.kr = True, strength * law.shaft_stiffness, law.tilt_stiffness
+        phys.ks, phys.shearAdhesion = law.damper_stiffness, 1e9
+        if law.torque_cap is not None:
+            # YADE states the cap as a multiple of the normal force; a small one is kept constant for it.
+            phys.unp -= SHAFT_FORCE / SHAFT_STIFFNESS
+            phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
+
+    def moved(self) -> None:
+        """A step has been made: YADE knows the bonds' shape again."""
+        self._loaded = None
+
+    def _twists(self) -> Array:
+        return np.array([geom.twist for geom, _ in self._shafts]) if self._loaded is None else self._loaded[0]
+
+    def _gaps(self) -> Array:
+        if self._loaded is not None:
+            return self._loaded[1]
+        return 2 * NODE_RADIUS - np.array([geom.penetrationDepth for geom in self._pins])
+
+    def angles(self) -> Array:
+        """(N, 2) angles of the barbs [rad], from the twist of the shafts."""
+        result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
+        return result
+
+    def rates(self) -> Array:
+        """(N, 2) how fast the barbs turn against their middle links [rad/s], half a step behind the angles."""
+        up = self._yade.vector(0, 0, 1)
+        turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
+        result: Array = -SENSE * np.array(turning).reshape(-1, 2)
+        return result
+
+    def set_torques(self, torques: Array, time_step: float) -> None:
+        """Twist the shafts such that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
+
+        YADE adds up twist and tilt step by step; set anew from the angles now and then, neither drifts.
+
+        Args:
+            torques: on the barbs.
+            time_step: dt [s].
+        """
+        moments = (-SENSE * torques).ravel().tolist()
+        for (geom, phys), moment in zip(self._shafts, moments, strict=True):
+            phys.moment_twist = geom.normal * moment
+        if self._looks % LOOKS_PER_TILT == 0:
+            self._set_tilts(time_step)
+        self._looks += 1
+
+    def _set_tilts(self, time_step: float) -> None:
+        # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
+        # while the twist is small. The next step adds the turn of the step that was just made, which the axes already
+        # have, so it is taken off here; without that the pins' vibrations gain energy at every correction.
+        up, tilt = self._yade.vector(0, 0, 1), self._law.tilt_stiffness
+        for (_, phys), (barb, middle) in zip(self._shafts, self._ends, strict=True):
+            axis = barb.ori * up
+            turn = (middle.angVel - barb.angVel) * time_step
+            phys.moment_bending = ((middle.ori * up).cross(axis) + turn - axis * axis.dot(turn)) * tilt
+
+    def torques(self) -> Array:
+        """(N, 2) torques on the barbs at present [N m], as YADE has them."""
+        moments = [geom.normal.dot(phys.moment_twist) for geom, phys in self._shafts]
+        result: Array = -SENSE * np.array(moments).reshape(-1, 2)
+        return result
+
+    def gaps(self) -> Array:
+        """(N, 2) how far the two links of each hinge are apart [m]."""
+        return self._gaps().reshape(-1, 2)
+
+    def elastic_energy(self) -> float:
+        """Energy in pins, dampers and shafts that tilt [J]; not in their twist, which belongs to the motors."""
+        dampers = self._damper_forces() / self._law.damper_stiffness
+        pins = self._law.pin_stiffness * (self.gaps() ** 2).sum()
+        tilts = sum(phys.moment_bending.squaredNorm() for _, phys in self._shafts) / self._law.tilt_stiffness
+        return float(0.5 * (pins + dampers + tilts))
+
+    def damped(self, time_step: float) -> float:
+        """Energy that the dampers dissipate in a step [J].
+
+        Args:
+            time_step: dt [s].
+        """
+        # YADE relaxes a damper's force by this share in each step.
+        share = time_step * self._law.damper_stiffness / self._law.damper_viscosity
+        return self._damper_forces() * (2 * share - share**2) / (2 * self._law.damper_stiffness)
+
+    def _damper_forces(self) -> float:
+        """Sum of the squares of all dampers' forces [N²]."""
+        return float(sum(phys.shearForce.squaredNorm() for _, phys in self._shafts))
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restored` needs."""
+        return {
+            "nodes": self._nodes,
+            "angles": self._angles.tolist(),
+            # Not in YADE's own file.
+            "twists": self._twists().tolist(),
+            "gaps": self._gaps().tolist(),
+            "looks": self._looks,
+        }
+
+    @classmethod
+    def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Hinges:
+        """The hinges of a simulation that was loaded."""
+        hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
+        hinges.bind()
+        hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])
+        hinges._looks = memory["looks"]
+        return hinges

@@ -1,0 +1,1 @@
+"""What happens, one file for each kind of phase."""

@@ -1,0 +1,34 @@
+"""What is no reason to refuse a scene and had better be known before it runs: one line each with the key."""
+
+from __future__ import annotations
+
+from dem.phases.actuation_checks import actuation_warnings
+from dem.plan.durations import run_duration
+from dem.scene.scene import Scene
+from dem.setting.hooks import hook_warnings
+
+_LEFT_OUT = {
+    "series_interval_s": "one sample is taken, at the start",
+    "frame_interval_s": "no frame is written",
+    "sphere_interval_s": "no spheres are written",
+}
+
+
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """All warnings of a scene, for `plan` and for the beginning of a run: what, where, value with unit, way out."""
+    return (*actuation_warnings(scene), *recording_warnings(scene), *hook_warnings(scene))
+
+
+def recording_warnings(scene: Scene) -> tuple[str, ...]:
+    """Intervals of recording that are longer than the run."""
+    length, known = run_duration(scene)
+    run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
+    found = []
+    for key, left_out in _LEFT_OUT.items():
+        interval = getattr(scene.recording, key)
+        if interval is not None and interval > length:
+            found.append(
+                f"recording.{key}: {interval:g} s is longer than {run}, so that {left_out}; shorten it, or lengthen "
+                "the run"
+            )
+    return tuple(found)

@@ -1,0 +1,353 @@
+"""The fidelity that a scene needs, from what was measured: a limit of the error, of the hours, or of both.
+
+The table is the one that `smarticles accuracy` writes: what each named fidelity errs by on some scene, and how its
+processor times compare with the planned wall times. The hours are those planned for this scene, times that ratio.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dem.errors import InputError
+from dem.plan.outlook import Plan, plan
+from dem.scene.scene import Scene, parse_scene
+from dem.setting.parts import FIDELITIES
+
+SHIPPED = Path(__file__).resolve().parent.parent.parent / "results" / "accuracy" / "work_precision.csv"
+"""The table that is used unless another one is given; there only if it was measured."""
+
+_HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
+_KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
+_ASPECT, _COUNT, _ACTIVITY, _REFERENCE = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
+QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
+"""What a limit of the error can be of: names of columns and of `--of`, and symbols."""
+
+PACKING = ("phi_0", "phi_f")
+"""What it is of unless said otherwise."""
+
+_COLUMNS = (
+    *(_KNOB, _VALUE, _SEEDS, _RATIO, _ASPECT, _COUNT, _ACTIVITY, _REFERENCE),
+    *(f"{name} error{mark} [%]" for name in QUANTITIES for mark in ("", " 95 %")),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Error:
+    """A relative error.
+
+    Args:
+        of: symbol of what.
+        value: against the reference fidelity [1]; NaN if unknown.
+        band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
+    """
+
+    of: str
+    value: float
+    band: float
+
+    def __str__(self) -> str:
+        band = f" ± {self.band:.3f}" if math.isfinite(self.band) else ", scatter unknown"
+        return f"{self.of} {self.value:+.3f}{band}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """One named fidelity as the table has it.
+
+    Args:
+        fidelity: its name.
+        errors: of what is asked for, such as φ_0 and φ_f.
+        others: of what is not, to be told.
+        seeds: how many runs it was measured with.
+        ratio: measured processor time over the planned wall time [1].
+        is_reference: whether the errors of the others are against it.
+    """
+
+    fidelity: str
+    errors: tuple[Error, ...]
+    others: tuple[Error, ...] = ()
+    seeds: int
+    ratio: float
+    is_reference: bool
+
+    @property
+    def worst(self) -> Error:
+        """The largest error; NaN if one is unknown."""
+        unknown = [error for error in self.errors if math.isnan(error.value)]
+        return unknown[0] if unknown else max(self.errors, key=lambda error: abs(error.value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracyTable:
+    """What was measured, and of which scene.
+
+    Args:
+        path: the file.
+        fidelities: those with finished runs, in the order of `FIDELITIES`.
+        aspect_ratio: l/w [1].
+        count: smarticles [1].
+        activity: types of phase, separated by spaces.
+    """
+
+    path: Path
+    fidelities: tuple[Measured, ...]
+    aspect_ratio: float
+    count: int
+    activity: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expectation:
+    """What a fidelity is expected to bring on the scene at hand.
+
+    Args:
+        measured: its errors, on the scene of the table.
+        hours: wall time on this scene, on one core of the table's machine [h].
+    """
+
+    measured: Measured
+    hours: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The fidelity chosen.
+
+    Args:
+        planned: the plan of the scene with it, its wall times corrected by what was measured.
+        expected: what it is expected to bring.
+        why: which limit it answers.
+        notes: what is to be known about it, one line each.
+    """
+
+    planned: Plan
+    expected: Expectation
+    why: str
+    notes: tuple[str, ...]
+
+    @property
+    def fidelity(self) -> str:
+        """Its name."""
+        return self.expected.measured.fidelity
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for `--json`; an unknown number is null."""
+        errors = [
+            {"of": error.of, "value": _known(error.value), "band": _known(error.band)}
+            for error in self.expected.measured.errors
+        ]
+        return {
+            "fidelity": self.fidelity,
+            "expected_hours": self.expected.hours,
+            "errors": errors,
+            "seeds": self.expected.measured.seeds,
+            "why": self.why,
+            "notes": list(self.notes),
+        }
+
+    def to_text(self) -> str:
+        """A few lines for the terminal."""
+        measured = self.expected.measured
+        errors = "none by definition" if measured.is_reference else ", ".join(map(str, measured.errors))
+        lines = [
+            f"fidelity {self.fidelity}: {self.why}",
+            f"expected: {self.expected.hours:.2g} h of one core, error {errors} ({measured.seeds} seeds)",
+            *(f"note: {note}" for note in self.notes),
+        ]
+        return "\n".join([*lines, f"use it: --set fidelity={self.fidelity}"])
+
+
+def read_table(path: Path | None, *, of: Sequence[str] = PACKING) -> AccuracyTable:
+    """Read a table of `smarticles accuracy`.
+
+    Args:
+        path: the file; None: the one that ships.
+        of: what errors are asked for, keys of `QUANTITIES`.
+
+    Raises:
+        InputError: there is none, it is another table, or it does not tell of named fidelities.
+    """
+    file = SHIPPED if path is None else path
+    if path is None and not file.is_file():
+        msg = f"--table: no table of measured errors ships at {file}; {_HOW}"
+        raise InputError(msg)
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "not a text file"
+        msg = f"--table {file}: cannot be read ({why}); {_HOW}"
+        raise InputError(msg) from None
+    reader = csv.DictReader(line for line in lines if line and not line.startswith("#"))
+    for column in _COLUMNS:
+        if column not in (reader.fieldnames or ()):
+            msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
+            raise InputError(msg)
+    rows = {row[_VALUE]: row for row in reader if row[_KNOB] == "fidelity" and row[_VALUE] in FIDELITIES}
+    try:
+        found = tuple(_measured(rows[name], of) for name in FIDELITIES if name in rows and int(rows[name][_SEEDS]) > 0)
+        if not any(one.is_reference for one in found) or len(found) < 2:
+            msg = f"--table {file}: tells of fewer than two named fidelities with runs; {_HOW}"
+            raise InputError(msg)
+        first = rows[found[0].fidelity]
+        return AccuracyTable(
+            path=file,
+            fidelities=found,
+            aspect_ratio=float(first[_ASPECT]),
+            count=round(float(first[_COUNT])),
+            activity=first[_ACTIVITY],
+        )
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        msg = f"--table {file}: a row of knob fidelity does not hold numbers ({error}); {_HOW}"
+        raise InputError(msg) from None
+
+
+def _measured(row: dict[str, str], of: Sequence[str]) -> Measured:
+    ratio = _number(row[_RATIO])
+    errors = {
+        name: Error(
+            of=symbol, value=_number(row[f"{name} error [%]"]) / 100, band=_number(row[f"{name} error 95 % [%]"]) / 100
+        )
+        for name, symbol in QUANTITIES.items()
+    }
+    return Measured(
+        fidelity=row[_VALUE],
+        errors=tuple(error for name, error in errors.items() if name in of),
+        others=tuple(error for name, error in errors.items() if name not in of),
+        seeds=int(row[_SEEDS]),
+        ratio=ratio if ratio > 0 else 1.0,
+        is_reference=row[_REFERENCE] == "reference",
+    )
+
+
+def _known(number: float) -> float | None:
+    return None if math.isnan(number) else number
+
+
+def _number(text: str) -> float:
+    return float(text) if text.strip() else math.nan
+
+
+def choose(
+    scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
+) -> Choice:
+    """The fidelity for a scene: the cheapest within the error, else the finest within the hours.
+
+    Args:
+        scene: the scene; its own fidelity does not matter.
+        table: what was measured.
+        max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
+        max_hours: longest wall time on one core [h].
+
+    Raises:
+        InputError: no fidelity keeps the limit, or the two contradict each other; the message says which gives way.
+    """
+    plans: dict[str, Plan] = {}
+    expected: list[Expectation] = []
+    refused: list[InputError] = []
+    for one in table.fidelities:
+        try:
+            plans[one.fidelity] = plan(_with_fidelity(scene, one.fidelity)).corrected(one.ratio)
+        except InputError as error:  # such as two rows in a section that is square
+            refused.append(error)
+            continue
+        expected.append(Expectation(measured=one, hours=plans[one.fidelity].wall_s / 3600))
+    if not expected:
+        raise refused[0]
+    picked, why = pick(expected, max_error=max_error, max_hours=max_hours)
+    return Choice(
+        planned=plans[picked.measured.fidelity],
+        expected=picked,
+        why=why,
+        notes=(*map(str, refused), *_notes(scene, table, picked.measured, max_error)),
+    )
+
+
+def _with_fidelity(scene: Scene, name: str) -> Scene:
+    return parse_scene({**scene.model_dump(mode="json"), "fidelity": name}, source=f"{scene.name} at fidelity {name}")
+
+
+def pick(
+    expected: Sequence[Expectation], *, max_error: float | None, max_hours: float | None
+) -> tuple[Expectation, str]:
+    """What keeps the limits, and in words which one; arguments and errors as `choose`, fidelities coarse to fine."""
+    quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
+    if max_error is None:
+        if quick:
+            return quick[-1], f"the finest within --max-hours {max_hours:g}"
+        least = min(expected, key=lambda one: one.hours)
+        msg = (
+            f"--max-hours {max_hours:g}: even {least.measured.fidelity} is expected to take {least.hours:.2g} h; "
+            f"give --max-hours {_above(least.hours)} or a smaller scene"
+        )
+        raise InputError(msg)
+    exact = [one for one in expected if abs(one.measured.worst.value) <= max_error]
+    if not exact:
+        known = [one for one in expected if not math.isnan(one.measured.worst.value)]
+        best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
+        msg = (
+            f"--max-error {max_error:g}: no fidelity of the table is known to be within; the best is {best.fidelity}, "
+            f"{best.worst}; give --max-error {_above(abs(best.worst.value))} or a table with finished reference runs"
+        )
+        raise InputError(msg)
+    need = min(exact, key=lambda one: one.hours)
+    if max_hours is None or need.hours <= max_hours:
+        limits = f"--max-error {max_error:g}" + ("" if max_hours is None else f" and --max-hours {max_hours:g}")
+        return need, f"the cheapest within {limits}"
+    msg = (
+        f"--max-error {max_error:g} and --max-hours {max_hours:g} contradict each other: {need.measured.fidelity}, the "
+        f"cheapest within the error, is expected to take {need.hours:.2g} h; accuracy goes first, so the hours give "
+        f"way: --max-hours {_above(need.hours)}"
+    )
+    known = [one for one in quick if not math.isnan(one.measured.worst.value)]
+    if known:
+        best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
+        msg += f"; or accept {best.fidelity} ({best.worst}) with --max-error {_above(abs(best.worst.value))}"
+    raise InputError(msg)
+
+
+def _above(number: float) -> str:
+    """A number rounded up to two digits."""
+    if number <= 0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(number)) - 1)
+    return f"{math.ceil(number / unit - 1e-9) * unit:.3g}"
+
+
+def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: float | None) -> tuple[str, ...]:
+    notes = []
+    reference = next(one.fidelity for one in table.fidelities if one.is_reference)
+    if not measured.is_reference:
+        others = ", ".join(str(error) for error in measured.others if not math.isnan(error.value))
+        if others:
+            notes.append(f"not asked for (--of): {others}")
+        bounds = [abs(error.value) + error.band for error in measured.errors]
+        if any(math.isnan(bound) for bound in bounds):
+            notes.append("the scatter between seeds is not known, so the error is not assured; measure with more seeds")
+        elif max_error is not None and max(bounds) > max_error:
+            notes.append(
+                f"not assured: the scatter of {measured.seeds} seeds allows an error up to {max(bounds):.2g}, more "
+                f"than --max-error {max_error:g}; measure with more seeds"
+            )
+    if reference != "reference":
+        notes.append(f"errors are against {reference}: the table has no finished runs of reference")
+    here = {
+        "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
+        "N": (str(scene.count), str(table.count)),
+        "activity": (_activity(scene), table.activity),
+    }
+    for name, (own, there) in here.items():
+        if own != there:
+            notes.append(f"errors were measured at {name} {there}, this scene has {own or 'none'}")
+    return (*notes, f"table: {table.path}")
+
+
+def _activity(scene: Scene) -> str:
+    kinds = dict.fromkeys(phase.type for phase in scene.phases)
+    return " ".join(kind for kind in kinds if kind not in ("deposit", "relax"))

@@ -1,0 +1,139 @@
+"""What a run would do: phases, effects and why each is on or off, engines, time step, cost. Simulates nothing."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
+
+from dem.engine.yade.construction import in_order
+from dem.phases.actuation import actuated
+from dem.physics.stability import stable_step, time_steps
+from dem.plan.advice import warnings_of
+from dem.plan.durations import expected_duration, known_duration
+from dem.plan.effects import Adds, Decision, decide
+from dem.scene.scene import Scene
+from dem.setting.parts import Deposit
+
+# Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
+# differ by a factor of two.
+COST_PER_SPHERE_STEP = 3.3e-7
+# A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
+ARTICULATED_SHARE = 1.7
+# A pour costs about half of the same time in the full pile, since the pile grows from nothing.
+POUR_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class PlannedPhase:
+    """One phase: its duration (None where a criterion ends it, then `estimate_s` is a guess), cost and time step."""
+
+    index: int
+    type: str
+    duration_s: float | None
+    estimate_s: float
+    wall_s: float
+    time_step_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything `smarticles plan` says; `correction` is the factor that its wall times have been corrected by."""
+
+    name: str
+    count: int
+    spheres_per_smarticle: int
+    sphere_diameter_m: float
+    time_step_s: float
+    stable_time_step_s: float
+    container_height_m: float
+    phases: tuple[PlannedPhase, ...]
+    effects: tuple[Decision, ...]
+    engines: tuple[str, ...]
+    frames: int
+    wall_s: float
+    warnings: tuple[str, ...]
+    planar: bool = False
+    correction: float = 1.0
+
+    def corrected(self, factor: float) -> Self:
+        """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
+        phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
+        return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for `--json`."""
+        return asdict(self)
+
+    def to_text(self) -> str:
+        """A table for the terminal."""
+        corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
+        wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
+        lines = [
+            f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
+            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
+            self._steps_to_text(),
+            "",
+            f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
+        ]
+        for phase in self.phases:
+            guess = "" if phase.duration_s is not None else "≈ "
+            label = f"{phase.index} {phase.type}"
+            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_told(phase.wall_s):>22}")
+        lines += [
+            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_told(self.wall_s):>22}",
+            f"(one core{corrected}; machines differ by a factor of two)",
+            "",
+            f"{'effect':<20}{'':<5}why, and what it adds",
+        ]
+        for effect in self.effects:
+            lines.append(f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}")
+            lines += [f"{'':<25}+ {added}"] if (added := effect.adds.to_text()) else []
+        lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
+        lines += [f"warning: {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def _steps_to_text(self) -> str:
+        first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
+        told = f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
+        return f"{told} from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else told
+
+
+def _told(wall: float) -> str:
+    """A wall time for a person: tenths of seconds where seconds would say nothing."""
+    return f"{wall:.1f} s" if wall < 10 else f"{wall:.0f} s"
+
+
+def plan(scene: Scene) -> Plan:
+    """Plan a scene.
+
+    Raises:
+        InputError: the scene's time step is above the stable one.
+    """
+    steps = time_steps(scene)
+    particle = scene.particle
+    spheres = len(particle.centres)
+    phases = []
+    for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
+        rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
+        estimate = expected_duration(phase, scene.count)
+        share = POUR_SHARE if isinstance(phase, Deposit) else ARTICULATED_SHARE if actuated(phase) else 1.0
+        wall = rate * estimate * share
+        phases.append(PlannedPhase(index, phase.type, known_duration(phase), estimate, wall, dt))
+    simulated = sum(phase.estimate_s for phase in phases)
+    effects = decide(scene)
+    return Plan(
+        name=scene.name,
+        count=scene.count,
+        spheres_per_smarticle=spheres,
+        sphere_diameter_m=particle.chain.diameter,
+        time_step_s=min(steps),
+        stable_time_step_s=stable_step(scene),
+        container_height_m=scene.cylinder.height,
+        phases=tuple(phases),
+        effects=effects,
+        engines=in_order(Adds.together(effect.adds for effect in effects).engines),
+        frames=round(simulated / scene.recording.frame_interval_s),
+        wall_s=sum(phase.wall_s for phase in phases),
+        warnings=warnings_of(scene),
+        planar=scene.plane is not None,
+    )

@@ -1,0 +1,1 @@
+"""One run: a scene in, a run directory out."""

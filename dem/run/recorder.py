@@ -1,0 +1,130 @@
+"""Everything a run writes while time passes: series, frames, progress; and the watchdog that sees the same state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from dem.body.state import State
+from dem.engine.yade.engine import Engine
+from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
+from dem.record.progress import Progress
+from dem.record.series import SeriesWriter
+from dem.run.watchdog import Watchdog
+
+# Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
+# step, so steps are the measure.
+WATCH_STEPS = 500
+
+
+@dataclass
+class Recorder:
+    """Records at fixed intervals of time; what is rarer than a sample of the series is counted in samples.
+
+    Args:
+        series: writes the series.
+        frames: writes the frames.
+        watchdog: looks at the state now and then, at every checkpoint and at the end.
+        progress: told at every sample.
+        interval: time between samples [s].
+        frame_every: samples between frames.
+        watch_every: samples between the watchdog's looks; None: as many as have `WATCH_STEPS` steps, about.
+        spheres: writes the spheres as points; None: nobody does.
+        sphere_every: samples between these.
+    """
+
+    series: SeriesWriter
+    frames: FrameWriter
+    watchdog: Watchdog
+    progress: Progress
+    interval: float
+    frame_every: int
+    watch_every: int | None = None
+    spheres: FrameWriter | None = None
+    sphere_every: int = 1
+    samples: int = 0
+    """Taken so far."""
+    next_step: int = 0
+    """When the next one is due."""
+
+    def record(self, engine: Engine, phase: int) -> None:
+        """Take what is due at this step; the state is read once for all.
+
+        Raises:
+            RunError: the watchdog stopped the run, or a file cannot be written.
+        """
+        state = engine.state()
+        phi = self.series.sample(engine, state, phase)
+        if engine.count and self.samples % self.frame_every == 0:
+            mesh = frame_mesh(
+                state,
+                contacts=engine.contacts(),
+                time=engine.time,
+                floor=engine.floor,
+                phase=phase,
+                hinged=engine.hinged,
+                motors=engine.motors if engine.articulated else None,
+            )
+            self.frames.write(mesh, engine.time)
+            self.series.write()
+        if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
+            self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
+        # After the frame is written: the last picture of a run that fails is worth having.
+        if self.samples % (self.watch_every or max(1, round(WATCH_STEPS * engine.time_step / self.interval))) == 0:
+            self.watch(engine, state)
+        self.progress.update(time=engine.time, phi=phi, count=engine.count)
+        self.samples += 1
+        self.schedule(engine)
+
+    def schedule(self, engine: Engine) -> None:
+        """Find the step that is nearest to the time of the next sample; to be called when the time step changes."""
+        self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
+
+    def watch(self, engine: Engine, state: State | None = None) -> None:
+        """Let the watchdog look at everything.
+
+        Raises:
+            RunError: it stopped the run.
+        """
+        state, time, watchdog = state or engine.state(), engine.time, self.watchdog
+        watchdog.check(
+            state,
+            floor=engine.floor,
+            time=time,
+            spheres=state.spheres(engine.particle),
+            raised=engine.fixtures.raised,
+            gaps=engine.joint_gaps() if engine.articulated else None,
+        )
+        strain = engine.strain(watchdog.depth)
+        watchdog.check_depths(strain, time=time)
+        given = engine.account.given + engine.motor_work
+        energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
+        watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs besides the columns of the series."""
+        spheres = {} if self.spheres is None else {"spheres": self.spheres.times}
+        return {
+            "samples": self.samples,
+            "next_step": self.next_step,
+            "frames": self.frames.times,
+            **spheres,
+            "series": self.series.memory,
+        }
+
+    def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
+        self.samples, self.next_step = memory["samples"], memory["next_step"]
+        self.truncate(memory)
+        self.series.restore(memory["series"], columns)
+        self.series.write()
+
+    def truncate(self, memory: Mapping[str, Any]) -> None:
+        """Keep the frames of `memory` only; of an empty one none."""
+        self.frames.truncate(memory.get("frames", []))
+        if self.spheres is not None:
+            self.spheres.truncate(memory.get("spheres", []))

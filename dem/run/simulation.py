@@ -1,0 +1,226 @@
+"""The loop of a run: phases in order, time advanced from one recording to the next, checkpoints in between."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import signal
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from dem.engine.yade.engine import Engine
+from dem.errors import RunError
+from dem.phases.stages import Stage, begin
+from dem.record.checkpoint import CURRENT, Checkpoint, write_checkpoint
+from dem.run.recorder import Recorder
+from dem.scene.scene import Scene, scene_hash
+
+SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
+
+
+class StopRequestedError(Exception):
+    """The run was asked to stop at its next checkpoint (SIGUSR1, as from a batch system), and did."""
+
+
+@dataclass
+class Simulation:
+    """One run while it runs.
+
+    Args:
+        scene: what is run.
+        engine: the physics.
+        recorder: what is written.
+        folder: the run directory.
+        log: its log.
+        yade: version of YADE, stored in the checkpoints.
+        time_steps: of each phase [s].
+    """
+
+    scene: Scene
+    engine: Engine
+    recorder: Recorder
+    folder: Path
+    log: logging.Logger
+    yade: str
+    time_steps: Sequence[float]
+    checkpointed: float | None = None
+    """Simulated time of the newest checkpoint [s], at which the watchdog found nothing; None: there is none."""
+    _phase: int = 0
+    _stage: Stage | None = None
+    _target: int = 0
+    _performed: list[dict[str, Any]] = field(default_factory=list)
+    _spent: float = 0.0
+    _began: float = field(default_factory=time.monotonic)
+    _cpu_spent: float = 0.0
+    _cpu_began: float = field(default_factory=time.process_time)
+    _stop_requested: bool = False
+
+    def run(self) -> list[dict[str, Any]]:
+        """Run to the end of the last phase, from wherever the simulation stands.
+
+        Returns:
+            One entry per phase for `done.json`.
+
+        Raises:
+            RunError: a phase failed.
+            StopRequestedError: SIGUSR1 came; the last checkpoint has everything.
+        """
+        before = signal.signal(signal.SIGUSR1, self._request_stop)
+        try:
+            if not self.engine.steps:
+                self.recorder.record(self.engine, 0)
+            while self._phase < len(self.scene.phases):
+                self._run_phase()
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+        if self.checkpointed != self.engine.time:
+            # What was just loaded has been looked at, and knows its contacts from the next step on.
+            self.recorder.watch(self.engine)
+        self.recorder.series.write()
+        return self._performed
+
+    def _run_phase(self) -> None:
+        phase = self.scene.phases[self._phase]
+        if self._stage is None:
+            self._stage = begin(self.scene, self._phase)
+            if self.engine.time_step != self.time_steps[self._phase]:
+                self.engine.set_time_step(self.time_steps[self._phase])
+                self.recorder.schedule(self.engine)
+            self._performed.append(
+                {
+                    "index": self._phase,
+                    "type": phase.type,
+                    "start_s": self.engine.time,
+                    "wall_s": -self.wall,
+                    "cpu_s": -self.cpu,
+                }
+            )
+            self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
+        entry = self._performed[-1]
+        duration = getattr(phase, "duration_s", None)
+        self.recorder.progress.begin(
+            index=self._phase,
+            phase=phase.type,
+            start=entry["start_s"],
+            now=self.engine.time,
+            end=None if duration is None else entry["start_s"] + duration,
+        )
+        self._advance()
+        while wait := self._stage.proceed(self.engine):
+            self._target = self.engine.steps + max(1, round(wait / self.engine.time_step))
+            self._advance()
+        entry["end_s"] = self.engine.time
+        entry["wall_s"] += self.wall
+        entry["cpu_s"] += self.cpu
+        self.log.info(
+            "phase %d %s ended at t = %.4f s after %.1f s of wall time",
+            self._phase,
+            phase.type,
+            self.engine.time,
+            entry["wall_s"],
+        )
+        if warning := self._stage.memory.get("warning"):
+            self.warn(f"phases.{self._phase} ({phase.type}): {warning}")
+        self._stage = None
+        self._phase += 1
+
+    def warn(self, message: str) -> None:
+        """Tell the log and the person at the terminal."""
+        self.log.warning("%s", message)
+        self.recorder.progress.warn(message)
+
+    def _advance(self) -> None:
+        """Advance to the target step, recording what is due on the way."""
+        engine, recorder, recording = self.engine, self.recorder, self.scene.recording
+        while engine.steps < self._target:
+            engine.advance(min(self._target, recorder.next_step) - engine.steps)
+            if engine.steps == recorder.next_step:
+                every = recording.samples_in(recording.checkpoint_interval_s)
+                due = every and recorder.samples % every == 0
+                recorder.record(engine, self._phase)
+                if due:
+                    self._checkpoint()
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    def _checkpoint(self) -> None:
+        saved = self.folder / ".engine.partial.yade"
+        # A checkpoint is good: the watchdog has looked at it.
+        self.recorder.watch(self.engine)
+        self._check_space()
+        try:
+            memory = self.engine.save(saved)
+            content = saved.read_bytes()
+            self.engine.load(saved, memory)
+        finally:
+            saved.unlink(missing_ok=True)
+        assert self._stage is not None  # a checkpoint is taken while a phase runs
+        state = {
+            "yade": self.yade,
+            "scene_sha256": scene_hash(self.scene),
+            "engine": memory,
+            "recorder": self.recorder.memory,
+            "phase": self._phase,
+            "stage": self._stage.memory,
+            "target": self._target,
+            "performed": self._performed,
+            "wall_s": self.wall,
+            "cpu_s": self.cpu,
+        }
+        write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
+        self._note_checkpoint()
+        if self._stop_requested:
+            msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
+            raise StopRequestedError(msg)
+
+    def _note_checkpoint(self) -> None:
+        self.checkpointed = self.engine.time
+        self.recorder.progress.checkpointed(self.engine.time)
+
+    def _check_space(self) -> None:
+        # YADE does not notice a full disk when it saves, and would then load what it could not write.
+        newest = self.folder / CURRENT
+        needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
+        free = shutil.disk_usage(self.folder).free
+        if free < needed:
+            msg = (
+                f"{self.folder}: {free / 2**20:.1f} MiB free, a checkpoint needs {needed / 2**20:.1f} MiB; "
+                "free space and go on with --resume"
+            )
+            raise RunError(msg)
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go on from a checkpoint."""
+        state: Mapping[str, Any] = checkpoint.state
+        saved = self.folder / ".engine.partial.yade"
+        try:
+            saved.write_bytes(checkpoint.engine)
+            self.engine.load(saved, state["engine"])
+        finally:
+            saved.unlink(missing_ok=True)
+        self._note_checkpoint()
+        self.recorder.restore(state["recorder"], checkpoint.series)
+        self._phase, self._target = state["phase"], state["target"]
+        self.engine.set_time_step(self.time_steps[self._phase])
+        self._stage = begin(self.scene, self._phase)
+        self._stage.memory = dict(state["stage"])
+        self._performed = [dict(entry) for entry in state["performed"]]
+        self._spent, self._began = state["wall_s"], time.monotonic()
+        self._cpu_spent, self._cpu_began = state["cpu_s"], time.process_time()
+
+    @property
+    def wall(self) -> float:
+        """Wall time spent [s], in the processes before this one too."""
+        return self._spent + time.monotonic() - self._began
+
+    @property
+    def cpu(self) -> float:
+        """Processor time spent [s], in the processes before this one too."""
+        return self._cpu_spent + time.process_time() - self._cpu_began
+
+    def _request_stop(self, number: int, frame: FrameType | None) -> None:
+        self._stop_requested = True

@@ -1,0 +1,169 @@
+"""Stops a run whose result would be nonsense, and says why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.state import State
+from dem.engine.yade.strain import Strain
+from dem.errors import refuse
+from dem.setting.container import Cylinder
+
+Array = NDArray[np.float64]
+
+LOWER_STEP = "lower fidelity.time_step_fraction"
+BOTH_HOOKS = ("the lower hook", "the upper hook")
+
+
+@dataclass(kw_only=True)
+class Watchdog:
+    """Limits that no smarticle may pass.
+
+    Args:
+        cylinder: the container; who has a sphere's centre beyond its wall or under its floor has escaped, whose centre
+            of mass is above it has been thrown out.
+        speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
+        gap: [m]; a hinge whose links are farther apart is broken.
+        depth: [m]; contacts that overlap by more no longer keep bodies apart.
+        energy: [J]; smarticles that gain more from nowhere are blowing up.
+    """
+
+    cylinder: Cylinder
+    speed: float
+    gap: float = math.inf
+    depth: float = math.inf
+    energy: float = math.inf
+    # What kinetic and potential energy less the work done may amount to from now on [J].
+    _ceiling: float = math.inf
+
+    def check(
+        self,
+        state: State,
+        *,
+        floor: float,
+        time: float,
+        spheres: Array | None = None,
+        raised: float | None = 0.0,
+        gaps: Array | None = None,
+    ) -> None:
+        """Look at all smarticles once.
+
+        Args:
+            state: the smarticles.
+            spheres: (N, S, 3) centres of their spheres [m]; None: their centres of mass stand for them. Contacts with
+                wall and floor do not tell: from the centre on YADE takes them for shallower the deeper they are.
+            floor: height of the floor [m].
+            time: simulated time [s].
+            raised: how far a hook may have raised smarticles [m]; None: nothing holds them, so that none escapes.
+            gaps: (N, 2) how far the links of each hinge are apart [m]; None while welded.
+
+        Raises:
+            RunError: cause, smarticles concerned, time and the way out.
+        """
+        positions = state.positions
+        speeds = _speeds(state)
+        heights = positions[:, 2] - floor
+        broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
+        refuse(broken, time, "a position or velocity that is no number", LOWER_STEP)
+        refuse(
+            speeds > self.speed,
+            time,
+            f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
+            "which nothing in this scene explains",
+            LOWER_STEP,
+        )
+        if gaps is not None:
+            # A gap that is no number is not below the limit either.
+            refuse(
+                (~np.less_equal(gaps, self.gap)).any(axis=1),
+                time,
+                f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
+                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
+            )
+        points = positions[:, None] if spheres is None else spheres
+        above = points[..., 2] - floor
+        outside: NDArray[np.bool_] = np.less(above, 0)
+        height = math.inf
+        if raised is not None:
+            height = self.cylinder.height
+            corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
+            outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
+            height += raised
+        refuse(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
+        refuse(
+            heights > height,
+            time,
+            f"thrown out over the wall of {self.cylinder.height:.3g} m",
+            "raise container.height_m or shake less",
+        )
+
+    def check_depths(self, strain: Strain, *, time: float) -> None:
+        """Look at all contacts once.
+
+        Args:
+            strain: the contacts, those deeper than `depth` named.
+            time: simulated time [s].
+
+        Raises:
+            RunError: cause, smarticles concerned, time and the way out.
+        """
+        cause = (
+            f"contacts more than {self.depth:.3g} m deep (deepest {strain.deepest:.3g} m), so that links pass through "
+            "each other or through the container"
+        )
+        way_out = "raise fidelity.stiffness_N_per_m, or load the pile less"
+        if strain.held:
+            # However stiff: between the two, a contact is all that can give way.
+            first = strain.held[0]
+            cause += (
+                f"; smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
+                f"{first.apart:.3g} m"
+            )
+            way_out = (
+                "set hooks.upper_height_m and lower_height_m further apart than w"
+                if first.between == BOTH_HOOKS
+                else "give the hook more room: a smaller hooks.length_m or a wider container"
+            )
+        refuse(strain.deep, time, cause, way_out)
+
+    def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
+        """Compare the energy with what it may be after all that was seen before.
+
+        Contacts, hinges and welding only take energy away, and what their springs hold comes back once at most. So
+        kinetic and potential energy less the work done can never rise above what they were at any earlier time by more
+        than the springs held then. The lowest of these ceilings counts: dissipation makes no room for a later rise.
+
+        Args:
+            state: the smarticles, to name the fast ones.
+            energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
+                where the work is not known at present: then everything seen so far is forgotten.
+            elastic: what the springs of contacts and hinges hold at most [J].
+            time: simulated time [s].
+
+        Raises:
+            RunError: cause, smarticles concerned, time and the way out.
+        """
+        if math.isnan(energy):
+            self._ceiling = math.inf
+            return
+        rise = energy - self._ceiling
+        if rise > self.energy:
+            speeds = _speeds(state)
+            refuse(
+                speeds >= speeds.max() / 2,
+                time,
+                f"an energy that has risen by {rise:.3g} J more than gravity, motors and springs explain (limit "
+                f"{self.energy:.3g} J); these are the fastest, up to {speeds.max():.3g} m/s",
+                LOWER_STEP,
+            )
+        self._ceiling = min(self._ceiling, energy + elastic)
+
+
+def _speeds(state: State) -> Array:
+    """(N,) speed of the fastest link's centre of each smarticle [m/s]."""
+    speeds: Array = np.linalg.norm(state.link_velocities, axis=-1).max(axis=-1)
+    return speeds

@@ -1,0 +1,1 @@
+"""A scene: what is given and what happens, joined, checked and read."""

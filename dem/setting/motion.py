@@ -1,0 +1,399 @@
+"""Motions of a barb: its angle as a function of time, as data.
+
+A motion begins at the angle where the barb is, and may depend on it; a sequence begins each of its steps where the step
+before ended. Evaluation is exact at any time, for many smarticles at once: no state is kept between two times.
+
+In a scene file angles are in degrees, in this module's functions in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import accumulate
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dem.setting.part import Duration, HingeAngle, Part
+
+Array = NDArray[np.float64]
+
+Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One stretch of a motion that is no sequence.
+
+    Args:
+        key: where the motion stands below the one it is a leg of, "" or e.g. "steps.1".
+        motion: the motion of this stretch.
+        start: angles [rad] at its beginning.
+        home: angles [rad] at the beginning of the phase.
+        until: how long it lasts [s].
+    """
+
+    key: str
+    motion: SimpleMotion
+    start: Array
+    home: Array
+    until: float
+
+    def extremes(self) -> tuple[Array, Array]:
+        """Lowest and highest angle [rad] of the stretch, for each start."""
+        low, high = self.motion.bounds(self.start, self.home, self.until)
+        return low + np.zeros_like(self.start), high + np.zeros_like(self.start)
+
+    def speed(self) -> float:
+        """Greatest speed [rad/s] over all starts, jumps apart."""
+        return float(np.max(self.motion.speeds(self.start, self.home)))
+
+
+class BaseMotion(Part):
+    """What all motions have in common."""
+
+    type: str
+
+    @property
+    def duration(self) -> float:
+        """Length [s]; inf: as long as its phase."""
+        raise NotImplementedError
+
+    @property
+    def period(self) -> float | None:
+        """Time [s] after which the motion repeats itself; None: it does not."""
+        return None
+
+    def course(self, start: Array, home: Array) -> Course:
+        """The motion from angles `start` [rad] on, in a phase that began at angles `home` [rad]."""
+        raise NotImplementedError
+
+    def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
+        """The stretches that make the motion up to the time `until` [s]; of repetitions only those that differ."""
+        raise NotImplementedError
+
+    def end(self, start: Array, home: Array) -> Array:
+        """Angles [rad] at the end of a motion of finite length."""
+        return self.course(start, home)(np.array(self.duration))
+
+    def angle(self, times: Array, start: Array | float) -> Array:
+        """Angles [rad] at times [s] since the phase began, given the angles [rad] at which it did.
+
+        Arrays are combined by NumPy's rules: times (T, 1) and starts (N,) give (T, N). Beyond the end of a motion what
+        is periodic goes on, all else stays where it is.
+        """
+        times, begun = np.asarray(times, dtype=np.float64), np.asarray(start, dtype=np.float64)
+        angles = np.empty(np.broadcast_shapes(times.shape, begun.shape))
+        angles[...] = self.course(begun, begun)(times)
+        return angles
+
+    def extremes(self, start: Array | float, until: float) -> tuple[Array, Array]:
+        """Lowest and highest angle [rad] that the motion asks for from its beginning to the time `until` [s].
+
+        Args:
+            start: angles [rad] at which the phase began, of any shape, which is that of the results.
+            until: end of the stretch of time [s]; must be finite for a motion that never ends.
+        """
+        begun = np.asarray(start, dtype=np.float64)
+        lows, highs = zip(*(leg.extremes() for leg in self.legs(begun, begun, until)), strict=True)
+        return np.min(lows, axis=0), np.max(highs, axis=0)
+
+    def speed(self, start: Array | float, until: float = math.inf) -> float:
+        """Greatest speed [rad/s] over all starts [rad], up to the time `until` [s].
+
+        A jump of the angle does not count: the motor follows it at its speed limit.
+        """
+        begun = np.asarray(start, dtype=np.float64)
+        return max(leg.speed() for leg in self.legs(begun, begun, until))
+
+
+class SimpleMotion(BaseMotion):
+    """A motion that is no sequence of others."""
+
+    pace: ClassVar[tuple[str, str]] = ("duration_s", "s")  # the key that sets the speed, and its unit
+
+    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array | float, Array | float]:
+        """Lowest and highest angle [rad] up to the time `until` [s]."""
+        raise NotImplementedError
+
+    def speeds(self, start: Array, home: Array) -> Array | float:
+        """Greatest speed [rad/s], jumps apart."""
+        raise NotImplementedError
+
+    def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
+        """See `BaseMotion.legs`."""
+        yield Leg("", self, start, home, until)
+
+
+class _Endless(SimpleMotion):
+    """A motion that lasts as long as its phase, unless it is given an end."""
+
+    duration_s: float | None = Field(None, gt=0, description="length [s]; default: as long as the phase")
+
+    @property
+    def duration(self) -> float:
+        """See `BaseMotion.duration`."""
+        return math.inf if self.duration_s is None else self.duration_s
+
+
+class Hold(_Endless):
+    """Keep the angle at which the motion begins."""
+
+    type: Literal["hold"]
+
+    def course(self, start: Array, home: Array) -> Course:
+        """See `BaseMotion.course`."""
+        return lambda times: start
+
+    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
+        """See `SimpleMotion.bounds`."""
+        return start, start
+
+    def speeds(self, start: Array, home: Array) -> float:
+        """See `SimpleMotion.speeds`."""
+        return 0.0
+
+
+class _Straight(SimpleMotion):
+    """Turn at a constant speed to an angle, and stay there."""
+
+    duration_s: Duration = Field(..., description="time that the turn takes [s]")
+
+    @property
+    def duration(self) -> float:
+        """See `BaseMotion.duration`."""
+        return self.duration_s
+
+    def goal(self, home: Array) -> Array:
+        """Angles [rad] at the end."""
+        raise NotImplementedError
+
+    def course(self, start: Array, home: Array) -> Course:
+        """See `BaseMotion.course`."""
+        goal, length = self.goal(home), self.duration_s
+
+        def at(times: Array) -> Array:
+            share = np.minimum(np.maximum(times / length, 0.0), 1.0)
+            # Weighted so that both ends are exact.
+            return np.asarray((1.0 - share) * start + share * goal)
+
+        return at
+
+    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
+        """See `SimpleMotion.bounds`."""
+        last = self.course(start, home)(np.array(until))
+        return np.minimum(start, last), np.maximum(start, last)
+
+    def speeds(self, start: Array, home: Array) -> Array:
+        """See `SimpleMotion.speeds`."""
+        return np.abs(self.goal(home) - start) / self.duration_s
+
+
+class Ramp(_Straight):
+    """Turn at a constant speed to a given angle."""
+
+    type: Literal["ramp"]
+    to_deg: HingeAngle = Field(..., description="angle at the end [deg]")
+
+    def goal(self, home: Array) -> Array:
+        """See `_Straight.goal`."""
+        return np.array(math.radians(self.to_deg))
+
+
+class Return(_Straight):
+    """Turn at a constant speed back to the angle at which the phase began."""
+
+    type: Literal["return"]
+
+    def goal(self, home: Array) -> Array:
+        """See `_Straight.goal`."""
+        return home
+
+
+class _Wave(_Endless):
+    """Swing about an angle, up first; the first point is jumped to."""
+
+    centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
+    amplitude_deg: float = Field(..., gt=0, description="largest distance from the centre, half the full swing [deg]")
+    cycles_offset: float = Field(0.0, description="cycles that lie behind at the beginning; 0.25: starts on top [1]")
+
+    @property
+    def frequency(self) -> float:
+        """Cycles per second [Hz]."""
+        raise NotImplementedError
+
+    @property
+    def period(self) -> float:
+        """See `BaseMotion.period`."""
+        return 1 / self.frequency
+
+    def swing(self, cycles: Array) -> Array:
+        """Distance from the centre over the amplitude [1] after a number of cycles."""
+        raise NotImplementedError
+
+    def course(self, start: Array, home: Array) -> Course:
+        """See `BaseMotion.course`."""
+        centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
+        frequency, offset = self.frequency, self.cycles_offset
+        return lambda times: centre + amplitude * self.swing(frequency * times + offset)
+
+    def bounds(self, start: Array, home: Array, until: float) -> tuple[float, float]:
+        """See `SimpleMotion.bounds`."""
+        first = self.cycles_offset
+        last = first + self.frequency * until
+        ends = self.swing(np.array([first, last] if math.isfinite(last) else [first]))
+        # Tops lie a quarter of a cycle after whole numbers of cycles, bottoms three quarters.
+        high = 1.0 if np.floor(last - 0.25) >= np.ceil(first - 0.25) else float(ends.max())
+        low = -1.0 if np.floor(last - 0.75) >= np.ceil(first - 0.75) else float(ends.min())
+        centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
+        return centre + amplitude * low, centre + amplitude * high
+
+
+class Sine(_Wave):
+    """Swing about an angle like a pendulum: centre + amplitude · sin(2π (frequency · t + offset))."""
+
+    type: Literal["sine"]
+    frequency_hz: float = Field(..., gt=0, description="cycles per second [Hz]")
+
+    pace: ClassVar[tuple[str, str]] = ("frequency_hz", "Hz")
+
+    @property
+    def frequency(self) -> float:
+        """See `_Wave.frequency`."""
+        return self.frequency_hz
+
+    def swing(self, cycles: Array) -> Array:
+        """See `_Wave.swing`."""
+        return np.sin(2 * math.pi * cycles)
+
+    def speeds(self, start: Array, home: Array) -> float:
+        """See `SimpleMotion.speeds`; the bound 2πfA, met in every half cycle."""
+        return 2 * math.pi * self.frequency_hz * math.radians(self.amplitude_deg)
+
+
+class Triangle(_Wave):
+    """Swing about an angle at a constant speed between the turning points."""
+
+    type: Literal["triangle"]
+    speed_rad_per_s: float = Field(..., gt=0, description="speed between the turning points [rad/s]")
+
+    pace: ClassVar[tuple[str, str]] = ("speed_rad_per_s", "rad/s")
+
+    @property
+    def frequency(self) -> float:
+        """See `_Wave.frequency`."""
+        return self.speed_rad_per_s / (4 * math.radians(self.amplitude_deg))
+
+    def swing(self, cycles: Array) -> Array:
+        """See `_Wave.swing`."""
+        quarter = cycles - 0.25
+        return 4 * np.abs(quarter - np.floor(quarter) - 0.5) - 1
+
+    def speeds(self, start: Array, home: Array) -> float:
+        """See `SimpleMotion.speeds`."""
+        return self.speed_rad_per_s
+
+
+class Sequence(BaseMotion):
+    """Motions one after the other, each from where the one before ended, once or again and again."""
+
+    type: Literal["sequence"]
+    steps: tuple[Motion, ...] = Field(..., description="motions in order, at least one")
+    repeat: int | None = Field(1, ge=1, description="how often the steps are run [1]; null: as long as the phase")
+
+    @model_validator(mode="after")
+    def _steps_end(self) -> Self:
+        if not self.steps:
+            msg = "steps: is empty; give at least one motion"
+            raise ValueError(msg)
+        once = self.repeat == 1
+        for number, step in enumerate(self.steps[:-1] if once else self.steps):
+            if math.isinf(step.duration):
+                where = "each step but the last" if once else "each step of a sequence that is repeated"
+                # What is missing in a sequence stands in the sequence: it repeats for ever, or its last step does.
+                key = "finite repeat" if isinstance(step, Sequence) and step.repeat is None else "duration_s"
+                msg = f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one"
+                raise ValueError(msg)
+        return self
+
+    @property
+    def _lengths(self) -> list[float]:
+        return [step.duration for step in self.steps]
+
+    @property
+    def duration(self) -> float:
+        """See `BaseMotion.duration`."""
+        return math.inf if self.repeat is None else self.repeat * sum(self._lengths)
+
+    @property
+    def period(self) -> float | None:
+        """See `BaseMotion.period`; the first time through may differ, as it starts elsewhere."""
+        return None if self.repeat == 1 else sum(self._lengths)
+
+    def _courses(self, start: Array, home: Array) -> list[Course]:
+        courses, begun = [], start
+        for step in self.steps:
+            courses.append(step.course(begun, home))
+            if math.isfinite(step.duration):
+                begun = step.end(begun, home)
+        return courses
+
+    def end(self, start: Array, home: Array) -> Array:
+        """See `BaseMotion.end`; however often the steps are gone through, as each time ends alike."""
+        for step in self.steps:
+            start = step.end(start, home)
+        return start
+
+    def course(self, start: Array, home: Array) -> Course:
+        """See `BaseMotion.course`."""
+        count, length, repeated = len(self.steps), sum(self._lengths), self.repeat != 1
+        begins = [0.0, *accumulate(self._lengths[:-1])]
+        courses = self._courses(start, home)
+        if repeated:
+            # From the second time on all repetitions are alike: wherever the steps begin, they end at a fixed angle,
+            # or, if all of them hold or return, where they began.
+            courses += self._courses(self.end(start, home), home)
+
+        # An end belongs to what ends there, so that the last angle of a sequence is that of its last step.
+        def at_one(time: float, times: Array) -> Array:
+            cycle = max(math.ceil(time / length) - 1, 0) if repeated else 0
+            begun = cycle * length if cycle else 0.0
+            step = bisect_left(begins, time - begun, lo=1) - 1
+            return courses[step + count * (cycle > 0)](times - (begun + begins[step]))
+
+        def at(times: Array) -> Array:
+            if times.size == 1:  # as for smarticles that move together, at every look of the motor control
+                return at_one(times.item(), times)
+            cycles = np.maximum(np.ceil(times / length) - 1, 0) if repeated else np.zeros_like(times)
+            local = times - cycles * length if repeated else times
+            slots = np.searchsorted(begins[1:], local) + count * (cycles > 0)
+            angles = np.empty(np.broadcast_shapes(times.shape, start.shape))
+            for slot in np.unique(slots):
+                np.copyto(angles, courses[slot](local - begins[slot % count]), where=slots == slot)
+            return angles
+
+        return at
+
+    def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
+        """See `BaseMotion.legs`."""
+        begun = 0.0
+        for _ in range(1 if self.repeat == 1 else 2):
+            for number, step in enumerate(self.steps):
+                if begun > 0 and begun >= until:
+                    return
+                left, last = until - begun, self.repeat == 1 and number == len(self.steps) - 1
+                for leg in step.legs(start, home, left if last else min(left, step.duration)):
+                    yield replace(leg, key=f"steps.{number}.{leg.key}".removesuffix("."))
+                begun += step.duration
+                if math.isfinite(begun):
+                    start = step.end(start, home)
+
+
+Simple = Hold | Ramp | Return | Sine | Triangle
+Motion = Annotated[Simple | Sequence, Field(discriminator="type")]
+Sequence.model_rebuild()

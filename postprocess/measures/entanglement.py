@@ -1,0 +1,272 @@
+"""Which links pass through which smarticles.
+
+The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the
+mouth. A link of another smarticle B passes through it if its ends lie strictly on the two sides of
+the plane and it meets the plane strictly inside the quadrilateral. Touching is not passing: a link
+that ends in the plane, lies in it, or meets an edge of the quadrilateral does not count, to within
+1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave or cross itself; inside is
+then what its outline winds around.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from postprocess.measures.geometry import bounding_spheres, checked_vertices, link_lengths, plane_frames
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+STRAIGHT = 0.99
+"""Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]."""
+
+_TOLERANCE = 1e-9
+# Pairs of smarticles held in memory at a time.
+_CHUNK = 100_000
+
+
+class CrossingPairs(NamedTuple):
+    """Pairs of smarticles of which one passes through the other; the edges of a directed graph.
+
+    Attributes:
+        i: (P,) int64, the smarticle passed through.
+        j: (P,) int64, the smarticle that passes.
+        links: (P,) int64, how many of j's links pass, 1 to 3.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    links: NDArray[np.int64]
+
+
+class LinkedPairs(NamedTuple):
+    """Pairs of smarticles that are linked when both are closed across their mouths.
+
+    Attributes:
+        i: (P,) int64, the lower index.
+        j: (P,) int64, the higher index.
+        number: (P,) int64, the linking number, never 0; its sign follows the order of the vertices.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    number: NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Entanglement:
+    """Crossings of all smarticles of a frame.
+
+    Attributes:
+        crossings: (N,) int64, links of others through each smarticle's plane; 0 without a plane.
+        has_plane: (N,) bool, False for (nearly) straight smarticles, which have no plane.
+        mean: Mean over the smarticles that have a plane [-]; NaN if none has.
+    """
+
+    crossings: NDArray[np.int64] = field(repr=False)
+    has_plane: NDArray[np.bool_] = field(repr=False)
+    mean: float
+
+
+def entanglement(vertices: ArrayLike) -> Entanglement:
+    """Crossings of all smarticles, with what the mean needs to skip.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        The crossings and their mean.
+
+    Raises:
+        InputError: Bad vertices.
+
+    Source:
+        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles
+        are skipped as A only, and a smarticle that passes twice counts twice.
+    """
+    vertices = checked_vertices(vertices)
+    planes = has_plane(vertices)
+    crossings = link_crossings(vertices)
+    mean = float(crossings[planes].mean()) if np.any(planes) else float("nan")
+    return Entanglement(crossings=crossings, has_plane=planes, mean=mean)
+
+
+def link_crossings(vertices: ArrayLike) -> NDArray[np.int64]:
+    """How many links of other smarticles pass through each smarticle's plane.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        (N,) int64; 0 for straight smarticles, see `has_plane`.
+
+    Raises:
+        InputError: Bad vertices.
+
+    Source:
+        Savoie et al., Soft Matter 2023, ⟨N⟩; the module's docstring has the rule at the boundary.
+
+    Example:
+        >>> u = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
+        >>> other = np.array([[0.0, 3, -1], [0, 1, -1], [0, 1, 1], [0, 3, 1]])
+        >>> link_crossings([u, other])
+        array([1, 0])
+    """
+    vertices = checked_vertices(vertices)
+    pairs = crossing_pairs(vertices)
+    counts = np.zeros(len(vertices), dtype=np.int64)
+    np.add.at(counts, pairs.i, pairs.links)
+    return counts
+
+
+def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
+    """The pairs behind `link_crossings`, for graphs of entanglement.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        Pairs with at least one link passing, sorted by i, then j.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    vertices = checked_vertices(vertices)
+    i, j = _close_pairs(vertices, has_plane(vertices))
+    links = (_signed_crossings(vertices, i, j, closed=False) != 0).sum(axis=1)
+    return CrossingPairs(*_sorted_nonzero(i, j, links))
+
+
+def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
+    """Linking numbers of smarticles closed across their mouths, a topological cross-check.
+
+    Counts how often the outline of one passes through the other, with sign. Unlike the number of
+    crossings it does not depend on which of the two is asked, and a link that passes in and out
+    again adds nothing.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        Pairs with a linking number other than 0, sorted by i, then j; pairs with a straight
+        smarticle are left out.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    vertices = checked_vertices(vertices)
+    planes = has_plane(vertices)
+    i, j = _close_pairs(vertices, planes)
+    once = (i < j) & planes[j]
+    i, j = i[once], j[once]
+    number = _signed_crossings(vertices, i, j, closed=True).sum(axis=1)
+    return LinkedPairs(*_sorted_nonzero(i, j, number))
+
+
+def has_plane(vertices: ArrayLike) -> NDArray[np.bool_]:
+    """Which smarticles are bent enough to span a plane.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        (N,) bool, False where the tips are further apart than 0.99 (2l + w), or where all four
+        vertices lie on one line.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    vertices = checked_vertices(vertices)
+    unfolded = link_lengths(vertices).sum(axis=1)
+    mouth = np.linalg.norm(vertices[:, 3] - vertices[:, 0], axis=1)
+    spread = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True), compute_uv=False)
+    bent: NDArray[np.bool_] = (mouth <= STRAIGHT * unfolded) & (spread[:, 1] > 1e-6 * unfolded)
+    return bent
+
+
+def _close_pairs(
+    vertices: NDArray[np.float64], planes: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
+    if len(vertices) < 2:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    centres, radii = bounding_spheres(vertices)
+    pairs = cKDTree(centres).query_pairs(2 * radii.max(), output_type="ndarray")
+    distance = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1)
+    pairs = pairs[distance < radii[pairs].sum(axis=1)]
+    i, j = np.concatenate([pairs, pairs[:, ::-1]]).astype(np.int64).T
+    return i[planes[i]], j[planes[i]]
+
+
+def _signed_crossings(
+    vertices: NDArray[np.float64],
+    i: NDArray[np.int64],
+    j: NDArray[np.int64],
+    *,
+    closed: bool,
+) -> NDArray[np.int64]:
+    """Passages of the links of j through i: (P, 3), or (P, 4) with j's mouth as a fourth.
+
+    The sign is that of the passage along the plane's normal times that of the winding of the
+    outline about it.
+    """
+    centres, radii = bounding_spheres(vertices)
+    frames = plane_frames(vertices)
+    corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
+    signs = np.zeros((len(i), 4 if closed else 3), dtype=np.int64)
+    for start in range(0, len(i), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        a, b = i[part], j[part]
+        relative = vertices[b] - centres[a, None]
+        heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
+        heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
+        ends = np.roll(heights, -1, axis=1)
+        row, link = np.nonzero((heights * ends < 0)[:, : signs.shape[1]])
+        below, above = heights[row, link], ends[row, link]
+        from_, to = relative[row, link], relative[row, (link + 1) % 4]
+        hits = from_ + (below / (below - above))[:, None] * (to - from_)
+        flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
+        winding = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]])
+        signs[start + row, link] = winding * np.sign(above - below).astype(np.int64)
+    return signs
+
+
+def _winding(
+    points: NDArray[np.float64], corners: NDArray[np.float64], tolerance: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """How often the outline of each quadrilateral winds around its point; 0 on an edge.
+
+    Args:
+        points: (n, 2) [m].
+        corners: (n, 4, 2) [m].
+        tolerance: (n,) [m], distance from an edge up to which a point lies on it.
+
+    Returns:
+        (n,) int64.
+    """
+    starts = corners - points[:, None]
+    ends = np.roll(starts, -1, axis=1)
+    edges = ends - starts
+    left = starts[..., 0] * ends[..., 1] - starts[..., 1] * ends[..., 0]
+    upward = (starts[..., 1] <= 0) & (ends[..., 1] > 0) & (left > 0)
+    downward = (starts[..., 1] > 0) & (ends[..., 1] <= 0) & (left < 0)
+    winding = upward.sum(axis=1) - downward.sum(axis=1)
+    # Nearest point of each edge; an edge of no length (l = 0) is its starting point.
+    squared = np.maximum((edges**2).sum(axis=2), 1e-300)
+    share = np.clip(-(starts * edges).sum(axis=2) / squared, 0, 1)
+    gaps = np.linalg.norm(starts + share[..., None] * edges, axis=2).min(axis=1)
+    winding[gaps <= tolerance] = 0
+    counts: NDArray[np.int64] = winding.astype(np.int64)
+    return counts
+
+
+def _sorted_nonzero(
+    i: NDArray[np.int64], j: NDArray[np.int64], number: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    keep = np.nonzero(number)[0]
+    order = keep[np.lexsort((j[keep], i[keep]))]
+    return i[order], j[order], number[order]

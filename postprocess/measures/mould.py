@@ -1,0 +1,103 @@
+"""How well a pile fills the tiers of a mould, and what of that is there when the mould is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postprocess.measures.geometry import checked_vertices, link_lengths
+from postprocess.measures.outline import outlines
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from postprocess.measures.region import Cylinder
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cast:
+    """A pile in its mould, and the same pile without it.
+
+    Attributes:
+        filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.measures.outline` [-].
+        filled_after: (T,) the same without the mould [-].
+        kept: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier.
+        material_before: (T,) share of all links' length inside each tier [-].
+        material_after: (T,) the same without the mould [-].
+        overlap: Volume common to the pile before and after over that of both together (Jaccard) [-].
+        likeness: The same of the pile after and the whole mould: 1 for a perfect cast [-].
+        likeness_before: The same of the pile before and the mould [-].
+    """
+
+    filled_before: NDArray[np.float64]
+    filled_after: NDArray[np.float64]
+    kept: NDArray[np.float64]
+    material_before: NDArray[np.float64]
+    material_after: NDArray[np.float64]
+    overlap: float
+    likeness: float
+    likeness_before: float
+
+
+def cast(
+    before: ArrayLike,
+    after: ArrayLike,
+    tiers: Sequence[Cylinder],
+    *,
+    thickness: float,
+    ball: float,
+    pitch: float | None = None,
+) -> Cast:
+    """Compares a pile in a mould with the same pile after the mould was taken away.
+
+    Shares of a tier are of its voxels, so that a tier that is all inside the pile has 1 and one without a link
+    has 0, however coarse the voxels.
+
+    Args:
+        before: (N, 4, 3) [m], in the mould, heights above the floor.
+        after: (N, 4, 3) [m], without the mould.
+        tiers: T cylinders, from the lowest, heights above the floor.
+        thickness: Of the links, taken as round [m].
+        ball: Radius of the ball that the outline is found with [m].
+        pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
+
+    Returns:
+        Shares and overlaps.
+
+    Raises:
+        InputError: Bad vertices or sizes.
+        UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
+    """
+    found = outlines([before, after], thickness=thickness, ball=ball, pitch=pitch, regions=tiers)
+    one, other = found.inside
+    masks = [found.within(tier) for tier in tiers]
+    mould = np.logical_or.reduce(masks)
+    return Cast(
+        filled_before=np.array([_share(one & mask, mask) for mask in masks]),
+        filled_after=np.array([_share(other & mask, mask) for mask in masks]),
+        kept=np.array([_share(one & other & mask, one & mask) for mask in masks]),
+        material_before=_material(before, tiers),
+        material_after=_material(after, tiers),
+        overlap=_share(one & other, one | other),
+        likeness=_share(other & mould, other | mould),
+        likeness_before=_share(one & mould, one | mould),
+    )
+
+
+def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+    total = int(whole.sum())
+    return float(part.sum() / total) if total else float("nan")
+
+
+def _material(vertices: ArrayLike, tiers: Sequence[Cylinder], samples: int = 50) -> NDArray[np.float64]:
+    """(T,) share of all links' length in each tier, by points evenly along each link."""
+    vertices = checked_vertices(vertices)
+    shares = (np.arange(samples) + 0.5) / samples
+    along = np.diff(vertices, axis=1)[:, :, None]
+    points = (vertices[:, :-1, None] + shares[:, None] * along).reshape(-1, 3)
+    weights = np.repeat(link_lengths(vertices).ravel(), samples)
+    inside: NDArray[np.float64] = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
+    return inside

@@ -1,0 +1,147 @@
+"""Packing fraction of a pile in a cylinder, by named definitions.
+
+One definition alone moves the value by several per cent, so each result names its own. No
+definition corrects the container's radius.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+from postprocess.errors import UndefinedMeasureError
+from postprocess.measures.geometry import checked_vertices
+from postprocess.measures.heights import heights, material_height
+from postprocess.measures.region import Cylinder, inner_region
+from postprocess.measures.voronoi import local_packing
+from postprocess.measures.voxel import solid_fraction
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+DEFINITIONS: Mapping[str, str] = MappingProxyType(
+    {
+        "second-highest-com": ("N V_s / (π r² z), z = second-highest smarticle centre of mass above the floor"),
+        "top-percentile": ("N V_s / (π r² h), 95 % of the links' material lies below h above the floor"),
+        "voxel": ("share of the inner cylinder (0.75 r, 20 % to 80 % of the height) inside the true boxes"),
+        "voronoi": ("V_s over the mean set-Voronoi cell of the smarticles centred in the inner cylinder"),
+    }
+)
+"""Each definition of the packing fraction with its meaning, for listings and help."""
+
+COSTLY_DEFINITIONS = frozenset({"voxel", "voronoi"})
+"""Definitions that take tenths of a second or more per frame; the others take milliseconds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackingFraction:
+    """A packing fraction that names its definition.
+
+    Attributes:
+        value: Solid volume over volume [-].
+        definition: Key of `DEFINITIONS`.
+        height: Height of the pile above the floor that the definition used [m].
+    """
+
+    value: float
+    definition: str
+    height: float
+
+
+def packing_fraction(
+    vertices: ArrayLike,
+    *,
+    radius: float,
+    solid_volume: float,
+    definition: str = "second-highest-com",
+    floor_z: float = 0.0,
+    axis: tuple[float, float] = (0.0, 0.0),
+    percentile: float = 95.0,
+    thickness_normal: float | None = None,
+    thickness_in_plane: float | None = None,
+    inner: float = 0.75,
+    low: float = 0.2,
+    high: float = 0.8,
+    spacing: float | None = None,
+) -> PackingFraction:
+    """Packing fraction of smarticles in an upright cylinder.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        radius: Radius of the container [m].
+        solid_volume: Volume of one smarticle [m³].
+        definition: Key of `DEFINITIONS`.
+        floor_z: Height of the container's floor [m].
+        axis: x and y of the container's axis [m].
+        percentile: Share of the material below the height, for all but the first definition [%].
+        thickness_normal: t1, along the normal of the smarticle's plane [m]; "voxel" only.
+        thickness_in_plane: t2, in the smarticle's plane [m]; "voxel" only.
+        inner: Radius of the inner cylinder as a share of the container's [-].
+        low: Lower end of the inner cylinder as a share of the height [-].
+        high: Upper end of the inner cylinder as a share of the height [-].
+        spacing: Distance of grid points ("voxel") or of points along links ("voronoi") [m]; half
+            the smaller thickness, or w/8, if not given.
+
+    Returns:
+        The packing fraction with its definition and the height it used.
+
+    Raises:
+        InputError: Unknown definition, bad vertices or sizes, or missing thicknesses.
+        UndefinedMeasureError: Too few smarticles, or none where the definition looks.
+
+    Source:
+        "second-highest-com": wsavoie/SmarticleSim, without the factor (0.0234/0.0224)² = 1.091
+        that one of its scripts applies. "voronoi": see `postprocess.measures.voronoi`.
+
+    Example:
+        >>> result = packing_fraction(  # doctest: +SKIP
+        ...     frame.vertices, radius=0.0234, solid_volume=1.783e-8, floor_z=frame.floor_z
+        ... )
+        >>> result.value, result.definition  # doctest: +SKIP
+    """
+    vertices = checked_vertices(vertices)
+    if definition not in DEFINITIONS:
+        msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"
+        raise InputError(msg)
+    for name, size, unit in (("radius", radius, "m"), ("solid_volume", solid_volume, "m³")):
+        if not (math.isfinite(size) and size > 0):
+            msg = f"{name} must be above 0 {unit}: got {size} {unit}"
+            raise InputError(msg)
+    if len(vertices) < 2:
+        msg = f"a packing fraction needs at least 2 smarticles: got {len(vertices)}"
+        raise UndefinedMeasureError(msg)
+    if definition == "second-highest-com":
+        height = heights(vertices, floor_z=floor_z).second_highest_com
+    else:
+        height = material_height(vertices, floor_z=floor_z, percentile=percentile)
+    if not height > 0:
+        msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
+        raise UndefinedMeasureError(msg)
+    pile = Cylinder(radius=radius, bottom=floor_z, top=floor_z + height, axis=axis)
+    if definition == "voxel":
+        if thickness_normal is None or thickness_in_plane is None:
+            msg = "definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None"
+            raise InputError(msg)
+        value = solid_fraction(
+            vertices,
+            inner_region(pile, inner=inner, low=low, high=high),
+            thickness_normal=thickness_normal,
+            thickness_in_plane=thickness_in_plane,
+            pitch=spacing,
+        )
+    elif definition == "voronoi":
+        value = local_packing(
+            vertices,
+            pile,
+            inner_region(pile, inner=inner, low=low, high=high),
+            solid_volume=solid_volume,
+            spacing=spacing,
+        ).value
+    else:
+        value = len(vertices) * solid_volume / pile.volume
+    return PackingFraction(value=value, definition=definition, height=height)

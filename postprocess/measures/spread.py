@@ -1,0 +1,232 @@
+"""A pile that no wall holds any more: how far it spreads, how it leans, and what came off it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dem.errors import InputError
+from postprocess.errors import UndefinedMeasureError
+from postprocess.measures.clusters import contact_clusters, entanglement_clusters
+from postprocess.measures.geometry import centres_of_mass, checked_vertices, link_lengths
+from postprocess.statistics.bisection import least_reaching
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from postprocess.manifest import RunManifest
+
+TOUCHING = 1.05
+"""Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
+
+Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
+centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles."""
+
+OUTSIDE = 0.5
+"""How far beyond the wall that was, in w, a centre of mass must be to have come off the pile [-].
+
+A smarticle reaches about w/2 from its centre of mass: it then lies as a whole where no smarticle was. Distances are
+from the middle of the pile, wherever that is by now: a pile that fell over as a whole has shed nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreePile:
+    """A pile without a wall.
+
+    Attributes:
+        touching: Share of the smarticles in the largest cluster joined by contact [-].
+        entangled: Share of them in the largest cluster joined by entanglement [-].
+        radius_half: Radius about the vertical through the centre of mass that holds half of the material [m].
+        radius_most: The same for 95 % [m].
+        sloughed: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-].
+        tilt: Angle of the pile from the vertical [degree], see `tilt`.
+        offset: How far the centre of mass is from the vertical through the foot [m].
+    """
+
+    touching: float
+    entangled: float
+    radius_half: float
+    radius_most: float
+    sloughed: float
+    tilt: float
+    offset: float
+
+
+def free_pile(
+    vertices: ArrayLike,
+    run: RunManifest,
+    *,
+    floor_z: float = 0.0,
+    foot: tuple[float, float] = (0.0, 0.0),
+) -> FreePile:
+    """All measures of a pile without a wall.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        run: The run, for its container and its smarticles.
+        floor_z: Height of the floor [m].
+        foot: x and y of the point that the pile stands on [m]: the container's axis if not given, better the place
+            of the centre of mass while the wall was there.
+
+    Returns:
+        The measures.
+
+    Raises:
+        InputError: Bad vertices.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    vertices = checked_vertices(vertices)
+    centre = centre_of_mass(vertices)
+    return FreePile(
+        touching=contact_clusters(vertices, TOUCHING * run.sphere_diameter).largest,
+        entangled=entanglement_clusters(vertices).largest,
+        radius_half=spread_radius(vertices, share=0.5),
+        radius_most=spread_radius(vertices, share=0.95),
+        sloughed=share_outside(vertices, run.container_radius + OUTSIDE * run.middle_length, axis=middle(vertices)),
+        tilt=math.degrees(tilt(vertices, foot=foot, floor_z=floor_z)),
+        offset=math.hypot(centre[0] - foot[0], centre[1] - foot[1]),
+    )
+
+
+def centre_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
+    """(3,) [m], of the whole pile.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Raises:
+        InputError: Bad vertices.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    vertices = checked_vertices(vertices)
+    if len(vertices) == 0:
+        msg = "a centre of mass needs at least 1 smarticle: got 0"
+        raise UndefinedMeasureError(msg)
+    # Smarticles may differ in length, so their centres are weighted by it.
+    weights = link_lengths(vertices).sum(axis=1)
+    centre: NDArray[np.float64] = np.average(centres_of_mass(vertices), axis=0, weights=weights)
+    return centre
+
+
+def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float] | None = None) -> float:
+    """Radius about a vertical axis that holds a given share of the links' material.
+
+    The material is spread evenly along each link's centreline. What of a link lies within a radius is where a
+    straight line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        share: Of the material [-], above 0 and up to 1.
+        axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
+
+    Returns:
+        The radius [m].
+
+    Raises:
+        InputError: Bad vertices or share.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    vertices = checked_vertices(vertices)
+    if not 0 < share <= 1:
+        msg = f"share must be above 0 and up to 1 of the material: got {share}; 0.95 is usual"
+        raise InputError(msg)
+    centre = centre_of_mass(vertices)[:2] if axis is None else np.asarray(axis)
+    points = vertices[:, :, :2] - centre
+    start, along = points[:, :-1].reshape(-1, 2), np.diff(points, axis=1).reshape(-1, 2)
+    weights = link_lengths(vertices).ravel()
+    wanted = share * weights.sum()
+    farthest = float(np.linalg.norm(points, axis=2).max())
+    return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), wanted, 0.0, farthest)
+
+
+def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
+    """Share of the smarticles whose centre of mass is farther than a radius from a vertical axis.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        radius: [m].
+        axis: x and y of the axis [m].
+
+    Returns:
+        The share [-].
+
+    Raises:
+        InputError: Bad vertices.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    centres = centres_of_mass(vertices)
+    if len(centres) == 0:
+        msg = "a share of smarticles needs at least 1 of them: got 0"
+        raise UndefinedMeasureError(msg)
+    return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
+
+
+def middle(vertices: ArrayLike) -> tuple[float, float]:
+    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
+    return float(x), float(y)
+
+
+def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
+    """Angle between the vertical and the line from a pile's foot to its centre of mass.
+
+    A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
+    none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than
+    about 1.7 times its radius (a solid cylinder's axes change places there), and it cannot tell a leaning pile from a
+    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has
+    fallen over lies above the middle of its side, and would be upright.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        foot: x and y of the point of the floor that the pile stood on [m].
+        floor_z: Height of the floor [m].
+
+    Returns:
+        The angle [rad], 0 to π/2.
+
+    Raises:
+        InputError: Bad vertices.
+        UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
+    """
+    x, y, z = centre_of_mass(vertices) - [*foot, floor_z]
+    if not z > 0:
+        msg = f"the centre of mass is {-z:g} m below the floor; check floor_z"
+        raise UndefinedMeasureError(msg)
+    return math.atan2(math.hypot(x, y), z)
+
+
+def has_toppled(offset: float, base_radius: float) -> bool:
+    """Whether a pile has fallen over: its centre of mass is no longer above the base that it stood on.
+
+    A body stands as long as the vertical through its centre of mass meets its base; beyond its edge, weight turns it
+    over. A pile that spreads or sheds smarticles to all sides keeps its centre of mass where it was.
+
+    Args:
+        offset: Distance of the centre of mass from the vertical through the foot [m].
+        base_radius: Radius of the base before the pile was free, such as that which holds 95 % of it [m].
+    """
+    return offset > base_radius
+
+
+def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """(n,) shares of straight lines (start, start + along), each (n, 2), within a circle about the origin."""
+    square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
+    inside = radius**2 - (start**2).sum(axis=1)
+    # Upright links are points seen from above.
+    upright = square <= 1e-24 + 1e-18 * radius**2
+    safe = np.where(upright, 1.0, square)
+    root = mixed**2 + safe * inside
+    reach = np.sqrt(np.maximum(root, 0.0))
+    first, last = (np.clip((-mixed + sign * reach) / safe, 0, 1) for sign in (-1, 1))
+    shares: NDArray[np.float64] = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
+    return shares

@@ -1,0 +1,393 @@
+"""Measures of whole runs as tidy tables: one row per frame, or one per phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pandas as pd
+
+from dem.errors import InputError
+from postprocess.errors import UndefinedMeasureError
+from postprocess.frames import read_frames
+from postprocess.manifest import read_run
+from postprocess.measures.entanglement import entanglement
+from postprocess.measures.geometry import centres_of_mass
+from postprocess.measures.heights import heights
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_fraction
+from postprocess.measures.pull import PULL, has_pull, pull_columns
+from postprocess.measures.spread import free_pile
+from postprocess.measures.strain import STRAIN, has_strain, strain_columns
+from postprocess.series import Series, read_series
+from postprocess.statistics.averages import Mean, mean_with_error
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
+
+    from postprocess.frames import Frame, FrameSequence
+    from postprocess.manifest import RunManifest
+
+Costly = Literal["never", "phase-end", "every-frame"]
+"""When to take the packing fractions of `COSTLY_DEFINITIONS`."""
+
+PASSIVE_PHASES = frozenset({"deposit", "relax"})
+"""Types of phase in which nothing drives the pile; all others count as activity."""
+
+LAST_FRAMES = 20
+"""Frames averaged at the end of a phase, as in Savoie et al."""
+
+_LABELS = ("run", "name", "seed", "aspect ratio [-]", "count", "fidelity", "scene_sha256")
+_SERIES_COLUMNS = {
+    "container_z_m": "container z",
+    "container_velocity_m_per_s": "container velocity",
+    "container_force_N": "container force",
+    "kinetic_energy_J": "kinetic energy",
+    "max_speed_m_per_s": "max speed",
+    "unbalanced_force": "unbalanced force",
+    "gravitational_energy_J": "gravitational energy",
+    "container_work_J": "container work",
+    "motor_work_J": "motor work",
+    "commanded_angle_rad": "commanded angle",
+    "angle_rad": "angle",
+    "schedule_error_rad": "schedule error",
+    "tracking_error_rad": "tracking error",
+    "motor_torque_N_m": "motor torque",
+    "halted_fraction": "halted fraction",
+    "joint_gap_m": "joint gap",
+    "hook_upper_force_N": "upper hook force",
+    "hook_lower_force_N": "lower hook force",
+    "hook_upper_z_m": "upper hook z",
+    "string_fixed_force_N": "fixed string force",
+    "string_pulled_force_N": "pulled string force",
+    "channel_lower_force_N": "lower wall force",
+    "channel_upper_force_N": "upper wall force",
+    "pulled_m": "pulled",
+    "chain_length_m": "chain length",
+    "chain_width_m": "chain width",
+}
+# What the columns of a series of vectors are, by their number.
+_COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
+# Recorded by the engine and measured here from the frames as well.
+_SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackingChange:
+    """Packing fraction before and at the end of the activity of a run.
+
+    Attributes:
+        before: φ_0, mean over the last frames of the phase before the first activity [-].
+        after: φ_f, mean over the last frames of the last activity [-].
+        definition: Key of `packing.DEFINITIONS`.
+        phase_before: Index of the phase of φ_0.
+        phase_after: Index of the phase of φ_f.
+    """
+
+    before: Mean
+    after: Mean
+    definition: str
+    phase_before: int
+    phase_after: int
+
+
+def measure_run(
+    directory: Path | str,
+    *,
+    definitions: Sequence[str] = tuple(DEFINITIONS),
+    costly: Costly = "phase-end",
+) -> pd.DataFrame:
+    """All measures of a run, one row per frame; the run may be done, failed or still going on.
+
+    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings
+    of straight ones) is NaN, as are costly values where they were not asked for. What the engine
+    recorded in `series.h5` is taken at the sample nearest in time, if that file exists.
+
+    Args:
+        directory: A run directory.
+        definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
+        costly: Whether the costly ones among them are taken never, at the last frame of each
+            phase recorded so far, or at every frame.
+
+    Returns:
+        A table with units in its column names.
+
+    Raises:
+        InputError: Unknown definition, or a file is missing or damaged.
+    """
+    manifest, frames, series = _open(directory, definitions)
+    rows: list[dict[str, object]] = []
+    for part in _phases(manifest, frames):
+        rows += _rows(part, manifest, series, definitions, costly, offset=len(rows))
+    return pd.DataFrame(rows)
+
+
+def summarise_run(
+    directory: Path | str,
+    *,
+    last: int = LAST_FRAMES,
+    definitions: Sequence[str] = tuple(DEFINITIONS),
+    costly: Costly = "phase-end",
+    phases: Collection[int] | None = None,
+) -> pd.DataFrame:
+    """Measures of a run averaged over the last frames of each phase, one row per phase.
+
+    Each measure has a second column, "… SE", with the standard error of the mean as in
+    `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
+    those of the last frame alone, without an error, unless asked for at every frame. A phase that pulls a
+    hook has the measures of `pull.pull_columns` as well, one that strains a chain those of `strain.strain_columns`.
+
+    Args:
+        directory: A run directory.
+        last: Frames to average; "frames averaged" says how many there were.
+        definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
+        costly: When to take the costly ones among them, see `measure_run`.
+        phases: Indices of the phases wanted; all if not given.
+
+    Returns:
+        A table with units in its column names.
+
+    Raises:
+        InputError: Unknown definition, `last` below 1, or a file is missing or damaged.
+    """
+    _check_last(last)
+    manifest, frames, series = _open(directory, definitions)
+    summaries = []
+    for part in _phases(manifest, frames):
+        if phases is not None and part[0].phase not in phases:
+            continue
+        table = pd.DataFrame(_rows(part[-last:], manifest, series, definitions, costly))
+        final = table.iloc[-1]
+        kept = [*_LABELS, "phase", "phase type"]
+        summary = {name: final[name] for name in kept}
+        summary |= {"time [s]": final["time [s]"], "frames averaged": len(table)}
+        for name in table.columns.difference([*summary, "frame"], sort=False):
+            mean = mean_with_error(table[name])
+            quantity, _, unit = name.rpartition(" [")
+            summary[name] = mean.value
+            summary[f"{quantity} SE [{unit}"] = mean.standard_error
+        if series is not None:
+            summary |= _test_columns(manifest, series, part[0].phase)
+        summaries.append(summary)
+    return pd.DataFrame(summaries)
+
+
+def _test_columns(manifest: RunManifest, series: Series, phase: int) -> dict[str, float]:
+    """What a phase tells that tests the pile or a chain: of the whole phase, not of its last frames."""
+    kind = manifest.phases[phase].type
+    if kind == PULL and has_pull(series, phase):
+        return pull_columns(manifest, series, phase)
+    if kind == STRAIN and has_strain(series):
+        return strain_columns(manifest)
+    return {}
+
+
+def packing_change(
+    directory: Path | str,
+    *,
+    definition: str = "second-highest-com",
+    last: int = LAST_FRAMES,
+    activity: Collection[str] | None = None,
+) -> PackingChange:
+    """φ_0 and φ_f of a run: before its first activity and at the end of its last one.
+
+    Only frames of the one phase are averaged, even if it has fewer than asked for: those before
+    it belong to another state of the pile.
+
+    Args:
+        directory: A run directory.
+        definition: Key of `packing.DEFINITIONS`.
+        last: Frames to average; the results say how many there were.
+        activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
+
+    Returns:
+        Both means with their errors.
+
+    Raises:
+        InputError: The run has no activity, has not come to it, or a file is missing or damaged.
+
+    Source:
+        changeInPhiAmp.m of wsavoie/SmarticleSim: means over 20 samples.
+    """
+    _check_last(last)
+    manifest, frames, _ = _open(directory, [definition])
+    active = [
+        phase.index
+        for phase in manifest.phases
+        if (phase.type not in PASSIVE_PHASES if activity is None else phase.type in activity)
+    ]
+    if not active or active[0] == 0:
+        types = ", ".join(phase.type for phase in manifest.phases)
+        msg = (
+            f"run {directory} has no activity with a phase before it: its phases are {types}; "
+            f"name its types of activity or choose another run"
+        )
+        raise InputError(msg)
+    before, after = active[0] - 1, active[-1]
+    means = []
+    for phase in (before, after):
+        part = frames.in_phase(phase)[-last:]
+        if not part:
+            kind = manifest.phases[phase].type
+            msg = f"run {directory} has no frame of phase {phase} ({kind}) yet; wait or resume it"
+            raise InputError(msg)
+        means.append(mean_with_error([_phi(frame, manifest, definition) for frame in part]))
+    return PackingChange(
+        before=means[0],
+        after=means[1],
+        definition=definition,
+        phase_before=before,
+        phase_after=after,
+    )
+
+
+def _check_last(last: int) -> None:
+    if last < 1:
+        msg = f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual"
+        raise InputError(msg)
+
+
+def _open(directory: Path | str, definitions: Iterable[str]) -> tuple[RunManifest, FrameSequence, Series | None]:
+    for definition in definitions:
+        if definition not in DEFINITIONS:
+            msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"
+            raise InputError(msg)
+    manifest = read_run(directory)
+    frames = read_frames(directory)
+    # A run that failed early may have frames and no series.
+    has_series = (manifest.directory / "series.h5").exists()
+    return manifest, frames, read_series(directory) if has_series else None
+
+
+def _phases(manifest: RunManifest, frames: FrameSequence) -> list[FrameSequence]:
+    """The frames of each phase that has any."""
+    parts = [frames.in_phase(phase.index) for phase in manifest.phases]
+    if sum(map(len, parts)) != len(frames):
+        msg = (
+            f"frames of {manifest.directory} name phases that run.json does not have "
+            f"(it has {len(parts)}), or not in order; run it again into a new directory"
+        )
+        raise InputError(msg)
+    return [part for part in parts if part]
+
+
+def _rows(
+    part: FrameSequence,
+    manifest: RunManifest,
+    series: Series | None,
+    definitions: Sequence[str],
+    costly: Costly,
+    *,
+    offset: int = 0,
+) -> list[dict[str, object]]:
+    """One row per frame of a part of one phase; `offset` is the number of its first frame."""
+    rows: list[dict[str, object]] = []
+    for number, frame in enumerate(part):
+        take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
+        row: dict[str, object] = _labels(manifest)
+        row |= {
+            "frame": offset + number,
+            "time [s]": frame.time,
+            "phase": frame.phase,
+            "phase type": manifest.phases[frame.phase].type,
+        }
+        row |= _shape_columns(frame, manifest)
+        if not (manifest.planar or manifest.walled(manifest.phases[-1].index)):
+            row |= _free_columns(frame, manifest)
+        for definition in definitions if not manifest.planar else ():
+            wanted = take_costly or definition not in COSTLY_DEFINITIONS
+            phi = _phi(frame, manifest, definition) if wanted else float("nan")
+            row[f"phi {definition} [-]"] = phi
+        if series is not None:
+            row |= _series_columns(series, frame.time)
+        rows.append(row)
+    return rows
+
+
+def _labels(manifest: RunManifest) -> dict[str, object]:
+    values = (
+        str(manifest.directory),
+        manifest.name,
+        manifest.seed,
+        manifest.aspect_ratio,
+        manifest.count,
+        manifest.fidelity,
+        manifest.scene_sha256,
+    )
+    return dict(zip(_LABELS, values, strict=True))
+
+
+def _shape_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
+    if manifest.planar:
+        # All lie at one height, and each in the plane of all others.
+        return {"smarticles [-]": frame.count, "contacts mean [-]": float(frame.contacts.mean())}
+    levels = heights(frame.vertices, floor_z=frame.floor_z)
+    tangle = entanglement(frame.vertices)
+    return {
+        "smarticles [-]": frame.count,
+        "escaped [-]": _escaped(frame, manifest.container_radius),
+        "com height [m]": levels.mean_com,
+        "second-highest com height [m]": levels.second_highest_com,
+        f"top {levels.percentile:g} % height [m]": levels.top,
+        "crossings mean [-]": tangle.mean,
+        "planes [-]": int(tangle.has_plane.sum()),
+        "contacts mean [-]": float(frame.contacts.mean()),
+    }
+
+
+def _free_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
+    """What is told of a pile without a wall; NaN while there is one."""
+    pile = None
+    if not manifest.walled(frame.phase):
+        pile = free_pile(frame.vertices, manifest, floor_z=frame.floor_z)
+    names = {
+        "largest cluster by contact [-]": "touching",
+        "largest cluster by crossings [-]": "entangled",
+        "spread radius 50 % [m]": "radius_half",
+        "spread radius 95 % [m]": "radius_most",
+        "sloughed [-]": "sloughed",
+        "tilt [degree]": "tilt",
+    }
+    return {name: float("nan") if pile is None else getattr(pile, key) for name, key in names.items()}
+
+
+def _escaped(frame: Frame, radius: float) -> int:
+    """Smarticles with their centre of mass beside or below the container."""
+    centres = centres_of_mass(frame.vertices)
+    outside = np.hypot(centres[:, 0], centres[:, 1]) > radius
+    return int((outside | (centres[:, 2] < frame.floor_z)).sum())
+
+
+def _phi(frame: Frame, manifest: RunManifest, definition: str) -> float:
+    if not manifest.fills_cylinder(frame.phase):
+        return float("nan")
+    try:
+        return packing_fraction(
+            frame.vertices,
+            radius=manifest.container_radius,
+            solid_volume=manifest.solid_volume,
+            definition=definition,
+            floor_z=frame.floor_z,
+            thickness_normal=manifest.thickness_normal,
+            thickness_in_plane=manifest.thickness_in_plane,
+        ).value
+    except UndefinedMeasureError:
+        return float("nan")
+
+
+def _series_columns(series: Series, time: float) -> dict[str, float]:
+    columns: dict[str, float] = {}
+    index = series.nearest(time)
+    for name, values in series.data.items():
+        if name in _SERIES_MEASURED:
+            continue
+        label = _SERIES_COLUMNS.get(name, name)
+        # The recorder writes the SI unit one; the tables write a dash.
+        unit = "-" if series.units[name] in {"1", ""} else series.units[name]
+        if values.ndim == 1:
+            columns[f"{label} [{unit}]"] = float(values[index])
+        else:
+            for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
+                columns[f"{label} {component} [{unit}]"] = float(value)
+    return columns

@@ -1,0 +1,24 @@
+"""Lines of the texts that studies write: tables, findings, and what columns mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from postprocess.statistics.findings import Finding
+
+
+def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """A table."""
+    lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def findings_lines(found: Iterable[Finding]) -> list[str]:
+    """A table of findings."""
+    rows = ((one.paper, one.ours, f"**{one.verdict}**", one.criterion) for one in found)
+    return table_lines(["finding in the paper", "ours (± standard error)", "verdict", "found if"], rows)
+
+
+def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
+    """What the columns of a file are."""
+    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {told}" for name, told in meanings.items())]

@@ -1,0 +1,7 @@
+"""`python -m smarticles` is `smarticles`."""
+
+import sys
+
+from smarticles.main import main
+
+sys.exit(main())

@@ -1,0 +1,187 @@
+"""accuracy: what accuracy costs in time, measured on variants of one scene."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+from smarticles.commands.scenes import add_scene
+from smarticles.commands.studies import told_results
+from smarticles.commands.study import compute_and_analyse
+from smarticles.commands.sweeps import add_slots, expected_wall_s, folder_of
+from smarticles.layout import columns
+from smarticles.parsing import Commands, positive_number
+
+if TYPE_CHECKING:
+    from studies.accuracy.ladder import Ladder
+    from templates.sweep.expand import Point
+    from templates.sweep.sweep import Sweep
+
+_SEEDS = "1,2,3"
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    accuracy = commands.add(
+        "accuracy",
+        run_accuracy,
+        summary="what accuracy costs in time: one scene at several settings of each knob",
+        text="""
+Makes variants of a scene, each with one knob turned, several seeds each, runs them and tells errors
+against wall time. Knobs:
+
+  time-step    time step over the stable one: 0.9, 0.45, 0.225
+  stiffness    of contacts: ×1, ×2, ×4; the time step follows
+  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows
+  restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
+  control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
+  hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate
+  fidelity     draft, standard, reference
+
+The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
+setting with finished runs. An error within the scatter between seeds is not resolved, which is not
+the same as none: more seeds narrow it, and the same command with more --seeds runs only these.
+
+DIR gets the runs, and results/ with table, figure and advice; its work_precision.csv is what
+`smarticles plan --max-error --table` reads. Ctrl-C stops; the same command again goes on.
+`smarticles status DIR` tells how far it is.""",
+        examples="""\
+  smarticles accuracy scene.yaml --out ladder --dry-run
+  smarticles accuracy scene.yaml --out ladder
+  smarticles accuracy scene.yaml --out ladder --knobs fidelity --seeds 1,2,3,4,5
+  smarticles accuracy scene.yaml --out ladder --max-run-hours 1     leave out what takes longer
+  smarticles accuracy scene.yaml --out ladder --analyse             what the finished runs say so far
+""",
+    )
+    add_scene(accuracy)
+    accuracy.add_argument("--out", type=Path, metavar="DIR", help="directory of the ladder")
+    accuracy.add_argument("--seeds", default=_SEEDS, metavar="1,2,…", help=f"seeds of each setting; default: {_SEEDS}")
+    accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to turn; default: all that the scene calls for")
+    accuracy.add_argument(
+        "--max-run-hours",
+        type=positive_number,
+        metavar="H",
+        help="leave out settings whose run is expected to take longer [h]; default: none",
+    )
+    accuracy.add_argument(
+        "--dry-run", action="store_true", help="show the ladder and its expected hours, write nothing"
+    )
+    accuracy.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
+    add_slots(accuracy)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Study:
+    """A ladder, expanded.
+
+    Args:
+        ladder: its rungs.
+        sweep: the sweep of it.
+        points: its runs.
+        expected_s: expected wall time of a run by setting [s].
+    """
+
+    ladder: Ladder
+    sweep: Sweep
+    points: Sequence[Point]
+    expected_s: Mapping[str, float]
+
+
+def run_accuracy(arguments: argparse.Namespace) -> int:
+    """`smarticles accuracy`."""
+    from studies.accuracy.ladder import BASE, parse_seeds  # noqa: PLC0415
+
+    seeds = parse_seeds(arguments.seeds)
+    study = _study(arguments, seeds)
+    if not arguments.dry_run and arguments.out is None:
+        msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
+        raise InputError(msg)
+    print(_listing(study, len(seeds), arguments.jobs), flush=True)
+    if len(seeds) < 2:
+        print(
+            "smarticles: warning: one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3",
+            file=sys.stderr,
+        )
+    if arguments.dry_run:
+        return 0
+    folder = folder_of(study.sweep, study.points, arguments.out, arguments.command_line, extend=True)
+    expected = {entry.name: entry.expected_s for entry in folder.entries}
+
+    def analyse(runs: Sequence[Path], output: Path) -> str:
+        return _analyse(study, expected, runs, output, arguments)
+
+    return compute_and_analyse(folder, arguments, analyse, {"setting": BASE})
+
+
+def _study(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Study:
+    from dem.scene.scene import load_scene  # noqa: PLC0415
+    from studies.accuracy.ladder import affordable, build_ladder, ladder_sweep, parse_knobs  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
+
+    knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
+    scene = load_scene(arguments.scene, arguments.set)
+    ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
+    expected_s = {setting: expected_wall_s(one) for setting, one in ladder.scenes.items()}
+    if arguments.max_run_hours is not None:
+        ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
+    sweep = ladder_sweep(scene, ladder, seeds)
+    return _Study(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s)
+
+
+def _listing(study: _Study, seeds: int, jobs: int | None) -> str:
+    """The ladder as a table, and what it is expected to take."""
+    from dem.plan.outlook import plan  # noqa: PLC0415
+    from templates.local.local import slots_here  # noqa: PLC0415
+
+    ladder = study.ladder
+    references = ladder.references()
+    rows = []
+    for rung in ladder.rungs:
+        planned = plan(ladder.scenes[rung.setting])
+        own = "reference" if references[rung.knob] == rung else ""
+        shape = [planned.time_step_s, planned.spheres_per_smarticle]
+        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(study.expected_s[rung.setting])])
+    header = ["knob", "value", "setting", "", "time step s", "spheres", "expected wall s"]
+    slots = min(jobs or slots_here(), len(study.points))
+    hours = seeds * sum(study.expected_s[setting] for setting in ladder.settings) / 3600
+    lines = [columns(header, rows), *(f"left out: {line}" for line in ladder.left_out)]
+    lines.append(
+        f"{len(ladder.settings)} settings × {seeds} seeds = {len(study.points)} runs, about {hours:.2g} h of one core, "
+        f"{hours / slots:.2g} h or more with {slots} at once"
+    )
+    return "\n".join(lines)
+
+
+def _analyse(
+    study: _Study, expected_s: Mapping[str, float], runs: Sequence[Path], output: Path, arguments: argparse.Namespace
+) -> str:
+    from studies.accuracy.ladder import SENSITIVITIES  # noqa: PLC0415
+    from studies.accuracy.runs import Rung  # noqa: PLC0415
+    from studies.accuracy.study import analyse_accuracy, told_rungs  # noqa: PLC0415
+
+    ladder = study.ladder
+    left_out = f"; left out: {'; '.join(ladder.left_out)}" if ladder.left_out else ""
+    report = analyse_accuracy(
+        runs,
+        output,
+        rungs=[
+            Rung(
+                knob=rung.knob,
+                value=rung.value,
+                unit=rung.unit,
+                setting=rung.setting,
+                sensitivity=rung.knob in SENSITIVITIES,
+            )
+            for rung in ladder.rungs
+        ],
+        expected_s=expected_s,
+        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
+        command=arguments.command_line,
+    )
+    told = ["* beyond the seed-to-seed band, 95 %.", "", *(one.sentence for one in report.advice), "", report.closing]
+    return told_results(columns(*told_rungs(report.table)), told, report.files, output)

@@ -1,0 +1,165 @@
+"""study: a shipped sweep, run, measured and compared with its reference."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+from smarticles.commands.studies import STUDIES, Analysis
+from smarticles.commands.sweeps import add_slots, compute, make_folder, refuse_failures
+from smarticles.parsing import Commands
+
+if TYPE_CHECKING:
+    from templates.sweep.expand import Point
+    from templates.sweep.folder import Entry, Folder
+
+
+_ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in STUDIES.items())
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    study = commands.add(
+        "study",
+        run_study,
+        summary="a shipped sweep: run, measure, compare with its reference",
+        text=_ABOUT
+        + """
+
+DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
+same command again goes on where it stopped. `smarticles status DIR` tells how far it is, and
+--analyse shows what the finished runs say, also while the others are being computed.""",
+        examples="""\
+  smarticles study gravish --quick --out demo
+  smarticles study gravish --out gravish
+  smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
+  smarticles study sensitivity --out sensitivity
+  smarticles study procedures --quick --out procedures-quick
+  smarticles study procedures --out procedures --analyse     what the finished runs say so far
+""",
+    )
+    study.add_argument("name", choices=tuple(STUDIES), metavar="NAME", help=", ".join(STUDIES))
+    study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
+    study.add_argument(
+        "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
+    )
+    study.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
+    study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
+    add_slots(study)
+
+
+def run_study(arguments: argparse.Namespace) -> int:
+    """`smarticles study`."""
+    from studies.shipped import study_file  # noqa: PLC0415
+
+    study = STUDIES[arguments.name]
+    file = study_file(arguments.name, quick=arguments.quick)
+    changed = _changed(arguments.name, file, arguments.fidelity)
+    folder = make_folder(file, arguments.out, arguments.command_line, changed)
+    note = _note(arguments.name, file, changed)
+    print(note, flush=True)
+
+    def analyse(runs: Sequence[Path], output: Path) -> str:
+        return study.analyse(
+            Analysis(runs=runs, output=output, note=note, command=arguments.command_line, quick=arguments.quick)
+        )
+
+    return compute_and_analyse(folder, arguments, analyse, study.pictured)
+
+
+def compute_and_analyse(
+    folder: Folder,
+    arguments: argparse.Namespace,
+    analyse: Callable[[Sequence[Path], Path], str],
+    pictured: Mapping[str, object],
+) -> int:
+    """Run what a sweep is missing unless --analyse says not to, then say what the finished runs say.
+
+    Args:
+        folder: the sweep's directory.
+        arguments: of the command.
+        analyse: measures the run directories given, finished or not, and writes to a folder; gives the text for the
+            terminal.
+        pictured: values of the run that a picture is drawn of.
+
+    Raises:
+        InputError: no run is finished and none is to be started.
+        RunError: a run failed.
+    """
+    outcomes = [] if arguments.analyse else compute(folder, arguments)
+    finished = [entry for entry in folder.entries if folder.is_done(entry)]
+    if arguments.analyse and not finished:
+        msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
+        raise InputError(msg)
+    if finished:
+        results = folder.path / "results"
+        # All runs: those that are not done are listed as missing in every table.
+        print(analyse([folder.run(entry) for entry in folder.entries], results))
+        sys.stdout.flush()
+        _draw(folder, finished, pictured, results / "run.png")
+    # Last, so that what is there is shown before what is missing.
+    refuse_failures(folder, outcomes)
+    return 0
+
+
+def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
+    """Constants of the study that the command line changes.
+
+    Raises:
+        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
+    """
+    from dem.setting.parts import FIDELITIES  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
+    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+
+    if fidelity is None:
+        return {}
+    if fidelity not in FIDELITIES:
+        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
+        raise InputError(msg)
+    sweep, changed = load_sweep(file), {"fidelity": fidelity}
+    shipped = sweep.content.constants.get("fidelity")
+    if shipped == fidelity:
+        return changed
+    try:
+        changes_all = shipped is not None and not _scenes(expand(with_constants(sweep, changed))) & _scenes(
+            expand(sweep)
+        )
+    except InputError as error:
+        msg = f"--fidelity {fidelity}: study {name} cannot be run at it ({error}); leave --fidelity out"
+        raise InputError(msg) from None
+    if not changes_all:
+        msg = f"--fidelity {fidelity}: study {name} sets the fidelity of its runs itself; leave --fidelity out"
+        raise InputError(msg)
+    return changed
+
+
+def _scenes(points: Sequence[Point]) -> set[str]:
+    return {point.scene_sha256 for point in points}
+
+
+def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
+    """How what is run differs from the full study as it ships, one line."""
+    from studies.shipped import differences, study_file  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
+    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+
+    here = expand(with_constants(load_sweep(file), changed))
+    lines = differences(here, expand(load_sweep(study_file(name))))
+    return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
+
+
+def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:
+    """Draw the first finished run that has these values."""
+    from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
+
+    for entry in finished:
+        if all(entry.values.get(name) == value for name, value in values.items()):
+            output.parent.mkdir(parents=True, exist_ok=True)
+            render_run(folder.run(entry), output=output, overwrite=True)
+            print(f"picture of {entry.name}: {output}")
+            return

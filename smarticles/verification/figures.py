@@ -1,0 +1,139 @@
+"""Figures of known answers: errors against the time step, and flat impacts against the number of spheres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postprocess.report import figures
+from studies.base.figures import finished
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axis import Axis
+    from numpy.typing import NDArray
+
+_WIDTH, _HEIGHT = 2 * figures.COLUMN_WIDTH, 3.5
+_LOOKS = (
+    ("o", figures.BLUE),
+    ("s", figures.ORANGE),
+    ("^", figures.BLACK),
+    ("v", figures.SKY),
+    ("D", figures.GREY),
+    ("P", figures.BLUE),
+)
+_ORDINALS = {1: "first", 2: "second"}
+
+
+def _plain_ticks(axis: Axis, values: NDArray[np.float64]) -> None:
+    """Ticks 1, 2, 5, 10, … of a logarithmic axis about the values, written out."""
+    low, high = 0.8 * values.min(), 1.25 * values.max()
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [m * 10.0**decade for decade in decades for m in (1, 2, 5) if low <= m * 10.0**decade <= high]
+    axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+    axis.set_ticks([], minor=True)
+
+
+def draw_orders(path: Path, *, trajectories: pd.DataFrame, orders: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
+    """Errors over the size of the motion against the time step, one panel per order of the scheme.
+
+    Args:
+        path: Without suffix.
+        trajectories: One row per ladder and time step.
+        orders: See `verification.order_table`.
+        footer: Origin, one statement each.
+
+    Returns:
+        The files written.
+    """
+    schemes = sorted(set(orders["order of the scheme [1]"]))
+    with figures.style():
+        figure = figures.blank_figure(_WIDTH, _HEIGHT)
+        for axes, scheme in zip(np.atleast_1d(figure.subplots(1, len(schemes))), schemes, strict=True):
+            of_scheme = orders[orders["order of the scheme [1]"] == scheme]
+            lowest = np.inf
+            for (shape, colour), row in zip(_LOOKS, of_scheme.to_dict("records"), strict=False):
+                own = trajectories[trajectories["ladder"] == row["ladder"]]
+                error = own["error [unit]"] / own["size of the motion [unit]"]
+                lowest = min(lowest, float(error.min()))
+                axes.loglog(
+                    own["time step [s]"] * 1e6,
+                    error,
+                    marker=shape,
+                    color=colour,
+                    linewidth=0.8,
+                    label=f"{row['ladder']}: {row['order observed [1]']:.2f}",
+                )
+            steps = trajectories["time step [s]"][trajectories["ladder"].isin(of_scheme["ladder"])].to_numpy() * 1e6
+            ends = np.array([steps.min(), steps.max()])
+            axes.loglog(
+                ends,
+                0.4 * lowest * (ends / ends[0]) ** scheme,
+                color=figures.GREY,
+                linestyle=(0, (4, 3)),
+                linewidth=0.8,
+                label=f"slope {scheme}",
+            )
+            axes.set_xlabel("time step [µs]")
+            axes.set_ylabel("error over the size of the motion [1]")
+            _plain_ticks(axes.xaxis, ends)
+            order = _ORDINALS.get(scheme, str(scheme))
+            axes.legend(
+                loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title=f"scheme of {order} order: observed order"
+            )
+        return finished(figure, path, footer)
+
+
+def draw_clumps(path: Path, *, clumps: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
+    """Restitution, contact time and depth of flat impacts against the number of contacts.
+
+    Args:
+        path: Without suffix.
+        clumps: One row per sphere chain.
+        footer: Origin, one statement each.
+
+    Returns:
+        The files written.
+    """
+    table = clumps.sort_values("contacts [1]")
+    contacts = table["contacts [1]"]
+    panels = (
+        ("restitution, n in parallel and tilt [1]", "restitution measured [1]", 1.0, "restitution of a flat fall [1]"),
+        ("contact time, theory [s]", "contact time measured [s]", 1e6, "time in contact [µs]"),
+        ("depth at rest, theory [m]", "depth at rest measured [m]", 1e9, "depth under its own weight [nm]"),
+    )
+    with figures.style():
+        figure = figures.blank_figure(_WIDTH, _HEIGHT - 0.9)
+        for axes, (theory, measured, unit, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
+            axes.plot(contacts, table[theory] * unit, color=figures.GREY, linewidth=0.8, label="theory: n in parallel")
+            for rows, shape, colour in ((1, "o", figures.BLUE), (2, "s", figures.ORANGE)):
+                part = table[table["rows [1]"] == rows]
+                name = f"{rows} row{'s' if rows > 1 else ''}, pitch 1.3 … 0.25"
+                axes.plot(
+                    part["contacts [1]"],
+                    part[measured] * unit,
+                    linestyle="none",
+                    marker=shape,
+                    color=colour,
+                    label=name,
+                )
+            axes.set_xscale("log")
+            axes.set_xlabel("contacts with the floor, n [1]")
+            axes.set_ylabel(label)
+            _plain_ticks(axes.xaxis, contacts.to_numpy())
+            if unit == 1.0:
+                look = {"marker": "x", "color": figures.BLACK, "linestyle": "none", "markersize": 3.0}
+                coarse = table["restitution at the scene's time step [1]"]
+                axes.plot(contacts, coarse, **look, label="at a scene's step")
+                asked = float(table["restitution asked for [1]"].iloc[0])
+                axes.axhline(asked, color=figures.BLACK, linewidth=0.8, linestyle=(0, (4, 3)), label="asked for")
+                axes.set_ylim(0, 1)
+                figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=5)
+            else:
+                axes.set_yscale("log")
+                _plain_ticks(axes.yaxis, table[measured].to_numpy() * unit)
+        return finished(figure, path, footer)

@@ -1,0 +1,1 @@
+"""Small simulations whose answer is on paper."""

@@ -1,0 +1,1 @@
+"""Shipped sweeps with their analysis."""

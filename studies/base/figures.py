@@ -1,0 +1,138 @@
+"""What the figures of studies share: means with their error bars, and histories averaged over seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postprocess.report import figures
+from studies.procedures.runs import EXTERNAL, INTERNAL, SHAPE, STATIC
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
+CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
+
+COLOURS: Mapping[str, str] = MappingProxyType(
+    {SHAPE: figures.ORANGE, EXTERNAL: figures.BLUE, INTERNAL: figures.SKY, STATIC: figures.GREY}
+)
+"""Colour of each procedure, the same in all studies."""
+
+SHAPES: Mapping[str, str] = MappingProxyType({SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"})
+"""Marker of each procedure, the same in all studies."""
+
+_LEAST_BIN = 0.1  # s: three periods of shaking at 30 Hz
+_BINS = 100
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class History:
+    """A quantity of one run from the phase before its activity to the end.
+
+    Attributes:
+        times: (n,) since the activity began [s].
+        values: (n,).
+        active: Time at which the activity ended [s].
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    active: float
+
+
+def bin_width(ends: Sequence[float]) -> float:
+    """Width of the intervals over which histories are averaged [s].
+
+    Args:
+        ends: Times at which activities ended [s].
+    """
+    return max(max(ends, default=0.0) / _BINS, _LEAST_BIN)
+
+
+def binned(histories: Sequence[History], width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means over equal intervals of time: centres (n,) [s] and values (seeds, n).
+
+    No interval reaches across the beginning of the activity; those that lack a sample of any seed are
+    left out.
+    """
+    first = math.floor(min(history.times[0] for history in histories) / width)
+    last = math.ceil(max(history.times[-1] for history in histories) / width)
+    count = max(last - first, 1)
+    rows = []
+    for history in histories:
+        # A sample at the very end belongs to the last interval.
+        place = np.clip(np.floor(history.times / width).astype(int) - first, 0, count - 1)
+        samples = np.bincount(place, minlength=count)
+        sums = np.bincount(place, history.values, count)
+        rows.append(np.where(samples > 0, sums / np.maximum(samples, 1), np.nan))
+    means = np.array(rows)
+    whole = np.isfinite(means).all(axis=0)
+    return (first + np.arange(count) + 0.5)[whole] * width, means[:, whole]
+
+
+def draw_history(axes: Axes, histories: Sequence[History], width: float, *, colour: str, label: str) -> None:
+    """The mean over seeds as a line, from the lowest to the highest seed as a band."""
+    centres, means = binned(histories, width)
+    axes.plot(centres, means.mean(axis=0), color=colour, label=label)
+    if len(means) > 1:
+        axes.fill_between(centres, means.min(axis=0), means.max(axis=0), color=colour, alpha=0.25, linewidth=0)
+
+
+def told_histories(width: float, what: str) -> str:
+    """What lines, bands and broken lines are, for footers; `what` begins and ends at the broken lines."""
+    return (
+        f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed. "
+        f"{what} begins and ends at the broken lines."
+    )
+
+
+def draw_ends(axes: Axes, ends: Sequence[float]) -> None:
+    """Broken lines where activities begin and end [s]."""
+    for time in sorted({0.0, *ends}):
+        axes.axvline(time, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
+
+
+def draw_means(
+    axes: Axes, x: ArrayLike, values: ArrayLike, half_widths: ArrayLike, *, look: Mapping[str, Any], label: str
+) -> None:
+    """Means over seeds with their error bars; a mean over one seed has none."""
+    axes.errorbar(x, values, yerr=half_widths, **{"markersize": 3.4, "linewidth": 0.7, **look}, label=label)
+
+
+def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
+    """A marker with an error bar of its colour."""
+    return {
+        "marker": shape,
+        "color": colour,
+        "markerfacecolor": face,
+        "markeredgewidth": 0.9,
+        "elinewidth": 0.8,
+        "capthick": 0.8,
+    }
+
+
+def procedure_marker(procedure: str) -> dict[str, Any]:
+    """The marker of a procedure; that of the static state, which is none, is open."""
+    colour = COLOURS[procedure]
+    return marker(SHAPES[procedure], colour, "white" if procedure == STATIC else colour)
+
+
+def legend_above(axes: Axes) -> None:
+    """Puts the legend above the axes, where there is one."""
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+
+
+def finished(figure: Figure, path: Path, footer: Sequence[str]) -> list[Path]:
+    """Puts the footer below a figure and writes it; gives the files."""
+    figures.add_footer(figure, footer)
+    return figures.save(figure, path)

@@ -1,0 +1,218 @@
+"""Where the numbers of a study come from: footers, provenance, and tables that carry both."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import pandas as pd
+
+from dem.errors import InputError
+from postprocess.manifest import RunManifest
+from postprocess.measures.packing import DEFINITIONS
+from postprocess.measures.table import LAST_FRAMES
+from postprocess.report import figures
+from postprocess.report.markdown import table_lines
+from studies.base.runs import DEFINITION, MissingRun
+from studies.gravish.reference import CITATION, DIGITISING_ERROR, REFERENCE
+
+
+def make_folder(path: Path | str) -> Path:
+    """A folder for results.
+
+    Raises:
+        InputError: It is a file, or cannot be made.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        msg = f"cannot write to {path}: {error.strerror}; choose another folder as output"
+        raise InputError(msg) from None
+    return path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """What a study is compared with.
+
+    Attributes:
+        statement: Names it, for footers; without a full stop.
+        facts: The same for `provenance.json`.
+    """
+
+    statement: str
+    facts: Mapping[str, object]
+
+
+GRAVISH = Reference(
+    statement=f"{CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}",
+    facts=MappingProxyType(
+        {
+            "file": REFERENCE.name,
+            "sha256": hashlib.sha256(REFERENCE.read_bytes()).hexdigest(),
+            "digitising_error": DIGITISING_ERROR,
+        }
+    ),
+)
+
+SAVOIE = Reference(
+    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
+    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Origin:
+    """What the results of a study come from.
+
+    Attributes:
+        study: Its name.
+        manifests: The runs used, one or more.
+        missing: The runs that could not be used.
+        note: How these runs differ from the full study.
+        command: Command line.
+        reference: What they are compared with.
+    """
+
+    study: str
+    manifests: Sequence[RunManifest]
+    missing: tuple[MissingRun, ...]
+    note: str
+    command: str
+    reference: Reference = GRAVISH
+
+    def footer(self, points: str, *statements: str) -> tuple[str, ...]:
+        """What every table and figure says about its origin, one statement each.
+
+        Args:
+            points: Which runs there are; goes on from "… of … runs; ".
+            statements: What else is to be known, such as definitions.
+        """
+        lacking = f", {len(self.missing)} missing" if self.missing else ""
+        used, total = len(self.manifests), len(self.manifests) + len(self.missing)
+        fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
+        versions = []
+        for name in ("smarticles", "git", "yade"):
+            found = sorted({run.versions.get(name, "unknown") for run in self.manifests})
+            versions.append(f"{name} {', '.join(found)}")
+        return (
+            f"Study {self.study}, fidelity {fidelities}: {used} of {total} runs{lacking}; {points}",
+            *statements,
+            f"Reference: {self.reference.statement}.",
+            f"Note: {self.note}",
+            f"Versions: {'; '.join(versions)}. Command: {self.command}",
+        )
+
+    def write(
+        self,
+        output: Path,
+        footer: Sequence[str],
+        *,
+        tables: Mapping[str, pd.DataFrame],
+        text: tuple[str, Sequence[str]],
+        draw: Callable[[], Sequence[Path]],
+    ) -> Mapping[str, Path]:
+        """Writes all results of a study: its tables and that of the missing runs, text, provenance, figures.
+
+        Args:
+            output: Folder, see `make_folder`.
+            footer: See `footer`.
+            tables: By name, without suffix.
+            text: Name of the Markdown file, and its lines; missing runs and footer are put below.
+            draw: Draws the figures into the folder.
+
+        Returns:
+            Everything that was written, by name.
+        """
+        written = write_tables(output, {**tables, "missing": missing_table(self.missing)}, footer)
+        name, lines = text
+        written[name] = write_text("\n".join([*lines, *markdown_ending(self.missing, footer)]), output / name)
+        provenance = output / "provenance.json"
+        told = {column for table in tables.values() for column in table.columns}
+        written[provenance.name] = write_text(_provenance(self, footer, told), provenance)
+        return MappingProxyType(written | {path.name: path for path in draw()})
+
+
+def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str]) -> str:
+    """Everything about the origin of a study's results as JSON; of φ where its tables have such columns."""
+    try:
+        version = importlib.metadata.version("smarticles")
+    except importlib.metadata.PackageNotFoundError:
+        version = "unknown"
+    packing: dict[str, object] = {
+        "definition": DEFINITION,
+        "definition_meaning": DEFINITIONS[DEFINITION],
+        "frames_averaged_at_most": LAST_FRAMES,
+    }
+    content = {
+        "format": 1,
+        "study": origin.study,
+        "note": origin.note,
+        "command": origin.command,
+        "footer": list(footer),
+        "analysed_with": {"smarticles": version},
+        **(packing if any(DEFINITION in column for column in columns) else {}),
+        "reference": dict(origin.reference.facts),
+        "runs": [
+            {
+                "directory": str(run.directory),
+                "name": run.name,
+                "scene_sha256": run.scene_sha256,
+                "aspect_ratio": run.aspect_ratio,
+                "seed": run.seed,
+                "fidelity": run.fidelity,
+                "started": run.started,
+                "command": run.command,
+                "versions": dict(run.versions),
+            }
+            for run in origin.manifests
+        ],
+        "missing": [asdict(run) for run in origin.missing],
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def write_tables(folder: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> dict[str, Path]:
+    """Writes tables as CSV with their footer as comments below; read them with `comment="#"`.
+
+    Args:
+        folder: Where to.
+        tables: By name, without suffix.
+        footer: One statement each.
+
+    Returns:
+        The files written, by name.
+    """
+    below = "".join(f"# {line}\n" for line in footer)
+    written = {}
+    for name, table in tables.items():
+        path = folder / f"{name}.csv"
+        written[path.name] = write_text(table.to_csv(index=False, float_format="%.6g") + below, path)
+    return written
+
+
+def missing_table(missing: Sequence[MissingRun]) -> pd.DataFrame:
+    """One row per run that could not be used."""
+    return pd.DataFrame([asdict(run) for run in missing], columns=["directory", "status", "cause"])
+
+
+def markdown_ending(missing: Sequence[MissingRun], footer: Sequence[str]) -> list[str]:
+    """The lines that end a report: missing runs and footer."""
+    lines = []
+    if missing:
+        rows = [(run.directory, run.status, run.cause) for run in missing]
+        lines += ["", "## Missing runs", "", *table_lines(["run", "status", "cause"], rows)]
+    return [*lines, "", "---", "", *(f"{line}  " for line in footer), ""]
+
+
+def write_text(text: str, path: Path) -> Path:
+    """Writes a text whole."""
+    with figures.whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path

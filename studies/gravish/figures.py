@@ -1,0 +1,183 @@
+"""The figures of the study `gravish`; see `studies.gravish.study` for what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dem.errors import InputError
+from postprocess.manifest import RunManifest
+from postprocess.report import figures
+from postprocess.series import read_series
+from studies.base.figures import (
+    ASPECT_LABEL,
+    CROSSINGS_LABEL,
+    History,
+    bin_width,
+    draw_ends,
+    draw_history,
+    draw_means,
+    finished,
+    marker,
+    told_histories,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+_ASPECT = "aspect ratio [-]"
+_SERIES = "packing_fraction"
+_SHIFT = 0.005  # in l/w, to keep error bars apart
+
+
+def draw(
+    output: Path,
+    *,
+    summary: pd.DataFrame,
+    reference: pd.DataFrame,
+    manifests: Sequence[RunManifest],
+    definition: str,
+    reading_error: float,
+    footer: Sequence[str],
+) -> list[Path]:
+    """Draws and writes all figures.
+
+    Args:
+        output: Folder.
+        summary: See `gravish_answers.summarise_runs`.
+        reference: See `gravish_reference.read_reference`.
+        manifests: The runs behind the summary.
+        definition: Of the packing fraction that is compared.
+        reading_error: Of the reference's points [-].
+        footer: Origin, one statement each.
+
+    Returns:
+        The files written.
+    """
+    with figures.style():
+        return [
+            *_draw_packing(
+                output / "phi",
+                summary,
+                reference,
+                footer,
+                definition=definition,
+                reading_error=reading_error,
+            ),
+            *_draw_crossings(output / "crossings", summary, footer),
+            *_draw_history(output / "phi_time", manifests, footer),
+        ]
+
+
+def _draw_packing(
+    path: Path,
+    summary: pd.DataFrame,
+    reference: pd.DataFrame,
+    footer: Sequence[str],
+    *,
+    definition: str,
+    reading_error: float,
+) -> list[Path]:
+    figure, axes = figures.new_figure(height=2.7)
+    for column, face, label in (
+        ("phi_initial", "white", r"experiment, $\phi_0$ before shaking"),
+        ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after shaking"),
+    ):
+        axes.errorbar(
+            reference["l_over_w"],
+            reference[column],
+            yerr=reading_error,
+            **marker("o", figures.ORANGE, face),
+            markersize=5.5,
+            linestyle="none",
+            label=label,
+        )
+    blue, sky = figures.BLUE, figures.SKY
+    for stage, shape, colour, face, label in (
+        ("phi_0", "D", blue, "white", r"simulation, $\phi_0$ before shaking"),
+        ("phi_f relaxed", "^", sky, sky, r"simulation, $\phi_\mathrm{f}$ at rest again"),
+        ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
+    ):
+        _draw_means(axes, summary, f"{stage} {definition}", marker(shape, colour, face), label)
+    axes.set_xlabel(ASPECT_LABEL)
+    axes.set_ylabel(r"packing fraction $\phi$ [-]")
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="upper right")
+    return finished(figure, path, footer)
+
+
+def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
+    figure, axes = figures.new_figure(height=2.4)
+    for quantity, face, label, shift in (
+        ("crossings before", "white", "before shaking", -_SHIFT),
+        ("crossings after", figures.BLUE, "at the end of shaking", _SHIFT),
+    ):
+        _draw_means(axes, summary, quantity, marker("D", figures.BLUE, face), label, shift=shift)
+    axes.set_xlabel(ASPECT_LABEL)
+    axes.set_ylabel(CROSSINGS_LABEL)
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="best")
+    return finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])
+
+
+def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence[str]) -> list[Path]:
+    figure, axes = figures.new_figure(height=2.7)
+    histories: dict[float, list[History]] = {}
+    without, ends = [], []
+    for run in manifests:
+        try:
+            history = _history(run)
+        except InputError:
+            without.append(run.directory.name)
+        else:
+            histories.setdefault(round(run.aspect_ratio, 6), []).append(history)
+            ends.append(history.active)
+    width = bin_width(ends)
+    decimals = 1 if all(round(ratio, 1) == ratio for ratio in histories) else 2
+    colours = figures.sequence(len(histories), last=0.9)
+    for (ratio, seeds), colour in zip(sorted(histories.items()), colours, strict=True):
+        draw_history(axes, seeds, width, colour=colour, label=f"{ratio:.{decimals}f}")
+    draw_ends(axes, ends)
+    axes.set_xlabel("time since shaking began [s]")
+    axes.set_ylabel(r"packing fraction $\phi$ [-]")
+    if histories:
+        axes.legend(title=r"$l/w$", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    told = [told_histories(width, "Shaking")]
+    if without:
+        told.append(f"No time series of φ: {', '.join(without)}.")
+    return finished(figure, path, [*told, *footer])
+
+
+def _history(run: RunManifest) -> History:
+    """Reads one run's history.
+
+    Raises:
+        InputError: There is none.
+    """
+    series = read_series(run.directory)
+    shakes = [phase for phase in run.phases if phase.type == "shake"]
+    start, end = shakes[0].start, shakes[-1].end
+    values = np.asarray(series[_SERIES], dtype=np.float64)
+    shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
+    if start is None or end is None or not shown.any():
+        msg = f"{run.directory}: no packing fraction was recorded while shaking"
+        raise InputError(msg)
+    return History(times=series.time[shown] - start, values=values[shown], active=end - start)
+
+
+def _draw_means(
+    axes: Axes,
+    summary: pd.DataFrame,
+    quantity: str,
+    shape: Mapping[str, Any],
+    label: str,
+    *,
+    shift: float = 0.0,
+) -> None:
+    if f"{quantity} [-]" in summary.columns:
+        values, half_widths = summary[f"{quantity} [-]"], summary[f"{quantity} 95 % [-]"].to_numpy()
+        draw_means(axes, summary[_ASPECT] + shift, values, half_widths, look=shape, label=label)

@@ -1,0 +1,190 @@
+"""What is known about a cluster, as data: partitions, limits, modules, container."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from dem.errors import InputError
+from templates.sweep.explain import Models, explain
+from templates.sweep.texts import nearest, read_text
+
+SHIPPED = Path(__file__).parent / "clusters"
+
+# These go into lines that Slurm reads without a shell: nothing in them may need quoting.
+Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+/:@=,-]*$", max_length=200)]
+Option = Annotated[str, Field(pattern=r"^--[a-z][A-Za-z0-9._+/:@=,&|*%\[\]-]*$", max_length=200)]
+
+_UNITS = (86400, 3600, 60, 1)
+
+
+def parse_time(text: str) -> int:
+    """Seconds of a time as Slurm writes it: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M`, `D-H:M:S`.
+
+    Raises:
+        ValueError: it is not such a time, or not longer than zero.
+    """
+    days, dash, rest = text.rpartition("-")
+    parts = rest.split(":")
+    names = {1: "h", 2: "hm", 3: "hms"} if dash else {1: "m", 2: "ms", 3: "hms"}
+    fits = all(re.fullmatch(r"[0-9]{1,6}", part) for part in [*parts, *([days] if dash else [])])
+    if not fits or len(parts) not in names:
+        msg = f"{text!r} is not a time; write D-HH:MM:SS, HH:MM:SS or minutes"
+        raise ValueError(msg)
+    factor = {"h": 3600, "m": 60, "s": 1}
+    seconds = int(days or 0) * 86400
+    seconds += sum(int(part) * factor[name] for part, name in zip(parts, names[len(parts)], strict=True))
+    if seconds == 0:
+        msg = f"{text!r} is no time at all; give at least one minute"
+        raise ValueError(msg)
+    return seconds
+
+
+def format_time(seconds: float) -> str:
+    """`D-HH:MM:SS`, or `HH:MM:SS` below a day."""
+    rest, parts = round(seconds), []
+    for unit in _UNITS:
+        parts.append(rest // unit)
+        rest %= unit
+    days, hours, minutes, seconds_ = parts
+    clock = f"{hours:02d}:{minutes:02d}:{seconds_:02d}"
+    return f"{days}-{clock}" if days else clock
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Partition(_Model):
+    """One queue of a cluster.
+
+    `cores_per_node` and `memory_per_node_mib` may be "here": those of the machine that submits.
+    """
+
+    cores_per_node: Annotated[int, Field(ge=1)] | Literal["here"]
+    memory_per_node_mib: Annotated[int, Field(ge=1)] | Literal["here"]
+    max_time: str
+    named: bool = Field(default=True, description="false: leave --partition out, Slurm takes its default")
+
+    @field_validator("max_time")
+    @classmethod
+    def _is_time(cls, text: str) -> str:
+        parse_time(text)
+        return text
+
+    @property
+    def max_time_s(self) -> int:
+        """Longest wall time of a job [s]."""
+        return parse_time(self.max_time)
+
+    @property
+    def cores(self) -> int:
+        """Cores of one node."""
+        return (os.cpu_count() or 1) if self.cores_per_node == "here" else self.cores_per_node
+
+    @property
+    def memory_mib(self) -> int:
+        """Memory of one node [MiB]."""
+        if self.memory_per_node_mib != "here":
+            return self.memory_per_node_mib
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20
+
+
+class Container(_Model):
+    """An Apptainer image whose run script is `smarticles`."""
+
+    image: str = Field(min_length=1)
+    command: tuple[str, ...] = Field(default=("apptainer", "run"), min_length=1)
+
+
+class Cluster(_Model):
+    """Everything the job scripts need to know of a cluster."""
+
+    schema_version: Literal[1]
+    name: Word
+    description: str = ""
+    scheduler: Literal["slurm"]
+    max_array_size: int = Field(ge=1, description="MaxArraySize of `scontrol show config`")
+    signal_lead_s: int = Field(ge=2, le=65535, description="between the signal and the time limit [s]")
+    default_partition: str
+    partitions: dict[Word, Partition] = Field(min_length=1)
+    account: Word | None = None
+    qos: Word | None = None
+    options: tuple[Option, ...] = Field(default=(), description="further options of sbatch")
+    modules: tuple[Word, ...] = ()
+    container: Container | None = None
+    template: str | None = Field(default=None, description="Jinja2 file that extends slurm.sh.j2; beside this file")
+
+    @model_validator(mode="after")
+    def _check(self) -> Cluster:
+        if self.default_partition not in self.partitions:
+            advice = nearest(self.default_partition, self.partitions)
+            msg = f"default_partition: there is no {self.default_partition!r}; {advice}"
+            raise ValueError(msg)
+        return self
+
+    def partition(self, name: str | None) -> tuple[str, Partition]:
+        """A partition and its name; by default the cluster's default.
+
+        Raises:
+            InputError: the cluster has no such partition.
+        """
+        wanted = name or self.default_partition
+        if wanted not in self.partitions:
+            msg = f"--partition {wanted}: cluster {self.name} has no such partition; {nearest(wanted, self.partitions)}"
+            raise InputError(msg)
+        return wanted, self.partitions[wanted]
+
+
+_MODELS: Models = {(): Cluster, ("partitions", "*"): Partition, ("container",): Container}
+
+
+def shipped_clusters() -> list[str]:
+    """Names of the clusters that come with the project."""
+    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def cluster_file(reference: str) -> Path:
+    """The file of a cluster that is given by name or by file.
+
+    Raises:
+        InputError: there is no cluster of that name.
+    """
+    if reference.endswith(".toml"):
+        return Path(reference)
+    if reference not in shipped_clusters():
+        msg = (
+            f"--cluster {reference}: is not known; {nearest(reference, shipped_clusters())} "
+            "or give a file of your own, FILE.toml"
+        )
+        raise InputError(msg)
+    return SHIPPED / f"{reference}.toml"
+
+
+def load_cluster(reference: str) -> Cluster:
+    """Read what is known about a cluster.
+
+    Args:
+        reference: a shipped cluster's name, or a file that ends in .toml.
+
+    Raises:
+        InputError: unknown name, unreadable file, unknown key, bad value.
+    """
+    path = cluster_file(reference)
+    try:
+        content = tomllib.loads(read_text(path, "cluster file"))
+    except tomllib.TOMLDecodeError as error:
+        msg = f"{path}: not valid TOML: {error}; correct the file"
+        raise InputError(msg) from error
+    try:
+        cluster = Cluster.model_validate(content)
+    except ValidationError as error:
+        raise InputError(explain(error, path, _MODELS, f"see {SHIPPED / 'example-large.toml'}")) from error
+    if cluster.template is not None:
+        cluster = cluster.model_copy(update={"template": str(path.parent / cluster.template)})
+    return cluster

@@ -1,0 +1,153 @@
+"""What is asked of a cluster for some runs; refused where the cluster cannot give it, before anything is written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dem.errors import InputError
+from templates.slurm.cluster import Cluster, Partition, format_time, parse_time
+
+# Machines differ by a factor of two from the one that costs were measured on, and runs on a node share its memory bus.
+TIME_MARGIN = 3.0
+LEAST_TIME_S = 600
+# A run of 1000 smarticles takes less than half of it (`make bench` measures); --memory changes it.
+MEMORY_PER_RUN_MIB = 1024
+LEAST_REQUEUES = 3
+# Between telling runs to end at once and the time limit [s]; half of the lead where that is shorter.
+CLOSING_S = 30
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wishes:
+    """What the user asks for; None leaves it to the cluster and the runs.
+
+    Args:
+        partition: the partition.
+        account: the account to charge.
+        time: wall time, as Slurm writes it.
+        runs_per_task: runs side by side in one task of the array.
+        memory_mib: memory per run [MiB].
+    """
+
+    partition: str | None = None
+    account: str | None = None
+    time: str | None = None
+    runs_per_task: int | None = None
+    memory_mib: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """An array of tasks, each of which computes several runs at once, one core each.
+
+    Args:
+        partition: the partition; None is Slurm's default.
+        account: the account, or None.
+        tasks: tasks of the array.
+        runs_per_task: runs, and cores, of a task.
+        time_s: wall time of a task [s], whole minutes.
+        memory_mib: memory of a task [MiB].
+        lead_s: between the signal and the time limit [s].
+        grace_s: between the signal and the end of runs that have not reached a checkpoint [s].
+        requeues: how often a task may be put back into the queue.
+    """
+
+    partition: str | None
+    account: str | None
+    tasks: int
+    runs_per_task: int
+    time_s: int
+    memory_mib: int
+    lead_s: int
+    grace_s: int
+    requeues: int
+
+    def to_text(self) -> str:
+        """One line for the terminal."""
+        each = f"{self.runs_per_task} runs" if self.runs_per_task > 1 else "1 run"
+        return (
+            f"{self.tasks} tasks of {each}: {self.runs_per_task} cores, {self.memory_mib} MiB, "
+            f"{format_time(self.time_s)} each"
+        )
+
+
+def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
+    """What to ask for.
+
+    Args:
+        expected_s: expected wall time of each run [s].
+        cluster: where.
+        wishes: what the user wants to have otherwise.
+
+    Raises:
+        InputError: it is more than the cluster gives.
+    """
+    name, partition = cluster.partition(wishes.partition)
+    where = f"partition {name} of {cluster.name}"
+    memory = wishes.memory_mib or MEMORY_PER_RUN_MIB
+    runs = _runs_per_task(len(expected_s), cluster, partition, wishes.runs_per_task, memory)
+    if runs > partition.cores:
+        msg = f"--runs-per-task {runs}: {where} has {partition.cores} cores per node; give at most that many"
+        raise InputError(msg)
+    if runs * memory > partition.memory_mib:
+        msg = (
+            f"--runs-per-task {runs}: {runs} × {memory} MiB are more than the {partition.memory_mib} MiB of a node in "
+            f"{where}; give fewer runs, or less with --memory"
+        )
+        raise InputError(msg)
+    tasks = math.ceil(len(expected_s) / runs)
+    if tasks > cluster.max_array_size:
+        msg = (
+            f"{len(expected_s)} runs, {runs} per task, make an array of {tasks} tasks; {cluster.name} allows "
+            f"{cluster.max_array_size}: give a larger --runs-per-task (up to {partition.cores}), or a smaller sweep"
+        )
+        raise InputError(msg)
+    longest = TIME_MARGIN * max(expected_s)
+    time_s = _time(longest, cluster, partition, wishes.time, where)
+    return Request(
+        partition=name if partition.named else None,
+        account=wishes.account or cluster.account,
+        tasks=tasks,
+        runs_per_task=runs,
+        time_s=time_s,
+        memory_mib=runs * memory,
+        lead_s=cluster.signal_lead_s,
+        grace_s=max(cluster.signal_lead_s - CLOSING_S, cluster.signal_lead_s // 2),
+        requeues=max(LEAST_REQUEUES, 2 * math.ceil(longest / (time_s - cluster.signal_lead_s))),
+    )
+
+
+def _runs_per_task(count: int, cluster: Cluster, partition: Partition, wanted: int | None, memory: int) -> int:
+    """What is wanted, but no more than there are runs; by default a full node, with tasks of equal size."""
+    if wanted is not None:
+        return wanted if wanted > partition.cores else min(wanted, count)
+    most = max(1, min(partition.cores, partition.memory_mib // memory))
+    return math.ceil(count / math.ceil(count / most))
+
+
+def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
+    """Wall time to ask for [s]: whole minutes, since Slurm counts in them."""
+    if wanted is None:
+        needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
+        time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)
+    else:
+        try:
+            time_s = 60 * math.ceil(parse_time(wanted) / 60)
+        except ValueError as error:
+            msg = f"--time: {error}"
+            raise InputError(msg) from None
+        if time_s > partition.max_time_s:
+            msg = (
+                f"--time {wanted}: {where} allows {partition.max_time}; ask for less: a run that needs longer is "
+                "stopped at a checkpoint and queued again"
+            )
+            raise InputError(msg)
+    if time_s <= cluster.signal_lead_s:
+        msg = (
+            f"--time {wanted or partition.max_time}: runs are told to stop {cluster.signal_lead_s} s before the end "
+            f"(signal_lead_s of {cluster.name}), so nothing would be computed; ask for more"
+        )
+        raise InputError(msg)
+    return time_s

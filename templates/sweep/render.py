@@ -1,0 +1,199 @@
+"""Jinja2 templates whose values cannot break out of the YAML they are put into.
+
+A template is text, so that loops and conditions may shape a scene. Values never become part of
+that text: each `{{ … }}` leaves a placeholder, the text is read as YAML, and the placeholders are
+then replaced by the values themselves. A value that stands alone keeps its type; a value within
+longer or quoted text becomes text. No string, however hostile, can add a key or end a quotation.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, NoReturn
+
+import jinja2
+import yaml
+from jinja2 import nodes
+from jinja2.runtime import Context
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+from dem.errors import InputError
+from dem.scene.yaml_text import StrictLoader, parse_yaml
+from templates.sweep.texts import nearest
+
+Value = Any
+"""What a variable may hold: None, bool, int, float, str, and lists and mappings of these."""
+
+_REFUSED = (nodes.Macro, nodes.CallBlock, nodes.FilterBlock, nodes.AssignBlock)
+
+
+class _Environment(ImmutableSandboxedEnvironment):
+    """Sandboxed; a misspelt name is an error; powers are computed as floats, in bounded time."""
+
+    intercepted_binops = frozenset({"**", "*"})
+
+    def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
+        for side in (left, right):
+            if not isinstance(side, int | float):
+                msg = f"{operator!r} takes numbers: got {side!r}"
+                raise jinja2.TemplateRuntimeError(msg)
+        if operator == "*":
+            return left * right
+        try:
+            power = float(left) ** float(right)
+        except OverflowError:
+            msg = f"{left} ** {right} is too large a number"
+            raise jinja2.TemplateRuntimeError(msg) from None
+        whole = isinstance(left, int) and isinstance(right, int) and right >= 0
+        return int(power) if whole else power
+
+
+def _environment(finalize: Callable[..., Any] | None = None) -> _Environment:
+    return _Environment(
+        undefined=jinja2.StrictUndefined,
+        finalize=finalize,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def _plain(value: Value) -> bool:
+    if isinstance(value, list | tuple):
+        return all(_plain(item) for item in value)
+    if isinstance(value, dict):
+        return all(isinstance(key, str) and _plain(item) for key, item in value.items())
+    return value is None or isinstance(value, bool | int | float | str)
+
+
+def _line(error: BaseException) -> int | None:
+    """Line of the template in which a rendering error arose."""
+    line, step = None, error.__traceback__
+    while step is not None:
+        if step.tb_frame.f_code.co_filename == "<template>":
+            line = step.tb_lineno
+        step = step.tb_next
+    return line
+
+
+def _refuse(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
+    """Raise the InputError that explains why a template or an expression failed."""
+    text = " ".join(str(error).split())
+    if isinstance(error, jinja2.UndefinedError):
+        name = re.match(r"'([^']+)' is undefined", text)
+        advice = nearest(name[1], values) if name else f"defined: {', '.join(sorted(values))}"
+        msg = f"{where}: {text}; {advice}"
+    else:
+        msg = f"{where}: {text or type(error).__name__}; correct it"
+    raise InputError(msg) from error
+
+
+# What templates and expressions raise: Jinja2's own errors and those of the values in them.
+_FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError)
+
+
+def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
+    """Value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
+
+    Args:
+        expression: the expression, without braces.
+        values: the variables it may use.
+        source: file and key, for the error message.
+
+    Raises:
+        InputError: it uses an unknown name, fails, or gives something that is not plain data.
+    """
+    environment = _environment()
+    try:
+        result = environment.compile_expression(expression, undefined_to_none=False)(**values)
+        if isinstance(result, jinja2.Undefined):
+            str(result)  # StrictUndefined raises, with the name
+    except _FAILURES as error:
+        _refuse(error, f"{source} = {expression!r}", values)
+    if not _plain(result):
+        what = type(result).__name__
+        msg = f"{source} = {expression!r}: gives {what}; it must give numbers or text"
+        raise InputError(msg)
+    return result
+
+
+def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
+    """A short text with `{{ … }}` in it, rendered as it stands; for names, not for YAML.
+
+    Raises:
+        InputError: it uses an unknown name, or fails.
+    """
+    try:
+        return _environment().from_string(template).render(**values)
+    except _FAILURES as error:
+        _refuse(error, f"{source} = {template!r}", values)
+
+
+def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
+    """The data a YAML template gives for some values.
+
+    Args:
+        template: YAML with Jinja2 in it.
+        values: the variables it may use.
+        source: the template's file, for error messages.
+
+    Returns:
+        Mappings, lists and plain values.
+
+    Raises:
+        InputError: an unknown name, a Jinja2 or YAML mistake; the message names the line.
+    """
+    prefix = "value"
+    while prefix in template or prefix in repr(values):
+        prefix += "x"
+    held: list[Value] = []
+
+    @jinja2.pass_context  # called while rendering only, not when constants are folded
+    def hold(_: Context, value: Value) -> str:
+        if isinstance(value, jinja2.Undefined):
+            str(value)  # StrictUndefined raises, with the name
+        if not _plain(value):
+            msg = f"{{{{ … }}}} gives {type(value).__name__}; it must give numbers, text or lists"
+            raise jinja2.TemplateRuntimeError(msg)
+        held.append(value)
+        return f"{prefix}{len(held) - 1}z"
+
+    environment = _environment(hold)
+    try:
+        tree = environment.parse(template)
+        refused = next(tree.find_all(_REFUSED), None)
+        if refused is not None:
+            msg = "macro, call, filter and set blocks make text out of values; use plain {{ … }}"
+            raise jinja2.TemplateSyntaxError(msg, refused.lineno)
+        text = environment.from_string(template).render(**values)
+    except _FAILURES as error:
+        number = getattr(error, "lineno", None) or _line(error)
+        _refuse(error, f"{source}, line {number}" if number else source, values)
+    return parse_yaml(text, source, _loader(re.compile(rf"{prefix}(\d+)z"), held))
+
+
+def _loader(placeholder: re.Pattern[str], held: list[Value]) -> type[StrictLoader]:
+    """A loader that puts held values in the place of their placeholders."""
+
+    class Loader(StrictLoader):
+        pass
+
+    def construct(_: Loader, node: yaml.ScalarNode) -> Value:
+        whole = placeholder.fullmatch(node.value)
+        if whole and node.style is None:
+            return held[int(whole[1])]
+
+        def text(found: re.Match[str]) -> str:
+            value = held[int(found[1])]
+            if isinstance(value, list | tuple | dict):
+                problem = f"a list or mapping within text: {value!r}"
+                raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+            if value is None or isinstance(value, bool):
+                return {None: "null", True: "true", False: "false"}[value]
+            return str(value)
+
+        return placeholder.sub(text, node.value)
+
+    Loader.add_constructor("tag:yaml.org,2002:str", construct)
+    return Loader
