@@ -13,9 +13,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.chain import extent
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.phases.chain import extent
+from dem.engine.yade.engine import YadeEngine
 from dem.physics.motor import Motors
 from dem.record.columns import (
     COLUMNS,
@@ -94,14 +94,14 @@ class SeriesWriter:
                 columns |= more
         return columns
 
-    def sample(self, engine: Engine, state: State, phase: int) -> float:
+    def sample(self, engine: YadeEngine, state: State, phase: int) -> float:
         """Take one sample.
 
         Returns:
             The packing fraction [1].
         """
         boxes = engine.particle.boxes
-        heights = state.positions[:, 2] - engine.floor
+        heights = state.positions[:, 2] - engine.fixtures.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
         more: dict[str, Any] = {}
@@ -128,8 +128,8 @@ class SeriesWriter:
             "time_s": engine.time,
             "phase": phase,
             "count": engine.count,
-            "container_z_m": engine.floor,
-            "container_velocity_m_per_s": engine.container_velocity,
+            "container_z_m": engine.fixtures.floor,
+            "container_velocity_m_per_s": engine.fixtures.velocity,
             "container_force_N": container_force,
             "com_height_m": heights.mean() if len(heights) else math.nan,
             "kinetic_energy_J": state.kinetic_energy,
@@ -150,7 +150,7 @@ class SeriesWriter:
             self._rows[name].append(value)
         return phi
 
-    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _mean_force(self, engine: YadeEngine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
         # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
         # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
         # Smarticles are added at rest, so a layer that was poured in between brings no momentum.
@@ -162,7 +162,7 @@ class SeriesWriter:
         mean: NDArray[np.float64] = lost / (time - before[0])
         return mean
 
-    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
+    def _hook_forces(self, engine: YadeEngine) -> NDArray[np.float64]:
         steps, sums, before = engine.steps, engine.fixtures.hook_sums, self._hooks_before
         self._hooks_before = (steps, sums)
         if before is None or steps <= before[0]:
@@ -170,7 +170,7 @@ class SeriesWriter:
         mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
         return mean
 
-    def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
+    def _strain_row(self, engine: YadeEngine, state: State) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
         row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
         row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
@@ -237,10 +237,10 @@ class SeriesWriter:
         path.write_bytes(content.getvalue())
 
 
-def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
+def _motor_row(engine: YadeEngine, state: State) -> dict[str, Any]:
     motors: Motors | None = engine.motors
     angles = _mean(state.angles)
-    if motors is None or not engine.articulated:
+    if motors is None or not engine.motors.articulated:
         unknown = math.nan
         held = angles if motors is None else _mean(motors.commands)
         behind = error = torque = halted = unknown
@@ -258,11 +258,11 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
         "motor_torque_N_m": torque,
         "halted_fraction": halted,
         "motor_work_J": 0.0 if motors is None else motors.work.sum(),
-        "joint_gap_m": engine.joint_gaps().max(initial=0.0),
+        "joint_gap_m": engine.motors.gaps().max(initial=0.0),
     }
 
 
-def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
+def _ledger_row(engine: YadeEngine, row: Mapping[str, Any]) -> dict[str, Any]:
     contacts, hinges = engine.account.elastic()
     given = engine.account.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
     stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges

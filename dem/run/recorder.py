@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
 from dem.record.progress import Progress
 from dem.record.series import SeriesWriter
@@ -50,7 +50,7 @@ class Recorder:
     next_step: int = 0
     """When the next one is due."""
 
-    def record(self, engine: Engine, phase: int) -> None:
+    def record(self, engine: YadeEngine, phase: int) -> None:
         """Take what is due at this step; the state is read once for all.
 
         Raises:
@@ -61,12 +61,12 @@ class Recorder:
         if engine.count and self.samples % self.frame_every == 0:
             mesh = frame_mesh(
                 state,
-                contacts=engine.contacts(),
+                contacts=engine.neighbours(),
                 time=engine.time,
-                floor=engine.floor,
+                floor=engine.fixtures.floor,
                 phase=phase,
-                hinged=engine.hinged,
-                motors=engine.motors if engine.articulated else None,
+                hinged=engine.motors.present,
+                motors=engine.motors if engine.motors.articulated else None,
             )
             self.frames.write(mesh, engine.time)
             self.series.write()
@@ -79,11 +79,11 @@ class Recorder:
         self.samples += 1
         self.schedule(engine)
 
-    def schedule(self, engine: Engine) -> None:
+    def schedule(self, engine: YadeEngine) -> None:
         """Find the step that is nearest to the time of the next sample; to be called when the time step changes."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
-    def watch(self, engine: Engine, state: State | None = None) -> None:
+    def watch(self, engine: YadeEngine, state: State | None = None) -> None:
         """Let the watchdog look at everything.
 
         Raises:
@@ -92,15 +92,15 @@ class Recorder:
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         watchdog.check(
             state,
-            floor=engine.floor,
+            floor=engine.fixtures.floor,
             time=time,
             spheres=state.spheres(engine.particle),
             raised=engine.fixtures.raised,
-            gaps=engine.joint_gaps() if engine.articulated else None,
+            gaps=engine.motors.gaps() if engine.motors.articulated else None,
         )
-        strain = engine.strain(watchdog.depth)
+        strain = engine.overlaps(watchdog.depth)
         watchdog.check_depths(strain, time=time)
-        given = engine.account.given + engine.motor_work
+        given = engine.account.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
         watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
 

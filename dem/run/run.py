@@ -17,14 +17,18 @@ import h5py
 import meshio
 import numpy as np
 
-from dem.engine.yade.engine import Engine
-from dem.engine.yade.hinges import DAMPER_TIME
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.hinge_law import DAMPER_TIME
+from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.errors import InputError, RunError
+from dem.phases.pull_hook import PullHook
+from dem.phases.shake import Shake
+from dem.physics.contact import contact_law
 from dem.physics.motor import MotorLaw
-from dem.physics.stability import contact_law, hinge_law, time_steps
 from dem.plan import effects
 from dem.plan.advice import warnings_of
+from dem.plan.steps import time_steps
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_json, write_text
 from dem.record.frames import FrameWriter
@@ -44,9 +48,9 @@ from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, dump_scene, scene_hash
-from dem.setting.hooks import PullHook
-from dem.setting.parts import Shake, shake_amplitude
+from dem.scene.reading import dump_scene, scene_hash
+from dem.scene.scene import Scene
+from dem.setting.parts import shake_amplitude
 
 FORMAT = 1
 GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
@@ -260,9 +264,9 @@ def manifest(scene: Scene, *, steps: Sequence[float], command: str, yade: str, t
     } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
 
 
-def build_engine(scene: Scene, dt: float) -> Engine:
+def build_engine(scene: Scene, dt: float) -> YadeEngine:
     """The engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
-    return Engine(
+    return YadeEngine(
         particle=scene.particle,
         cylinder=scene.cylinder,
         law=contact_law(scene),

@@ -12,12 +12,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.phases.stages import Stage, begin
+from dem.phases.phase import Stage
+from dem.phases.stages import begin
 from dem.record.checkpoint import CURRENT, Checkpoint, write_checkpoint
 from dem.run.recorder import Recorder
-from dem.scene.scene import Scene, scene_hash
+from dem.scene.reading import scene_hash
+from dem.scene.scene import Scene
 
 SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
 
@@ -41,7 +43,7 @@ class Simulation:
     """
 
     scene: Scene
-    engine: Engine
+    engine: YadeEngine
     recorder: Recorder
     folder: Path
     log: logging.Logger

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.engine.yade.strain import Strain
 from dem.errors import refuse
+from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ class Watchdog:
             "raise container.height_m or shake less",
         )
 
-    def check_depths(self, strain: Strain, *, time: float) -> None:
+    def check_depths(self, strain: Overlaps, *, time: float) -> None:
         """Look at all contacts once.
 
         Args:

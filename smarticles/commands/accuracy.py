@@ -119,7 +119,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _study(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Study:
-    from dem.scene.scene import load_scene  # noqa: PLC0415
+    from dem.scene.reading import load_scene  # noqa: PLC0415
     from studies.accuracy.ladder import affordable, build_ladder, ladder_sweep, parse_knobs  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
 

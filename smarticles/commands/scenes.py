@@ -195,8 +195,8 @@ def compute(
 
 def _load(scene_file: Path, settings: Sequence[str]) -> Scene:
     """A scene whose time steps are known to be good as well; errors name the file."""
-    from dem.physics.stability import time_steps  # noqa: PLC0415
-    from dem.scene.scene import load_scene  # noqa: PLC0415
+    from dem.plan.steps import time_steps  # noqa: PLC0415
+    from dem.scene.reading import load_scene  # noqa: PLC0415
 
     scene = load_scene(scene_file, settings)
     try:
@@ -246,7 +246,7 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
 
 def print_schema(_: argparse.Namespace) -> int:
     """`smarticles schema`."""
-    from dem.scene.scene import json_schema  # noqa: PLC0415
+    from dem.scene.reading import json_schema  # noqa: PLC0415
 
     print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return 0

@@ -112,7 +112,7 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     Raises:
         InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
     """
-    from dem.setting.parts import FIDELITIES  # noqa: PLC0415
+    from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
 

@@ -21,7 +21,7 @@ import pytest
 import yaml
 from run_files import frame_files, series
 
-from dem.scene.scene import load_scene, scene_hash
+from dem.scene.reading import load_scene, scene_hash
 
 pytestmark = pytest.mark.engine
 

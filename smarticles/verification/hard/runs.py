@@ -13,12 +13,13 @@ import numpy as np
 
 import dem.run.run
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.engine.yade.strain import Strain
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import InputError, RunError
+from dem.physics.overlaps import Overlaps
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 from smarticles.verification.hard.check import Check, below, near
 
 
@@ -38,7 +39,7 @@ class Noting(Watchdog):
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
-    def check_depths(self, strain: Strain, **options: Any) -> None:
+    def check_depths(self, strain: Overlaps, **options: Any) -> None:
         """See `Watchdog`."""
         self._note("depth", strain.deepest / self.depth)
         super().check_depths(strain, **options)
@@ -129,7 +130,7 @@ def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
     scene, spent = None, [0.0]
     looked = Recorder.watch
 
-    def watch(recorder: Recorder, engine: Engine, state: State | None = None) -> None:
+    def watch(recorder: Recorder, engine: YadeEngine, state: State | None = None) -> None:
         begun = time.process_time()
         try:
             looked(recorder, engine, state)

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from dem.plan.durations import run_duration
 
 from dem.plan.advice import warnings_of
-from dem.plan.durations import run_duration
 from dem.plan.outlook import plan
 from dem.scene.scene import Scene
 
