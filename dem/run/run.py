@@ -28,12 +28,9 @@ from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_json, write_text
 from dem.record.frames import FrameWriter
+from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, SCENE
 from dem.record.progress import Progress
 from dem.record.rundir import (
-    DONE,
-    FAILED,
-    MANIFEST,
-    SCENE,
     claimed,
     log_of,
     mark_done,
@@ -42,13 +39,13 @@ from dem.record.rundir import (
 )
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
+from dem.run.sampler import Sampler
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.run.watchdog import Watchdog
 from dem.scene.scene import Scene, dump_scene, scene_hash
 from dem.setting.hooks import PullHook
 from dem.setting.parts import Shake, shake_amplitude
 
-FORMAT = 1
 GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
 SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
 # Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
@@ -202,7 +199,7 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
         log.info("resumed from the start: no checkpoint was written")
         simulation.recorder.truncate({})
         return
-    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=("yade", yade))
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
@@ -231,7 +228,7 @@ def manifest(scene: Scene, *, steps: Sequence[float], command: str, yade: str, t
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
     return {
-        "format": FORMAT,
+        "format": MANIFEST_FORMAT,
         "name": scene.name,
         "scene_sha256": scene_hash(scene),
         "seed": scene.seed,
@@ -308,18 +305,18 @@ def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
         default=0.0,
     )
     moved = max((getattr(phase, "speed_m_per_s", None) or 0.0 for phase in scene.phases), default=0.0)
+    sampler = Sampler(
+        radius,
+        motors=effects.MOTORS.called_for(scene),
+        energy=effects.ENERGIES.called_for(scene),
+        ledger=effects.ENERGY_ACCOUNT.called_for(scene),
+        hooks=effects.HOOKS.called_for(scene),
+        release=effects.WALL_REMOVAL.called_for(scene),
+        strained=effects.STRINGS.called_for(scene),
+    )
     return Recorder(
-        series=SeriesWriter(
-            out,
-            radius,
-            {"scene_sha256": scene_hash(scene), "seed": scene.seed},
-            motors=effects.MOTORS.called_for(scene),
-            energy=effects.ENERGIES.called_for(scene),
-            ledger=effects.ENERGY_ACCOUNT.called_for(scene),
-            hooks=effects.HOOKS.called_for(scene),
-            release=effects.WALL_REMOVAL.called_for(scene),
-            strained=effects.STRINGS.called_for(scene),
-        ),
+        sampler=sampler,
+        series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
         frames=FrameWriter(out),
         watchdog=Watchdog(
             cylinder=scene.cylinder,

@@ -15,7 +15,8 @@ from typing import Any
 from dem.engine.yade.engine import Engine
 from dem.errors import RunError
 from dem.phases.stages import Stage, begin
-from dem.record.checkpoint import CURRENT, Checkpoint, write_checkpoint
+from dem.record.checkpoint import Checkpoint, write_checkpoint
+from dem.record.names import CHECKPOINT
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene, scene_hash
 
@@ -160,8 +161,6 @@ class Simulation:
             saved.unlink(missing_ok=True)
         assert self._stage is not None  # a checkpoint is taken while a phase runs
         state = {
-            "yade": self.yade,
-            "scene_sha256": scene_hash(self.scene),
             "engine": memory,
             "recorder": self.recorder.memory,
             "phase": self._phase,
@@ -171,7 +170,14 @@ class Simulation:
             "wall_s": self.wall,
             "cpu_s": self.cpu,
         }
-        write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
+        checkpoint = Checkpoint(
+            scene_sha256=scene_hash(self.scene),
+            made_by=("yade", self.yade),
+            state=state,
+            series=self.recorder.series.columns,
+            engine=content,
+        )
+        write_checkpoint(self.folder, checkpoint)
         self._note_checkpoint()
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
@@ -183,7 +189,7 @@ class Simulation:
 
     def _check_space(self) -> None:
         # YADE does not notice a full disk when it saves, and would then load what it could not write.
-        newest = self.folder / CURRENT
+        newest = self.folder / CHECKPOINT
         needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
         free = shutil.disk_usage(self.folder).free
         if free < needed:

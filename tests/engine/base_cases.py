@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from dem.engine.yade.engine import Engine
 from dem.errors import RunError
 from dem.phases.stages import begin, shake_amplitude
 from dem.physics.stability import time_step
-from dem.record.series import SeriesWriter
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 
 
@@ -109,19 +108,19 @@ def shaken_pile(data: dict[str, Any], *, count: int, samples: int, every: int) -
     wall = without_wall(engine, scene)
     amplitude, frequency = last_shake(scene)
     engine.shake(amplitude=amplitude, frequency=frequency)
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
-    means = []
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
+    means, balance = [], []
     stale = 0
     for _ in range(samples):
         forces: list[np.ndarray] = []
         advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
         means.append(np.mean(forces, axis=0))
-        writer.sample(engine, engine.state(), 0)
+        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
         stale += sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
     return {
         "steps": np.array(means),
-        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "balance": np.array(balance),
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
         "stale": stale,
     }

@@ -15,8 +15,8 @@ from dem.errors import RunError
 from dem.phases.stages import begin
 from dem.physics.stability import contact_law, time_step
 from dem.record.progress import Progress
-from dem.record.series import SeriesWriter
 from dem.run.run import build_recorder
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from smarticles.verification.bench import FLAT, add, advance_watched
 
@@ -288,7 +288,7 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(SeriesWriter(Path(), 1.0, {}, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, hooks=scene.hooks is not None).described),
     }
 
 

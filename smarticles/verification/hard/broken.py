@@ -12,7 +12,7 @@ from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.engine import Engine
 from dem.errors import RunError
 from dem.physics.stability import stable_step
-from dem.record.rundir import FAILED
+from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
 from dem.setting.container import WALL_MATERIAL
