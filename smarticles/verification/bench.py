@@ -21,10 +21,9 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law
+from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
 from dem.physics.contact import ContactLaw, damping_ratio
 from dem.plan.steps import time_step
-from dem.run.run import motor_law
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder

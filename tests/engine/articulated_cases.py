@@ -16,9 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law
+from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
 from dem.plan.steps import time_step
-from dem.run.run import motor_law
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from smarticles.verification.bench import bodies, drive

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from fixture_cases import damped
 from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
 from dem.plan.steps import time_step
-from dem.record.series import SeriesWriter
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 
 
@@ -108,19 +107,19 @@ def shaken_pile(data: dict[str, Any], *, count: int, samples: int, every: int) -
     wall = without_wall(engine, scene)
     amplitude, frequency = last_shake(scene)
     engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
-    means = []
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
+    means, balance = [], []
     stale = 0
     for _ in range(samples):
         forces: list[np.ndarray] = []
         advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
         means.append(np.mean(forces, axis=0))
-        writer.sample(engine, engine.state(), 0)
+        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
         stale += sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
     return {
         "steps": np.array(means),
-        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "balance": np.array(balance),
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
         "stale": stale,
     }
@@ -136,11 +135,11 @@ def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
     scene = load(data | {"count": 1, "phases": phases})
     engine = build(scene, shaken=True)
     add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
-    lifting = scene.phases[1].begin(scene, 1)
+    lifting = scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
     while wait := lifting.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     try:
-        scene.phases[2].begin(scene, 2).proceed(engine)
+        scene.phases[2].scene.phases[2].scene.phases[2].scene.phases[2].begin(scene, 2).proceed(engine)
     except RunError as error:
         return str(error)
     return "nothing"

@@ -21,8 +21,8 @@ from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
-from dem.record.series import SeriesWriter
 from dem.run.run import run_scene
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from smarticles.verification.bench import add, advance_watched, body_rotations, push
@@ -116,15 +116,15 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     engine = build(scene)
     pour(engine, scene, count)
     engine.advance(round(settle / engine.time_step))
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
     forces: list[np.ndarray] = []
     advance_watched(engine, watch, lambda: forces.append(engine.container_force()))
     state = engine.state()
-    writer.sample(engine, state, 0)
+    balance = sampler.sample(engine, state, 0)["container_force_N"]
     return {
         "forces": np.array(forces),
-        "balance": writer._rows["container_force_N"][-1],
+        "balance": balance,
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
         "speed": np.linalg.norm(state.velocities, axis=1).max(),
         "unbalanced": engine.unbalanced_force(),
@@ -179,17 +179,17 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     engine.advance(round(0.15 / engine.time_step))
     phase = next(p for p in scene.phases if p.type == "shake")
     engine.fixtures.shake(amplitude=phase.amplitude(scene.gravity_m_per_s2), frequency=phase.frequency_hz)
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
-    means = []
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
+    means, balance = [], []
     for _ in range(samples):
         forces: list[np.ndarray] = []
         advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
         means.append(np.mean(forces, axis=0))
-        writer.sample(engine, engine.state(), 0)
+        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
     return {
         "steps": np.array(means),
-        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "balance": np.array(balance),
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
     }
 

@@ -19,8 +19,8 @@ from dem.engine.yade.engine import YadeEngine
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.plan.steps import time_step
+from dem.run.build import build_engine
 from dem.run.recorder import Recorder
-from dem.run.run import build_engine
 
 # What every run directory holds, whatever the scene calls for.
 OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}

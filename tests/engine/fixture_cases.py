@@ -15,8 +15,8 @@ from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.record.progress import Progress
-from dem.record.series import SeriesWriter
-from dem.run.run import build_recorder
+from dem.run.build import build_recorder
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from smarticles.verification.bench import FLAT, add, advance_watched
 
@@ -288,7 +288,7 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(SeriesWriter(Path(), 1.0, {}, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, hooks=scene.hooks is not None).described),
     }
 
 
@@ -300,7 +300,7 @@ def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dic
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].begin(scene, 1)
+    stage = scene.phases[1].scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

@@ -13,7 +13,7 @@ from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
-from dem.record.rundir import FAILED
+from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
 from smarticles.verification.bench import add, push

@@ -116,12 +116,13 @@ import sys
 from pathlib import Path
 import numpy as np
 from dem.errors import RunError
+from dem.record.columns import COLUMNS
 from dem.record.series import SeriesWriter
 
 def write(length):
-    writer = SeriesWriter(Path(sys.argv[1]), 0.0234, {"seed": 1})
-    for name, rows in writer._rows.items():
-        rows += [np.zeros(3) if name == "container_force_N" else 0.0] * length
+    writer = SeriesWriter(Path(sys.argv[1]), COLUMNS, {"seed": 1})
+    for _ in range(length):
+        writer.add({name: np.zeros(3) if name == "container_force_N" else 0.0 for name in COLUMNS})
     writer.write()
 
 write(10)

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
-from dem.physics.motor import MotorLaw, Motors
 from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
 
 W, RATIO = 0.0117, 0.7
@@ -83,12 +82,11 @@ def test_cells_and_data_follow_the_contract(tmp_path: Path) -> None:
 
 def test_scenes_with_motors_carry_angle_torque_work_and_halts_of_each_barb(tmp_path: Path) -> None:
     angles = np.linspace(0.2, 1.1, 2 * COUNT).reshape(COUNT, 2)
-    motors = Motors(MotorLaw(torque_limit=1.0, speed_limit=6.0, stiffness=1.0, law="halt"), angles)
-    motors.torques, motors.work = angles + 1, angles + 2
-    motors.halted[1, 0] = True
+    halted = np.zeros((COUNT, 2), dtype=bool)
+    halted[1, 0] = True
     state, common = make_state(), {"contacts": np.zeros(COUNT, dtype=np.int64), "time": 0, "floor": 0, "phase": 0}
-    for at_work in (motors, None):
-        FrameWriter(tmp_path).write(frame_mesh(state, hinged=True, motors=at_work, **common), 0)
+    for at_work in ({"torques": angles + 1, "work": angles + 2, "halted": halted}, {}):
+        FrameWriter(tmp_path).write(frame_mesh(state, hinged=True, **at_work, **common), 0)
         mesh = meshio.read(tmp_path / "frames" / "frame_000000.vtu")
         data = {name: values[0].reshape(COUNT, 3) for name, values in mesh.cell_data.items() if values[0].ndim == 1}
         assert data["angle_rad"][:, [0, 2]] == pytest.approx(np.full((COUNT, 2), math.pi / 2))
