@@ -36,7 +36,7 @@ def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:
         lows.append(engine.state().positions[0, 2])
         gaps.append(engine.motors.gaps().max())
     d, particle = described.sphere_diameter, described.particle
-    work = 0.0 if engine.motors is None else max(0.0, float(engine.motors.work.sum()))
+    work = max(0.0, engine.motors.work)
     # As deep as if one spring took it all.
     depth = speed * math.sqrt(particle.boxes.mass / described.fidelity.stiffness_N_per_m)
     return [
