@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.commands.studies import STUDIES, Analysis
-from smarticles.commands.sweeps import add_slots, compute, make_folder, refuse_failures
-from smarticles.parsing import Commands
+from smarticles.parsing import Commands, add_slots
+from smarticles.sweeps import compute, make_folder, refuse_failures
 
 if TYPE_CHECKING:
     from templates.sweep.expand import Point
