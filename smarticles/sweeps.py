@@ -68,21 +68,24 @@ def expected_wall_s(scene: Scene) -> float:
     return plan(scene).wall_s
 
 
-def complete(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Run what a sweep is missing; refuse if anything is missing then."""
-    outcomes = compute(folder, arguments)
-    refuse_failures(folder, outcomes)
-    print(f"{folder.path}: all {len(outcomes)} runs are done; next: smarticles measure {folder.path}")
-    return 0
+def complete(folder: Folder, *, jobs: int | None, command: str) -> None:
+    """Run what a sweep is missing.
 
-
-def compute(folder: Folder, arguments: argparse.Namespace) -> list[Outcome]:
-    """Run what a sweep is missing, and show how it goes.
+    Args:
+        folder: the sweep's directory.
+        jobs: runs at once; None: one per core.
+        command: what to give again after Ctrl-C.
 
     Raises:
         InputError: runs of the sweep are in a queue.
+        RunError: a run failed.
         KeyboardInterrupt: Ctrl-C; the message says how to go on.
     """
+    refuse_failures(folder, compute(folder, jobs=jobs, command=command))
+
+
+def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
+    """The same, but a run that failed is told, not raised."""
     from rich.console import Console  # noqa: PLC0415
 
     from templates.local.display import display_for  # noqa: PLC0415
@@ -91,10 +94,17 @@ def compute(folder: Folder, arguments: argparse.Namespace) -> list[Outcome]:
 
     refuse_queued(folder)
     try:
-        return run_folder(folder, display_for(Console(stderr=True)), slots=arguments.jobs)
+        return run_folder(folder, display_for(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
-        msg = f"finished runs are kept; go on with: {arguments.command_line}"
+        msg = f"finished runs are kept; go on with: {command}"
         raise KeyboardInterrupt(msg) from None
+
+
+def complete_and_tell(folder: Folder, arguments: argparse.Namespace) -> int:
+    """Run what a sweep is missing, for a command with --jobs; say what comes next."""
+    complete(folder, jobs=arguments.jobs, command=arguments.command_line)
+    print(f"{folder.path}: all {len(folder.entries)} runs are done; next: smarticles measure {folder.path}")
+    return 0
 
 
 def refuse_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:

@@ -18,7 +18,7 @@ from dem.plan.outlook import Plan, plan
 from dem.scene.scene import Scene, parse_scene
 from dem.setting.parts import FIDELITIES
 
-SHIPPED = Path(__file__).resolve().parent.parent.parent / "results" / "accuracy" / "work_precision.csv"
+SHIPPED = Path(__file__).with_name("work_precision.csv")
 """The table that is used unless another one is given; there only if it was measured."""
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"

@@ -9,7 +9,7 @@ from dem.errors import InputError
 from smarticles import queueing
 from smarticles.parsing import Commands, add_slots
 from smarticles.scenes import run_here
-from smarticles.sweeps import complete
+from smarticles.sweeps import complete_and_tell
 
 
 def add(commands: Commands) -> None:
@@ -61,4 +61,4 @@ def resume_sweep(arguments: argparse.Namespace) -> int:
     if arguments.submit == "none":
         msg = "--submit none: needs --cluster NAME, for which the script is written; see `smarticles resume --help`"
         raise InputError(msg)
-    return complete(folder, arguments)
+    return complete_and_tell(folder, arguments)

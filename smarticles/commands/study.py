@@ -90,7 +90,7 @@ def compute_and_analyse(
         InputError: no run is finished and none is to be started.
         RunError: a run failed.
     """
-    outcomes = [] if arguments.analyse else compute(folder, arguments)
+    outcomes = [] if arguments.analyse else compute(folder, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished:
         msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"

@@ -11,7 +11,7 @@ from dem.errors import InputError
 from smarticles import queueing
 from smarticles.layout import columns
 from smarticles.parsing import Commands, add_slots, positive_int
-from smarticles.sweeps import complete, expected_wall_s, make_folder
+from smarticles.sweeps import complete_and_tell, expected_wall_s, make_folder
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -92,7 +92,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
         return 0
-    return complete(folder, arguments)
+    return complete_and_tell(folder, arguments)
 
 
 def _place(arguments: argparse.Namespace) -> Path:
