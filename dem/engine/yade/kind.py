@@ -19,8 +19,6 @@ from dem.physics.motor import MotorLaw
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
-# A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
-ARTICULATED_SHARE = 1.7
 
 
 class YadeKind:
@@ -28,6 +26,8 @@ class YadeKind:
 
     name = "yade"
     damps_once_per_look = True
+    # Three bodies and four bonds each, and the motors' looks.
+    actuated_share = 1.7
 
     def version(self) -> str:
         """See the interface."""
@@ -55,10 +55,9 @@ class YadeKind:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
         return stable
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+    def seconds_per_step(self, scene: Demand) -> float:
         """See the interface."""
-        share = ARTICULATED_SHARE if actuated else 1.0
-        return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count * share
+        return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
 
     def build(self, scene: Demand, time_step: float) -> YadeEngine:
         """See the interface."""
