@@ -6,7 +6,7 @@ import logging
 import math
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -76,7 +76,9 @@ class RunOutcome:
     wall_s: float
 
 
-def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False) -> RunOutcome | None:
+def run_scene(
+    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+) -> RunOutcome | None:
     """Run a scene into a run directory.
 
     Args:
@@ -85,6 +87,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         command: the command line, for the manifest.
         progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
+        builders: what makes its parts; by default what a run has.
 
     Returns:
         The outcome; None where the run was done already and there was nothing to resume.
@@ -95,7 +98,8 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
-    steps = time_steps(scene)
+    builders = builders or Builders()
+    steps = builders.steps(scene)
     yade = yade_version()
     with claimed(out, resume=resume):
         if resume and (out / DONE).exists():
@@ -109,7 +113,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, steps=steps, yade=yade, progress=progress, resume=resume)
+            return _run(scene, out, log, builders, steps=steps, yade=yade, progress=progress, resume=resume)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -126,6 +130,7 @@ def _run(
     scene: Scene,
     out: Path,
     log: logging.Logger,
+    builders: Builders,
     *,
     steps: Sequence[float],
     yade: str,
@@ -135,11 +140,11 @@ def _run(
     bar = Progress(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
-        engine = build_engine(scene, min(steps))
+        engine = builders.engine(scene, min(steps))
         simulation = Simulation(
             scene=scene,
             engine=engine,
-            recorder=build_recorder(scene, out, bar),
+            recorder=builders.recorder(scene, out, bar),
             folder=out,
             log=log,
             yade=yade,
@@ -335,6 +340,21 @@ def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
         spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Builders:
+    """What makes the parts of a run; who watches or spoils one on purpose gives others.
+
+    Args:
+        steps: time step of each phase [s].
+        engine: of a scene and a time step [s].
+        recorder: of a scene, a run directory and its progress.
+    """
+
+    steps: Callable[[Scene], Sequence[float]] = time_steps
+    engine: Callable[[Scene, float], Engine] = build_engine
+    recorder: Callable[[Scene, Path, Progress], Recorder] = build_recorder
 
 
 def versions(yade: str) -> dict[str, str]:
