@@ -161,7 +161,7 @@ def _analyse(
     study: _Study, expected_s: Mapping[str, float], runs: Sequence[Path], output: Path, arguments: argparse.Namespace
 ) -> str:
     from studies.accuracy.ladder import SENSITIVITIES  # noqa: PLC0415
-    from studies.accuracy.runs import Rung  # noqa: PLC0415
+    from studies.accuracy.measure import Rung  # noqa: PLC0415
     from studies.accuracy.study import analyse_accuracy, told_rungs  # noqa: PLC0415
 
     ladder = study.ladder

@@ -54,7 +54,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
 
 def run_study(arguments: argparse.Namespace) -> int:
     """`smarticles study`."""
-    from studies.shipped import study_file  # noqa: PLC0415
+    from studies.base.shipped import study_file  # noqa: PLC0415
 
     study = STUDIES[arguments.name]
     file = study_file(arguments.name, quick=arguments.quick)
@@ -144,7 +144,7 @@ def _scenes(points: Sequence[Point]) -> set[str]:
 
 def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
     """How what is run differs from the full study as it ships, one line."""
-    from studies.shipped import differences, study_file  # noqa: PLC0415
+    from studies.base.shipped import differences, study_file  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
 

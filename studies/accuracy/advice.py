@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from postprocess.statistics.points import told_number
-from studies.accuracy.runs import (
+from studies.accuracy.measure import (
     COMPARED,
     COST,
     IS_REFERENCE,

@@ -1,6 +1,6 @@
 """What accuracy costs in time: the ladder of one scene, measured, and the advice that follows from it.
 
-What is measured of a run, and how errors and their bands come about, is in `studies.accuracy.runs`.
+What is measured of a run, and how errors and their bands come about, is in `studies.accuracy.measure`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.points import ToldTable, marked, told_number
-from studies.accuracy import figure as accuracy_figure
+from studies.accuracy import figures as accuracy_figure
 from studies.accuracy.advice import Advice, advise, label, told_closing, told_error
-from studies.accuracy.runs import (
+from studies.accuracy.measure import (
     ACTIVITY,
     COMPARED,
     COST,

@@ -19,7 +19,7 @@ from postprocess.measures.table import LAST_FRAMES
 from postprocess.report import figures
 from postprocess.report.markdown import table_lines
 from studies.base.runs import DEFINITION, MissingRun
-from studies.gravish.reference import CITATION, DIGITISING_ERROR, REFERENCE
+from studies.base.references import CITATION, DIGITISING_ERROR, REFERENCE
 
 
 def make_folder(path: Path | str) -> Path:

@@ -19,7 +19,7 @@ from postprocess.statistics.pairs import compared, mean_difference
 from postprocess.statistics.points import ToldTable, averaged, ordered, seeds_of, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.base.runs import ASPECT, SEED
-from studies.procedures.runs import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
+from studies.procedures.measure import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 
 ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 """Procedures in the order of tables and pictures."""

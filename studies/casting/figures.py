@@ -15,7 +15,7 @@ from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, legend_above, procedure_marker
 from studies.base.release import ORDER, around, removal
 from studies.base.runs import SEED
-from studies.casting.runs import (
+from studies.casting.measure import (
     AFTER,
     FILLED,
     FILLED_AFTER,
@@ -28,7 +28,7 @@ from studies.casting.runs import (
     WHOLE_AFTER,
     WHOLE_KEPT,
 )
-from studies.procedures.runs import INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.procedures.measure import INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,7 +20,7 @@ from studies.base.report import StudyReport
 from studies.base.runs import SEED, SEEDS, collect_runs, refuse_mixture, refuse_repeats, told_bars, told_seeds
 from studies.casting import figures as casting_figures
 from studies.casting.findings import findings
-from studies.casting.runs import (
+from studies.casting.measure import (
     FILLED,
     FILLED_AFTER,
     KEPT,
@@ -35,7 +35,7 @@ from studies.casting.runs import (
     casting_row,
     mould,
 )
-from studies.procedures.runs import PROCEDURE
+from studies.procedures.measure import PROCEDURE
 
 _STUDY = "casting"
 _NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(

@@ -1,7 +1,7 @@
 """The study `chain`: strain tests of a chain of robots between two walls against the findings of Savoie et al.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical experiment".
-What is measured of a run is in `studies.chain.runs`, what the paper found and how it is judged in
+What is measured of a run is in `studies.chain.measure`, what the paper found and how it is judged in
 `studies.chain.findings`.
 """
 
@@ -34,7 +34,7 @@ from studies.base.report import StudyReport
 from studies.base.runs import SEED, SEEDS, collect_runs, refuse_repeats, told_range
 from studies.chain import figures as chain_figures
 from studies.chain.findings import findings, sensitivity
-from studies.chain.runs import CONFINEMENT, COUNT, SPEED, VARIANT, chain_row, points
+from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT, chain_row, points
 
 _STUDY = "chain"
 

@@ -15,7 +15,7 @@ from studies.base.runs import ASPECT
 from studies.collapse.column import COM, CORE, REMAINING, column_history, vibration
 from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
 from studies.collapse.reference import ACCELERATIONS, read_collapse_reference
-from studies.collapse.runs import DEFINITION, GAMMA, LOG, WATCHED
+from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,7 +23,7 @@ from studies.collapse.law import (
     activations,
     check_law,
 )
-from studies.collapse.runs import DEFINITION
+from studies.collapse.measure import DEFINITION
 
 INTERMEDIATE = 0.40
 """l/w of Gravish's greatest Δ [-]."""

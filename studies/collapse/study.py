@@ -2,7 +2,7 @@
 
 Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012): columns of
 u-particles collapse in τ = (1/f) exp(Δ/Γ), with Δ greatest at an intermediate l/w. A run pours, shakes with the wall,
-rests, takes the wall away, and shakes the floor. What is measured of a run is in `studies.collapse.runs`, by which
+rests, takes the wall away, and shakes the floor. What is measured of a run is in `studies.collapse.measure`, by which
 height in `studies.collapse.column`, Δ in `studies.collapse.law`, what is judged in `studies.collapse.findings`.
 """
 
@@ -36,7 +36,7 @@ from studies.collapse.column import DEFINITIONS, REMAINING, REST, vibration
 from studies.collapse.findings import findings, told_delta
 from studies.collapse.law import ACTIVATION, CENSORED, DEVIATION, HALF_WIDTH, REFERENCE, USED, activations, levels
 from studies.collapse.reference import COLLAPSE
-from studies.collapse.runs import COLUMNS, DEFINITION, FREQUENCY, GAMMA, HEIGHT_BEFORE, WATCHED, collapse_rows
+from studies.collapse.measure import COLUMNS, DEFINITION, FREQUENCY, GAMMA, HEIGHT_BEFORE, WATCHED, collapse_rows
 from studies.collapse.time import LEAST_FALL, WORST_ERROR
 
 _STUDY = "collapse"

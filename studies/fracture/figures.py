@@ -26,9 +26,9 @@ from studies.base.figures import (
 )
 from studies.base.runs import ASPECT
 from studies.fracture.findings import SHOWN_ASPECT, at_shown_aspect
-from studies.fracture.runs import HELD_FAST, PEAK, force_history
+from studies.fracture.measure import HELD_FAST, PEAK, force_history
 from studies.procedures.effects import of_procedure
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     AMPLITUDE,
     CROSSINGS,
     EXTERNAL,

@@ -1,7 +1,7 @@
 """The study `fracture`: a hook is pulled out of piles prepared by the procedures of Savoie et al.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading
-and fracture". What is measured of a pull is in `postprocess.measures.pull`, of a run in `studies.fracture.runs`, what the
+and fracture". What is measured of a pull is in `postprocess.measures.pull`, of a run in `studies.fracture.measure`, what the
 paper found and how it is judged in `studies.fracture.findings`.
 """
 
@@ -31,7 +31,7 @@ from studies.base.runs import (
 )
 from studies.fracture import figures as fracture_figures
 from studies.fracture.findings import findings
-from studies.fracture.runs import (
+from studies.fracture.measure import (
     ABOVE,
     ACCOUNT,
     CAME_FREE,
@@ -47,7 +47,7 @@ from studies.fracture.runs import (
     WORK,
     fracture_row,
 )
-from studies.procedures.runs import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
+from studies.procedures.measure import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
 
 _STUDY = "fracture"
 

@@ -3,7 +3,7 @@
 Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012):
 steel staples shaken vertically at 30 Hz and a peak acceleration of 2 g for 20 s. Their points are
 digitised (`reference/README.md`); they are compared at equal l/w only and never interpolated.
-How errors and answers come about is in `studies.gravish.answers`.
+How errors and answers come about is in `studies.gravish.findings`.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from studies.base.runs import (
     told_shaken,
 )
 from studies.gravish import figures as gravish_figures
-from studies.gravish.answers import (
+from studies.gravish.findings import (
     Verdict,
     answers,
     deviations_from_reference,
     steps_between_ratios,
     summarise_runs,
 )
-from studies.gravish.reference import DIGITISING_ERROR, SHAKE_TIME, read_reference
+from studies.base.references import DIGITISING_ERROR, SHAKE_TIME, read_reference
 
 _STUDY = "gravish"
 

@@ -12,8 +12,8 @@ from postprocess.report import figures
 from studies.base.figures import COLOURS, History, bin_width, draw_history, finished
 from studies.base.release import ORDER, around, removal
 from studies.base.runs import ASPECT, SEED
-from studies.melting.runs import CONTACT, ENTANGLED, HEIGHT, LIFT, SLOUGHED, SPREAD, TILT, Melting
-from studies.procedures.runs import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.melting.measure import CONTACT, ENTANGLED, HEIGHT, LIFT, SLOUGHED, SPREAD, TILT, Melting
+from studies.procedures.measure import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -30,7 +30,7 @@ from studies.base.runs import (
 )
 from studies.melting import figures as melting_figures
 from studies.melting.findings import findings
-from studies.melting.runs import (
+from studies.melting.measure import (
     BASE,
     CONTACT,
     ENTANGLED,
@@ -45,7 +45,7 @@ from studies.melting.runs import (
     Melting,
     measure_melting,
 )
-from studies.procedures.runs import PROCEDURE
+from studies.procedures.measure import PROCEDURE
 
 _STUDY = "melting"
 _NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(

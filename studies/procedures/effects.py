@@ -11,7 +11,7 @@ from postprocess.statistics.findings import Verdict, all_of, judge, negative, to
 from postprocess.statistics.pairs import mean_difference, pairs
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from studies.base.runs import ASPECT, SEED
-from studies.procedures.runs import AMPLITUDE, INTERNAL, PROCEDURE, THETA
+from studies.procedures.measure import AMPLITUDE, INTERNAL, PROCEDURE, THETA
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:

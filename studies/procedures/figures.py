@@ -29,7 +29,7 @@ from studies.base.figures import (
 )
 from studies.base.runs import ASPECT
 from studies.procedures.effects import of_procedure
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     ACTIVE,
     AMPLITUDE,
     CROSSINGS,

@@ -25,7 +25,7 @@ from studies.procedures.effects import (
     paired,
     pairs_of,
 )
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     AMPLITUDE,
     CROSSINGS,
     ENERGY,

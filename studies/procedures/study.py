@@ -2,7 +2,7 @@
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: smarticles poured
 into a cylinder go through one of three activities. What is measured of a run is in
-`studies.procedures.runs`, what the paper found and how it is judged in `studies.procedures.findings`.
+`studies.procedures.measure`, what the paper found and how it is judged in `studies.procedures.findings`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from studies.base.runs import (
 )
 from studies.procedures import figures as procedures_figures
 from studies.procedures.findings import findings
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     ACTIVE,
     AMPLITUDE,
     CROSSINGS,

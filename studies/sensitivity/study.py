@@ -38,8 +38,8 @@ from studies.base.runs import (
     variant_of,
     variants_of,
 )
-from studies.gravish.reference import read_reference, reference_at
-from studies.sensitivity import figure as sensitivity_figure
+from studies.base.references import read_reference, reference_at
+from studies.sensitivity import figures as sensitivity_figure
 
 COMPARED: Mapping[str, str] = MappingProxyType(
     {

@@ -13,9 +13,9 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from postprocess.statistics.points import marked
-from studies.accuracy import figure as accuracy_figure
+from studies.accuracy import figures as accuracy_figure
 from studies.accuracy.advice import advise, told_closing
-from studies.accuracy.runs import (
+from studies.accuracy.measure import (
     ACTIVITY,
     COMPARED,
     COST,

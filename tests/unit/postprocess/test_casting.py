@@ -11,7 +11,7 @@ from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.scene_file import read_tiers
 from studies.casting import figures as casting_figures
-from studies.casting.runs import (
+from studies.casting.measure import (
     FILLED,
     FILLED_AFTER,
     HEIGHT,
@@ -25,7 +25,7 @@ from studies.casting.runs import (
     casting_row,
 )
 from studies.casting.study import analyse
-from studies.procedures.runs import PROCEDURE
+from studies.procedures.measure import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [

@@ -28,7 +28,7 @@ from postprocess.measures.strain import (
 )
 from studies.base.runs import SEED
 from studies.chain.findings import findings, sensitivity
-from studies.chain.runs import CONFINEMENT, COUNT, SPEED, VARIANT
+from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT
 
 
 def pull(*, yields: bool, jolt: float = 0.0) -> Pull:

@@ -21,7 +21,7 @@ from postprocess.statistics.points import marked
 from studies.base.origin import SAVOIE
 from studies.base.report import StudyReport
 from studies.chain import figures as chain_figures
-from studies.chain.runs import CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import CONFINEMENT, COUNT, VARIANT
 from studies.chain.study import analyse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}

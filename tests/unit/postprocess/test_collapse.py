@@ -29,7 +29,7 @@ from studies.collapse.law import (
     slope_through_origin,
 )
 from studies.collapse.reference import read_collapse_reference, reference_delta
-from studies.collapse.runs import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
+from studies.collapse.measure import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
 from studies.collapse.study import analyse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}

@@ -18,7 +18,7 @@ from smarticles.commands.studies import STUDIES, Analysis
 from studies.base.runs import ASPECT, SEED, SEEDS
 from studies.fracture import figures as fracture_figures
 from studies.fracture.findings import findings
-from studies.fracture.runs import (
+from studies.fracture.measure import (
     ABOVE,
     ACCOUNT,
     BEFORE,
@@ -36,7 +36,7 @@ from studies.fracture.runs import (
     WORK,
 )
 from studies.fracture.study import analyse
-from studies.procedures.runs import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.procedures.measure import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out 'my study'"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}

@@ -11,15 +11,15 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from studies.base.runs import DEFINITION
-from studies.gravish import answers as gravish_answers
+from studies.gravish import findings as gravish_findings
 from studies.gravish import figures as gravish_figures
-from studies.gravish.answers import (
+from studies.gravish.findings import (
     answers,
     deviations_from_reference,
     steps_between_ratios,
     summarise_runs,
 )
-from studies.gravish.reference import DIGITISING_ERROR, read_reference
+from studies.base.references import DIGITISING_ERROR, read_reference
 from studies.gravish.study import analyse_gravish
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
@@ -381,4 +381,4 @@ def test_output_that_is_a_file_is_refused(study, tmp_path):
 
 
 def test_accepted_deviation_is_that_of_the_study():
-    assert gravish_answers.ACCEPTED_DEVIATION == 10.0
+    assert gravish_findings.ACCEPTED_DEVIATION == 10.0

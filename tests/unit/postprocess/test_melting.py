@@ -13,7 +13,7 @@ from postprocess.manifest import read_run
 from postprocess.measures.spread import centre_of_mass
 from studies.base.runs import SEED
 from studies.melting import figures as melting_figures
-from studies.melting.runs import (
+from studies.melting.measure import (
     BASE,
     CONTACT,
     HEIGHT,
@@ -26,7 +26,7 @@ from studies.melting.runs import (
     measure_melting,
 )
 from studies.melting.study import analyse
-from studies.procedures.runs import PROCEDURE
+from studies.procedures.measure import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 AWAY = np.array([0.05, 0.0, 0.0])

@@ -15,7 +15,7 @@ from dem.errors import InputError
 from postprocess.statistics.points import marked
 from studies.base.runs import ASPECT, SEED, SEEDS
 from studies.procedures import figures as procedures_figures
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     CROSSINGS,
     ENERGY,
     HALF,

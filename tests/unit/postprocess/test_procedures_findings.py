@@ -9,7 +9,7 @@ import pytest
 from postprocess.statistics.findings import findings_table
 from studies.base.runs import ASPECT, SEED
 from studies.procedures.findings import findings
-from studies.procedures.runs import (
+from studies.procedures.measure import (
     CROSSINGS,
     ENERGY,
     EXTERNAL,

@@ -17,7 +17,7 @@ import pandas as pd
 from postprocess.statistics.points import mean_columns, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.runs import ASPECT, DEFINITION, SEEDS, SHAKEN, STAGES, measured_quantities
-from studies.gravish.reference import COLUMNS, DIGITISING_ERROR, reference_at
+from studies.base.references import COLUMNS, DIGITISING_ERROR, reference_at
 
 ACCEPTED_DEVIATION = 10.0
 """Mean absolute deviation from Gravish's points that the study accepts [%]."""

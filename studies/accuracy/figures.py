@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from postprocess.report import figures
 from postprocess.statistics.points import marked
-from studies.accuracy.runs import COST, IS_REFERENCE, KNOB, VERDICT, measured
+from studies.accuracy.measure import COST, IS_REFERENCE, KNOB, VERDICT, measured
 from studies.base.figures import draw_means, finished, marker
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from postprocess.report import figures
 from studies.base.runs import DEFINITION, STAGES
-from studies.gravish.reference import DIGITISING_ERROR
+from studies.base.references import DIGITISING_ERROR
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -33,7 +33,7 @@ from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.series import Series, read_series
 from studies.base.runs import ASPECT, DEFINITION, SEED, duration
-from studies.procedures.runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
+from studies.procedures.measure import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
 
 PEAK, PEAK_TIME, PEAK_RAISED = "peak force over n W_s [-]", "time of the peak [s]", "hook raised at the peak [m]"
 WINDOWS: Mapping[float, str] = MappingProxyType(
