@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from postprocess.statistics.columns import SEEDS
 from postprocess.statistics.points import told_number
 from studies.accuracy.measure import (
     COMPARED,
@@ -22,7 +23,6 @@ from studies.accuracy.measure import (
     VALUE,
     VERDICT,
 )
-from studies.base.runs import SEEDS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -19,15 +18,12 @@ from postprocess.manifest import RunManifest
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.series import read_series
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
-from studies.base.runs import ASPECT, DEFINITION, SEED, VARIANT, duration, variant_of
-
-BASE = "base"
-"""Setting of the scene that the others are variants of."""
-
-ACTIVITIES = frozenset({"shake", "actuate", "shape-change", "internal-oscillation"})
-"""Types of phase between which packing is compared."""
+from studies.accuracy.rung import ACTIVITIES, BASE, Rung
+from studies.base.runs import DEFINITION, duration
+from studies.base.variants import VARIANT, variant_of
 
 KNOB, VALUE, UNIT, REFERENCE, VERDICT = "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"
@@ -62,25 +58,6 @@ RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "ref
 
 _AVERAGED = (COST, WALL, EXPECTED, *COMPARED.values(), RESIDUAL, GAP)
 _OF_SETTING = (TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rung:
-    """One value of one knob.
-
-    Attributes:
-        knob: Name of the knob.
-        value: The value, as text.
-        unit: Its unit, or empty.
-        setting: Name of the variant of the scene that has it; runs are named SETTING_seedN.
-        sensitivity: Whether the knob belongs to what is modelled, so that its rungs differ and do not err.
-    """
-
-    knob: str
-    value: str
-    unit: str
-    setting: str
-    sensitivity: bool = False
 
 
 def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str, object]:

@@ -1,13 +1,15 @@
-"""Gravish's points: packing fractions of staples before and after shaking, digitised.
+"""What studies are compared with: the text of Savoie et al., and Gravish's packing fractions, digitised.
 
-Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012);
-see `reference/README.md`. They are compared at equal l/w only and never interpolated.
+Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012): of staples before
+and after shaking; see `reference/README.md`. They are compared at equal l/w only and never interpolated.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
 
@@ -28,7 +30,37 @@ REFERENCE = files("postprocess") / "reference" / "gravish2012_phi.csv"
 COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
 )
-"""The column that each stage is compared with, see `study_runs.STAGES`."""
+"""The column that each stage is compared with, see `shaken.STAGES`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """What a study is compared with.
+
+    Attributes:
+        statement: Names it, for footers; without a full stop.
+        facts: The same for `provenance.json`.
+    """
+
+    statement: str
+    facts: Mapping[str, object]
+
+
+GRAVISH = Reference(
+    statement=f"{CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}",
+    facts=MappingProxyType(
+        {
+            "file": REFERENCE.name,
+            "sha256": hashlib.sha256(REFERENCE.read_bytes()).hexdigest(),
+            "digitising_error": DIGITISING_ERROR,
+        }
+    ),
+)
+
+SAVOIE = Reference(
+    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
+    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
+)
 
 
 def read_reference() -> pd.DataFrame:

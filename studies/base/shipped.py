@@ -1,38 +1,56 @@
-"""Shipped studies: sweeps with a quick variant, kept as data beside this module."""
+"""A shipped study as it is known before it is asked for: light, so that the command line can tell of all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 from dem.errors import InputError
-from templates.sweep.expand import Point
-from templates.sweep.render import Value
-from templates.sweep.texts import nearest
 
-_FOLDER = Path(__file__).parent
-
-
-def study_names() -> list[str]:
-    """Names of the shipped studies."""
-    files = (path.name.removesuffix(".yaml") for path in _FOLDER.glob("*/*.yaml"))
-    return sorted(name for name in files if "." not in name)
+if TYPE_CHECKING:
+    from studies.base.study import Study
+    from templates.sweep.expand import Point
+    from templates.sweep.render import Value
 
 
-def study_file(name: str, *, quick: bool = False) -> Path:
-    """Sweep file of a study.
+class Loader(Protocol):
+    """Imports the class of a study and makes one; `quick`: whether its analysis is to take seconds."""
 
-    Raises:
-        InputError: there is no such study, or it has no quick variant.
+    def __call__(self, *, quick: bool) -> Study[Any]:
+        """The study."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shipped:
+    """A study that is installed with this package.
+
+    Attributes:
+        name: For the command line; its sweep file is named after it.
+        folder: With the sweep file, that of the quick variant if there is one, and what both need.
+        about: What it is, for `smarticles study --help`.
+        pictured: Values of the run that a picture is drawn of.
+        load: Gives the study itself.
     """
-    if name not in study_names():
-        msg = f"study {name!r} does not exist; {nearest(name, study_names())}"
-        raise InputError(msg)
-    file = _FOLDER / name.partition("-")[0] / (f"{name}.quick.yaml" if quick else f"{name}.yaml")
-    if not file.is_file():
-        msg = f"study {name} has no quick variant; leave --quick out"
-        raise InputError(msg)
-    return file
+
+    name: str
+    folder: Path
+    about: str
+    pictured: Mapping[str, object]
+    load: Loader
+
+    def sweep_file(self, *, quick: bool = False) -> Path:
+        """Its sweep file.
+
+        Raises:
+            InputError: It has no quick variant.
+        """
+        file = self.folder / (f"{self.name}.quick.yaml" if quick else f"{self.name}.yaml")
+        if not file.is_file():
+            msg = f"study {self.name} has no quick variant; leave --quick out"
+            raise InputError(msg)
+        return file
 
 
 def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:

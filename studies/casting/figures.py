@@ -11,10 +11,11 @@ import numpy as np
 from postprocess.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, legend_above, procedure_marker
+from studies.base.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
-from studies.base.runs import SEED
 from studies.casting.measure import (
     AFTER,
     FILLED,
@@ -28,7 +29,6 @@ from studies.casting.measure import (
     WHOLE_AFTER,
     WHOLE_KEPT,
 )
-from studies.procedures.measure import INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd

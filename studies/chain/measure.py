@@ -1,4 +1,4 @@
-"""One row per run of the study `chain`, and the means over its trials; what is measured is in `postprocess.measures.strain`."""
+"""One row per run of the study `chain`, and means over trials; what is measured is in `postprocess.measures.strain`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dem.errors import InputError
 from postprocess.manifest import RunManifest
 from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_pull
 from postprocess.scene_file import read_phases
+from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.points import averaged
-from studies.base.runs import SEED, SEEDS
 
 BASELINE = "baseline"
 

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from postprocess.manifest import RunManifest
-from studies.base.runs import ASPECT, SEED, duration
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.runs import duration
 from studies.collapse.column import COM, DEFINITIONS, collapse_of, column_history, vibration
 from studies.collapse.time import CollapseTime
 

@@ -1,6 +1,6 @@
 """What the study `fracture` takes from a run: the pile before the pull, and what the hook felt in it.
 
-Forces are over n W_s, the weight of all smarticles, as in the paper; see `postprocess.measures.pull` for what a peak is.
+Forces are over n W_s, the weight of all smarticles, as in the paper; what a peak is, is in `postprocess.measures.pull`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ from postprocess.measures.pull import (
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.series import Series, read_series
-from studies.base.runs import ASPECT, DEFINITION, SEED, duration
-from studies.procedures.measure import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
+from studies.base.runs import DEFINITION, duration
 
 PEAK, PEAK_TIME, PEAK_RAISED = "peak force over n W_s [-]", "time of the peak [s]", "hook raised at the peak [m]"
 WINDOWS: Mapping[float, str] = MappingProxyType(

@@ -1,4 +1,4 @@
-"""Statistics of the study `gravish`: deviations, and answers with evidence.
+"""Findings of the study `gravish`: deviations, and answers with evidence.
 
 Gravish's points are compared at equal l/w only and never interpolated. All error bars are
 half-widths of 95 % confidence intervals of a mean over seeds, by Student's t. A mean over one seed
@@ -14,10 +14,12 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import mean_columns, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.runs import ASPECT, DEFINITION, SEEDS, SHAKEN, STAGES, measured_quantities
 from studies.base.references import COLUMNS, DIGITISING_ERROR, reference_at
+from studies.base.runs import DEFINITION
+from studies.base.shaken import SHAKEN, STAGES, measured_quantities
 
 ACCEPTED_DEVIATION = 10.0
 """Mean absolute deviation from Gravish's points that the study accepts [%]."""
@@ -25,12 +27,12 @@ ACCEPTED_DEVIATION = 10.0
 
 _COMPARED = {f"{stage} {DEFINITION}": stage for stage in COLUMNS}
 
-Answer = Literal["yes", "no", "undetermined"]
+YesNo = Literal["yes", "no", "undetermined"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """An answer to one of the study's questions.
+class Question:
+    """A question of the study, answered.
 
     Attributes:
         question: Ends in a question mark.
@@ -39,7 +41,7 @@ class Verdict:
     """
 
     question: str
-    answer: Answer
+    answer: YesNo
     evidence: str
 
 
@@ -47,8 +49,8 @@ def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
     """One row per aspect ratio: means over seeds, their errors, and Gravish's values.
 
     Args:
-        runs: Table of runs, see `GravishReport.runs`.
-        reference: See `gravish_reference.read_reference`.
+        runs: Table of runs, rows of `shaken.measured_row`.
+        reference: See `references.read_reference`.
 
     Returns:
         The table, by ascending aspect ratio. `… 95 % [-]` are half-widths, `… deviation [%]` is
@@ -74,17 +76,17 @@ def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
 
 def answers(
     runs: pd.DataFrame, summary: pd.DataFrame, deviations: pd.DataFrame, steps: pd.DataFrame
-) -> tuple[Verdict, ...]:
+) -> tuple[Question, ...]:
     """Answers to the study's questions.
 
     Args:
-        runs: Table of runs, see `gravish.GravishReport`.
+        runs: Table of runs, rows of `shaken.measured_row`.
         summary: See `summarise_runs`.
         deviations: See `deviations_from_reference`.
         steps: See `steps_between_ratios`.
 
     Returns:
-        One answer per question and stage.
+        The questions, answered, by stage.
     """
     return (
         *(_monotone(stage, steps, summary) for stage in _stages(summary)),
@@ -183,12 +185,12 @@ def _direction(difference: float, half_width: float) -> str:
     return "falls" if difference < 0 else "rises"
 
 
-def _monotone(stage: str, steps: pd.DataFrame, summary: pd.DataFrame) -> Verdict:
+def _monotone(stage: str, steps: pd.DataFrame, summary: pd.DataFrame) -> Question:
     question = f"Does {stage} fall monotonically with l/w within error bars?"
     found = steps.loc[steps["stage"] == stage]
     if found.empty:
         evidence = "fewer than two aspect ratios"
-        return Verdict(question=question, answer="undetermined", evidence=evidence)
+        return Question(question=question, answer="undetermined", evidence=evidence)
     counts = found["phi"].value_counts()
     falls, rises = int(counts.get("falls", 0)), int(counts.get("rises", 0))
     within, bare = (int(counts.get(name, 0)) for name in ("within error bars", "no error bar"))
@@ -207,16 +209,16 @@ def _monotone(stage: str, steps: pd.DataFrame, summary: pd.DataFrame) -> Verdict
         if math.isfinite(half_width)
         else f"in all the change is {total:+.4f}, without an error bar"
     )
-    answer: Answer = "undetermined"
+    answer: YesNo = "undetermined"
     if rises:
         answer = "no"
     # A flat line with wide error bars is not monotone: the whole change must be beyond them.
     elif not bare and total < -half_width:
         answer = "yes"
-    return Verdict(question=question, answer=answer, evidence="; ".join(parts))
+    return Question(question=question, answer=answer, evidence="; ".join(parts))
 
 
-def _compacted(runs: pd.DataFrame) -> Verdict:
+def _compacted(runs: pd.DataFrame) -> Question:
     question = "Is phi_f above phi_0 at every l/w?"
     gain = runs[f"phi_f {DEFINITION} [-]"] - runs[f"phi_0 {DEFINITION} [-]"]
     means = [mean_over_seeds(part) for _, part in gain.groupby(runs[ASPECT])]
@@ -227,23 +229,23 @@ def _compacted(runs: pd.DataFrame) -> Verdict:
         f"{len(means)} l/w, and in {int((gain > 0).sum())} of {len(gain)} runs; the least mean "
         f"gain is {least:+.4f}"
     )
-    answer: Answer = "undetermined"
+    answer: YesNo = "undetermined"
     if any(mean.value <= 0 for mean in means):
         answer = "no"
     elif clear == len(means):
         answer = "yes"
     elif any(mean.count < 2 for mean in means):
         evidence += "; where there is one seed there is no error bar"
-    return Verdict(question=question, answer=answer, evidence=evidence)
+    return Question(question=question, answer=answer, evidence=evidence)
 
 
-def _close_enough(stage: str, deviations: pd.DataFrame) -> Verdict:
+def _close_enough(stage: str, deviations: pd.DataFrame) -> Question:
     question = f"Is the mean absolute deviation of {stage} from Gravish at most "
     question += f"{ACCEPTED_DEVIATION:g} %?"
     found = deviations.loc[deviations["stage"] == stage]
     if found.empty:
         evidence = "Gravish has no point at these l/w"
-        return Verdict(question=question, answer="undetermined", evidence=evidence)
+        return Question(question=question, answer="undetermined", evidence=evidence)
     deviation = float(found["deviation [%]"].abs().mean())
     half_width = float(np.hypot.reduce(found["deviation 95 % [%]"])) / len(found)
     error = f"± {half_width:.1f} %" if math.isfinite(half_width) else "(without an error bar)"
@@ -254,5 +256,5 @@ def _close_enough(stage: str, deviations: pd.DataFrame) -> Verdict:
         f"{worst['deviation [%]']:+.1f} % at l/w = {worst[ASPECT]:g}; reading Gravish's points "
         f"is uncertain by about {reading:.1f} %"
     )
-    answer: Answer = "yes" if deviation <= ACCEPTED_DEVIATION else "no"
-    return Verdict(question=question, answer=answer, evidence=evidence)
+    answer: YesNo = "yes" if deviation <= ACCEPTED_DEVIATION else "no"
+    return Question(question=question, answer=answer, evidence=evidence)

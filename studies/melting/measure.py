@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postprocess.manifest import RunManifest
 from postprocess.measures.heights import heights
 from postprocess.measures.spread import centre_of_mass, free_pile, has_toppled
 from postprocess.scene_file import read_phases
 from studies.base.release import around, labels, removal
-from studies.base.runs import duration
+from studies.base.runs import MeasuredRun, duration
 
-LIFT = "lift speed [m/s]"
+LIFT, SINCE = "lift speed [m/s]", "time since the wall began to go [s]"
 BASE, TOP, CENTRE = "radius of 95 % before [m]", "height of 95 % before [m]", "com height before [m]"
 CONTACT, ENTANGLED = "largest cluster by contact [-]", "largest cluster by crossings [-]"
 HEIGHT, TOP_KEPT = "com height over that before [-]", "height of 95 % over that before [-]"
@@ -51,23 +49,8 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 """What is averaged over seeds: columns of the table of runs."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Melting:
-    """One run since its wall began to go.
-
-    Attributes:
-        row: One run's row of the table: what it was before, and in the end.
-        times: (n,) since then [s], the first one 0.
-        values: (n,) each, by the names of `FREE`.
-    """
-
-    row: dict[str, object]
-    times: NDArray[np.float64]
-    values: Mapping[str, NDArray[np.float64]]
-
-
-def measure_melting(run: RunManifest) -> Melting:
-    """Measures a run of the study.
+def measure_melting(run: RunManifest) -> MeasuredRun:
+    """What a pile was before its wall began to go, and in the end; its history begins with the former.
 
     Args:
         run: A finished run.
@@ -114,4 +97,4 @@ def measure_melting(run: RunManifest) -> Melting:
         "run": run.directory.name,
     }
     values = {name: np.array([one[name] for one in rows]) for name in FREE}
-    return Melting(row=row, times=times, values=MappingProxyType(values))
+    return MeasuredRun(manifest=run, rows=[row], history={SINCE: times, **values})

@@ -9,7 +9,7 @@ bounces, and is looser while it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -21,22 +21,23 @@ from postprocess.manifest import PhaseRecord, RunManifest
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.scene_file import read_phases
 from postprocess.series import Series, read_series
-from postprocess.statistics.points import mean_columns, ordered, seeds_of
-from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.runs import ASPECT, DEFINITION, SEED, SEEDS, duration, refuse_mixture, refuse_repeats
-
-STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
-PROCEDURES: Mapping[str, str] = MappingProxyType(
-    {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.procedures import (
+    ACTIVE,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PHI,
+    PROCEDURE,
+    PROCEDURES,
+    SHAPE,
+    STATIC,
+    THETA,
 )
-"""Procedure of each type of activity."""
+from studies.base.runs import DEFINITION, duration
 
-AMPLITUDE = 10.0
-"""θ of the internal oscillation where procedures are compared, as in the paper [deg]."""
-
-PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI_ACTIVE = f"phi {DEFINITION} at the end of the activity [-]"
-PHI, CROSSINGS, ENERGY = f"phi {DEFINITION} [-]", "crossings [-]", "energy per smarticle [J]"
+ENERGY = "energy per smarticle [J]"
 HEIGHT, STRAIGHT, HALF = "com height over h0 [-]", "com height straight over h0 [-]", "half of compaction at [-]"
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -50,16 +51,6 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
     }
 )
 """What is averaged over seeds: columns of `samples`."""
-
-NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
-    {
-        "procedure": lambda point: str(point[PROCEDURE]),
-        "θ": lambda point: "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°",
-        "l/w": lambda point: f"{point[ASPECT]:g}",
-        "seeds": lambda point: str(point[SEEDS]),
-    }
-)
-"""What tells a point from others, for a person to read; see `points.told_means`."""
 
 _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
 _WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
@@ -238,52 +229,3 @@ def static_spread(runs: pd.DataFrame) -> float:
     """Largest difference of φ before the activity between runs of the same aspect ratio and seed [-]."""
     groups = runs.groupby([ASPECT, SEED])[f"{STATIC} {PHI}"]
     return float((groups.max() - groups.min()).max())
-
-
-def points(table: pd.DataFrame, quantities: Iterable[str] = tuple(QUANTITIES)) -> pd.DataFrame:
-    """One row per procedure, aspect ratio and θ: means over seeds with their errors.
-
-    Args:
-        table: See `samples`.
-        quantities: Columns that are averaged.
-
-    Returns:
-        The table; `… SE` is the standard error, `… 95 %` the half-width of the confidence interval, `… seeds`
-        how many seeds have a value.
-    """
-    rows = []
-    for (procedure, aspect, theta), group in table.groupby([PROCEDURE, ASPECT, THETA], sort=True, dropna=False):
-        row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, ASPECT: aspect, **seeds_of(group)}
-        for quantity in quantities:
-            mean = mean_over_seeds(group[quantity])
-            row |= mean_columns(quantity, mean)
-            row[f"{quantity.rpartition(' [')[0]} seeds [-]"] = mean.count
-        rows.append(row)
-    order = (STATIC, EXTERNAL, SHAPE, INTERNAL)
-    return ordered(pd.DataFrame(rows), [PROCEDURE, THETA, ASPECT], named=PROCEDURE, order=order)
-
-
-def refuse_unlike(study: str, manifests: Sequence[RunManifest], rows: Sequence[Mapping[str, object]]) -> None:
-    """Refuses runs of one procedure that took different times, and a point's runs with the same seed.
-
-    Args:
-        study: Its name, for messages.
-        manifests: The runs.
-        rows: Their rows of the table of runs, in the same order.
-
-    Raises:
-        InputError: There are such.
-    """
-    row_of = dict(zip((run.directory for run in manifests), rows, strict=True))
-
-    def lasting(run: RunManifest) -> str:
-        row = row_of[run.directory]
-        return f"{row[PROCEDURE]} for {row[ACTIVE]:.3g} s"
-
-    def name(run: RunManifest) -> str:
-        row = row_of[run.directory]
-        theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
-        return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"
-
-    refuse_mixture(study, manifests, "duration", lasting, within=lambda run: str(row_of[run.directory][PROCEDURE]))
-    refuse_repeats(study, manifests, "point", name)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from postprocess.report import figures
-from studies.base.runs import DEFINITION, STAGES
 from studies.base.references import DIGITISING_ERROR
+from studies.base.runs import DEFINITION
+from studies.base.shaken import STAGES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,8 +35,8 @@ def draw(
 
     Args:
         path: Without suffix.
-        runs: See `sensitivity.SensitivityReport.runs`.
-        summary: See `sensitivity.summarise_variants`; its first row is the baseline.
+        runs: See `measure.sensitivity_row`.
+        summary: See `measure.summarise_variants`; its first row is the baseline.
         reference: Gravish's value of each stage, NaN without one [-].
         footer: Origin, one statement each.
 

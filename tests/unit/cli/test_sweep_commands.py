@@ -10,7 +10,7 @@ from command_cases import SWEEP, Smarticles, WriteRun
 
 from dem.errors import InputError
 from dem.record.rundir import claimed
-from studies.base.shipped import study_file
+from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.folder import create_folder, open_folder
 from templates.sweep.sweep import load_sweep, with_constants

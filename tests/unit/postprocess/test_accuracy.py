@@ -12,6 +12,7 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked
 from studies.accuracy import figures as accuracy_figure
 from studies.accuracy.advice import advise, told_closing
@@ -30,7 +31,8 @@ from studies.accuracy.measure import (
     work_precision,
 )
 from studies.accuracy.study import analyse_accuracy
-from studies.base.runs import ASPECT, DEFINITION, SEED, VARIANT
+from studies.base.runs import DEFINITION
+from studies.base.variants import VARIANT
 
 PHI_F = f"phi_f {DEFINITION} [-]"
 STEPS = [

@@ -10,6 +10,7 @@ from released import stack, write_released
 from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.scene_file import read_tiers
+from studies.base.procedures import PROCEDURE
 from studies.casting import figures as casting_figures
 from studies.casting.measure import (
     FILLED,
@@ -25,7 +26,6 @@ from studies.casting.measure import (
     casting_row,
 )
 from studies.casting.study import analyse
-from studies.procedures.measure import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [

@@ -26,7 +26,7 @@ from postprocess.measures.strain import (
     first_drop,
     measured,
 )
-from studies.base.runs import SEED
+from postprocess.statistics.columns import SEED
 from studies.chain.findings import findings, sensitivity
 from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT
 

@@ -18,7 +18,7 @@ from dem.errors import InputError
 from postprocess.measures.strain import FRACTURE, PEAK, STIFFNESS
 from postprocess.statistics.findings import CRITERION
 from postprocess.statistics.points import marked
-from studies.base.origin import SAVOIE
+from studies.base.references import SAVOIE
 from studies.base.report import StudyReport
 from studies.chain import figures as chain_figures
 from studies.chain.measure import CONFINEMENT, COUNT, VARIANT

@@ -11,7 +11,7 @@ from PIL import Image
 
 from dem.errors import InputError
 from postprocess.manifest import read_run
-from studies.base.runs import ASPECT, SEED, SEEDS
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from studies.collapse import figures as collapse_figures
 from studies.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
 from studies.collapse.findings import findings
@@ -28,8 +28,8 @@ from studies.collapse.law import (
     levels,
     slope_through_origin,
 )
-from studies.collapse.reference import read_collapse_reference, reference_delta
 from studies.collapse.measure import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
+from studies.collapse.reference import read_collapse_reference, reference_delta
 from studies.collapse.study import analyse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}

@@ -13,9 +13,10 @@ from synthetic import SyntheticRun, W
 
 from dem.errors import InputError
 from postprocess.measures.pull import WINDOW
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
 from smarticles.commands.studies import STUDIES, Analysis
-from studies.base.runs import ASPECT, SEED, SEEDS
+from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.fracture import figures as fracture_figures
 from studies.fracture.findings import findings
 from studies.fracture.measure import (
@@ -36,7 +37,6 @@ from studies.fracture.measure import (
     WORK,
 )
 from studies.fracture.study import analyse
-from studies.procedures.measure import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out 'my study'"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}

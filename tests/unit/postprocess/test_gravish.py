@@ -10,16 +10,16 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
+from studies.base.references import DIGITISING_ERROR, read_reference
 from studies.base.runs import DEFINITION
-from studies.gravish import findings as gravish_findings
 from studies.gravish import figures as gravish_figures
+from studies.gravish import findings as gravish_findings
 from studies.gravish.findings import (
     answers,
     deviations_from_reference,
     steps_between_ratios,
     summarise_runs,
 )
-from studies.base.references import DIGITISING_ERROR, read_reference
 from studies.gravish.study import analyse_gravish
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"

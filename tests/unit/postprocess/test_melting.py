@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.measures.spread import centre_of_mass
-from studies.base.runs import SEED
+from postprocess.statistics.columns import SEED
+from studies.base.procedures import PROCEDURE
 from studies.melting import figures as melting_figures
 from studies.melting.measure import (
     BASE,
@@ -26,7 +27,6 @@ from studies.melting.measure import (
     measure_melting,
 )
 from studies.melting.study import analyse
-from studies.procedures.measure import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 AWAY = np.array([0.05, 0.0, 0.0])

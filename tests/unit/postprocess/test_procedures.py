@@ -12,21 +12,11 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
-from studies.base.runs import ASPECT, SEED, SEEDS
+from studies.base.procedures import CROSSINGS, PHI, PROCEDURE, THETA
 from studies.procedures import figures as procedures_figures
-from studies.procedures.measure import (
-    CROSSINGS,
-    ENERGY,
-    HALF,
-    HEIGHT,
-    PHI,
-    PROCEDURE,
-    QUANTITIES,
-    STRAIGHT,
-    THETA,
-    half_compaction,
-)
+from studies.procedures.measure import ENERGY, HALF, HEIGHT, QUANTITIES, STRAIGHT, half_compaction
 from studies.procedures.study import analyse_procedures, told_points
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study procedures --out 'my study'"}

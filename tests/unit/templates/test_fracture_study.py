@@ -11,7 +11,8 @@ import studies
 from dem.phases.actuation import InternalOscillation, ShapeChange
 from dem.setting.hooks import PullHook
 from dem.setting.parts import Deposit, Relax, Shake
-from studies.base.shipped import differences, study_file
+from studies.base.shipped import differences
+from studies.registry import study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep import load_sweep
 

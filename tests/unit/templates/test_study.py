@@ -13,7 +13,8 @@ import studies
 from dem.errors import InputError
 from dem.phases.actuation import InternalOscillation, ShapeChange
 from dem.setting.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
-from studies.base.shipped import differences, study_file, study_names
+from studies.base.shipped import differences, study_names
+from studies.registry import study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep import load_sweep
 
