@@ -329,7 +329,7 @@ def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
     def file_of(name: str, *, quick: bool = False) -> Path:
         return sweep_file
 
-    monkeypatch.setattr("studies.base.shipped.study_file", file_of)
+    monkeypatch.setattr("studies.registry.study_file", file_of)
     sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
     out = sweep_file.parent / "out"
     said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from released import stack, write_released
+from synthetic.released import stack, write_released
 
 from dem.errors import InputError
 from postprocess.manifest import read_run
@@ -25,7 +25,7 @@ from studies.casting.measure import (
     WHOLE_KEPT,
     casting_row,
 )
-from studies.casting.study import analyse
+from studies.casting.study import Casting
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [
@@ -104,29 +104,28 @@ def test_of_a_tier_that_holds_less_than_the_ball_no_share_is_told(tmp_path):
 
 def test_the_study_compares_procedures_by_pairs(runs, tmp_path, monkeypatch):
     monkeypatch.setattr(casting_figures, "draw_strip", lambda rows, output, **_: output)
-    report = analyse([*runs, tmp_path / "absent"], tmp_path / "out", **ORIGIN)
+    report = Casting().analyse([*runs, tmp_path / "absent"], tmp_path / "out", **ORIGIN)
     table = pd.read_csv(report.files["points.csv"], comment="#")
     assert table[PROCEDURE].tolist() == ["static", "internal", "shape-change"]
     assert table[WHOLE].iloc[1] > table[WHOLE].iloc[0]
-    verdicts = {one.paper: one.verdict for one in report.findings}
+    verdicts = {one.paper: one.verdict for one in report.judged}
     assert verdicts["The mould is filled by pouring (shown in a picture)"] == "not found"
     assert {"tiers.png", "overlap.png", "pictures.png"} <= set(report.files)
     text = report.files["findings.md"].read_text()
     assert "assumed: the paper gives none" in text
 
 
-def test_runs_of_other_moulds_are_refused(runs, tmp_path, monkeypatch):
-    monkeypatch.setattr(casting_figures, "draw", lambda *_, **__: [])
+def test_runs_of_other_moulds_are_refused(runs, tmp_path, undrawn):
     pile = crossed(14)
     kept = {"before": pile, "after": pile, "seed": 3, "aspect_ratio": 0.8}
     plain = write_released(tmp_path / "plain", "static", **kept)
-    report = analyse([runs[0], plain], tmp_path / "out", **ORIGIN)
+    report = Casting().analyse([runs[0], plain], tmp_path / "out", **ORIGIN)
     missing = pd.read_csv(report.files["missing.csv"], comment="#")
     assert "a mould has 3 tiers and a neck: container.tiers has 0" in missing["cause"].iloc[0]
     wider = [{**tier, "radius_m": 2 * tier["radius_m"]} for tier in MOULD]
     other = write_released(tmp_path / "wider", "static", **kept, tiers=wider)
     with pytest.raises(InputError, match="runs of different mould must not be averaged"):
-        analyse([runs[0], other], tmp_path / "out", **ORIGIN)
+        Casting().analyse([runs[0], other], tmp_path / "out", **ORIGIN)
     bad = write_released(tmp_path / "bad", "static", **kept, tiers=[{"radius_m": 0.01, "height_m": -1}])
     with pytest.raises(InputError, match=r"container.tiers.0.height_m must be a finite number above 0: got -1"):
         read_tiers(bad)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+
 from synthetic import T1, SyntheticRun, u_shape, write_frame, write_run
 
 ACTIVITY = {

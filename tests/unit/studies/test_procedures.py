@@ -15,9 +15,8 @@ from dem.errors import InputError
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
 from studies.base.procedures import CROSSINGS, PHI, PROCEDURE, THETA
-from studies.procedures import figures as procedures_figures
 from studies.procedures.measure import ENERGY, HALF, HEIGHT, QUANTITIES, STRAIGHT, half_compaction
-from studies.procedures.study import analyse_procedures, told_points
+from studies.procedures.study import Procedures
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study procedures --out 'my study'"}
 ACTIVITY = {"external": "shake", "shape-change": "shape-change", "internal": "internal-oscillation"}
@@ -67,17 +66,11 @@ def study(tmp_path_factory):
                     made = run(procedure, aspect=aspect, seed=seed, theta=theta, status="failed" if failed else "done")
                     directories.append(write_run(root / f"{procedure}{theta:g}_lw{aspect}_seed{seed}", made))
     directories.append(root / "internal10_lw0.40_seed1")
-    return root, directories, analyse_procedures(directories, root / "out", **ORIGIN)
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the figures, which take most of the time."""
-    monkeypatch.setattr(procedures_figures, "draw", lambda *_, **__: [])
+    return root, directories, Procedures().analyse(directories, root / "out", **ORIGIN)
 
 
 def point(report, procedure, aspect=0.7, theta=None):
-    table = report.points
+    table = report.tables["points"]
     rows = table[(table[PROCEDURE] == procedure) & (table[ASPECT] == aspect)]
     rows = rows if theta is None else rows[rows[THETA] == theta]
     assert len(rows) == 1
@@ -109,7 +102,7 @@ def test_static_is_every_runs_state_before_its_activity(study):
 def test_static_runs_that_differ_are_told(study, tmp_path, undrawn):
     other = run("external", seed=1, packing=(0.09, 0.12, 0.12, 0.12))
     runs = [write_run(tmp_path / "a", run("internal", seed=1)), write_run(tmp_path / "b", other)]
-    report = analyse_procedures(runs, tmp_path / "out", **ORIGIN)
+    report = Procedures().analyse(runs, tmp_path / "out", **ORIGIN)
     assert point(report, "static")[PHI] == pytest.approx((0.099 + 0.12) / 2, rel=1e-4)
     assert "(runs of one l/w and seed agree there within 0.021 in φ)" in report.footer[1]
 
@@ -119,7 +112,7 @@ def test_energy_is_the_work_per_smarticle(study):
     assert point(report, "external")[ENERGY] == pytest.approx(1e-5 / 12)
     assert point(report, "shape-change")[ENERGY] == pytest.approx(1e-3 / 12)
     assert point(report, "internal", theta=30.0)[ENERGY] == pytest.approx(1.2e-4 / 12)
-    costs = [f for f in report.findings if f.paper.startswith("Shape change costs")]
+    costs = [f for f in report.judged if f.paper.startswith("Shape change costs")]
     assert costs[0].ours.startswith("ratio 25 ")
 
 
@@ -170,7 +163,7 @@ def test_missing_runs_are_listed_and_the_rest_is_used(study):
 
 
 def test_findings_that_lack_runs_have_no_data(study):
-    found = {finding.paper: finding.verdict for finding in study[2].findings}
+    found = {finding.paper: finding.verdict for finding in study[2].judged}
     assert found["Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5"] == "no data"
     assert found["Shape change: the centre of mass rises when the smarticles straighten"] == "found"
     assert found["Internal oscillation: lower θ packs tighter"] == "found"
@@ -180,15 +173,15 @@ def test_tables_on_disk_are_those_of_the_report(study):
     report = study[2]
     for name in ("runs", "points"):
         table = pd.read_csv(report.files[f"{name}.csv"], comment="#")
-        expected = getattr(report, name)
+        expected = report.tables[name]
         assert list(table.columns) == list(expected.columns)
         assert len(table) == len(expected) > 0
     table = pd.read_csv(report.files["findings.csv"], comment="#")
-    assert table["verdict"].tolist() == [finding.verdict for finding in report.findings]
+    assert table["verdict"].tolist() == [finding.verdict for finding in report.judged]
     assert all("[" in name for name in (*QUANTITIES, THETA))
     text = report.files["findings.md"].read_text()
-    assert text.count("| **found** |") == [finding.verdict for finding in report.findings].count("found")
-    header, rows = told_points(report.points)
+    assert text.count("| **found** |") == [finding.verdict for finding in report.judged].count("found")
+    header, rows = report.header, report.rows
     assert header == ["procedure", "θ", "l/w", "seeds", "φ_f", "φ at rest again", "⟨N⟩", "energy [J]", "h/h0"]
     assert ["static", "", "0.7", "2", "0.1000 ± 0.0010"] in [row[:5] for row in rows]
     assert ["internal", "30°", "0.7", "2"] in [row[:4] for row in rows]
@@ -210,7 +203,7 @@ def test_every_output_names_its_origin(study):
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["reference"]["doi"] == "10.1039/d2sm01573k"
     assert origin["definition"] == "second-highest-com"
-    assert {r["directory"] for r in origin["runs"]} == {str(root / name) for name in report.runs["run"]}
+    assert {r["directory"] for r in origin["runs"]} == {str(root / name) for name in report.tables["runs"]["run"]}
 
 
 def test_figures_are_drawn(study):
@@ -227,9 +220,9 @@ def test_figures_are_drawn(study):
 
 
 def test_study_of_one_run_says_what_it_can(tmp_path):
-    report = analyse_procedures([write_run(tmp_path / "a", run("external"))], tmp_path / "out", **ORIGIN)
-    assert report.points[PROCEDURE].tolist() == ["static", "external"]
-    assert {finding.verdict for finding in report.findings} == {"no data"}
+    report = Procedures().analyse([write_run(tmp_path / "a", run("external"))], tmp_path / "out", **ORIGIN)
+    assert report.tables["points"][PROCEDURE].tolist() == ["static", "external"]
+    assert {finding.verdict for finding in report.judged} == {"no data"}
     assert "One seed per point: no error bars" in " ".join(report.footer)
     assert "no runs for this yet" in report.files["energy_theta.svg"].read_text()
 
@@ -240,8 +233,8 @@ def test_run_without_energy_or_series_is_still_measured(tmp_path):
         write_run(tmp_path / "a", run("shape-change", work=None)),
         write_run(tmp_path / "b", run("internal", series=False)),
     ]
-    report = analyse_procedures(runs, tmp_path / "out", **ORIGIN)
-    table = report.runs.set_index(PROCEDURE)
+    report = Procedures().analyse(runs, tmp_path / "out", **ORIGIN)
+    table = report.tables["runs"].set_index(PROCEDURE)
     assert table[ENERGY].isna().all()
     assert table.loc["internal", [HALF, STRAIGHT]].isna().all()
     assert table.loc["shape-change", STRAIGHT] > 1.2
@@ -254,13 +247,13 @@ def test_work_done_before_the_activity_does_not_count(tmp_path):
     with h5py.File(directory / "series.h5", "a") as file:
         file["motor_work_J"][...] = file["motor_work_J"][...] + 5.0
         file["motor_work_J"][-1] = math.nan
-    report = analyse_procedures([directory], tmp_path / "out", **ORIGIN)
-    assert report.runs[ENERGY].tolist() == [pytest.approx(1e-5, rel=1e-6)]
+    report = Procedures().analyse([directory], tmp_path / "out", **ORIGIN)
+    assert report.tables["runs"][ENERGY].tolist() == [pytest.approx(1e-5, rel=1e-6)]
 
 
 def test_run_without_series_is_named_in_the_heights(tmp_path):
     runs = [write_run(tmp_path / "bare", run("internal", series=False)), write_run(tmp_path / "b", run("external"))]
-    report = analyse_procedures(runs, tmp_path / "out", **ORIGIN)
+    report = Procedures().analyse(runs, tmp_path / "out", **ORIGIN)
     assert "No time series of the height: bare." in report.files["height_time.svg"].read_text()
 
 
@@ -277,7 +270,7 @@ def test_run_without_series_is_named_in_the_heights(tmp_path):
 def test_run_of_another_kind_is_listed_as_unusable(tmp_path, made, cause):
     phases = made["phases"]
     other = write_run(tmp_path / "other", run("external", packing=(0.1,) * len(phases), **made))
-    report = analyse_procedures([write_run(tmp_path / "a", run("external")), other], tmp_path / "out", **ORIGIN)
+    report = Procedures().analyse([write_run(tmp_path / "a", run("external")), other], tmp_path / "out", **ORIGIN)
     (missing,) = report.missing
     assert missing.status == "unusable"
     with pytest.raises(InputError, match=cause):
@@ -299,7 +292,7 @@ def test_scene_that_does_not_fit_its_run(tmp_path, text, cause):
     (bad / "scene.yaml").unlink()
     if text is not None:
         (bad / "scene.yaml").write_text(text)
-    report = analyse_procedures([good, bad], tmp_path / "out", **ORIGIN)
+    report = Procedures().analyse([good, bad], tmp_path / "out", **ORIGIN)
     with pytest.raises(InputError, match=cause):
         raise InputError(report.missing[0].cause)
 
@@ -316,12 +309,12 @@ def test_scene_that_does_not_fit_its_run(tmp_path, text, cause):
 def test_runs_that_cannot_be_compared_are_refused(study, tmp_path, made, message):
     other = write_run(tmp_path / "other", run("external", **{"seed": 5, **made}))
     with pytest.raises(InputError, match=message):
-        analyse_procedures([study[1][0], other], tmp_path / "out", **ORIGIN)
+        Procedures().analyse([study[1][0], other], tmp_path / "out", **ORIGIN)
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_amplitudes_are_different_points(study, tmp_path):
     twice = write_run(tmp_path / "again", run("internal", theta=30.0))
     with pytest.raises(InputError, match=r"point = internal θ 30° l/w 0\.7 with seed 1 is given twice"):
-        analyse_procedures([*study[1], twice], tmp_path / "out", **ORIGIN)
-    assert study[2].runs.groupby([PROCEDURE, ASPECT, SEED]).size().max() == 3
+        Procedures().analyse([*study[1], twice], tmp_path / "out", **ORIGIN)
+    assert study[2].tables["runs"].groupby([PROCEDURE, ASPECT, SEED]).size().max() == 3

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from series_file import write_series
+
 from synthetic import SyntheticRun, W, write_run
+from synthetic.series import write_series
 
 GRAVITY = 9.81
 SPEED = W  # of the hook: w per second

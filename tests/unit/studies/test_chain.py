@@ -11,18 +11,18 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from series_file import write_series
 from synthetic import SyntheticRun, write_manifest
+from synthetic.series import write_series
 
 from dem.errors import InputError
 from postprocess.measures.strain import FRACTURE, PEAK, STIFFNESS
-from postprocess.statistics.findings import CRITERION
+from postprocess.statistics.findings import CRITERION, Finding
 from postprocess.statistics.points import marked
 from studies.base.references import SAVOIE
-from studies.base.report import StudyReport
+from studies.base.report import Report
 from studies.chain import figures as chain_figures
 from studies.chain.measure import CONFINEMENT, COUNT, VARIANT
-from studies.chain.study import analyse
+from studies.chain.study import Chain
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}
 WIDTH = 0.0520  # m, of the chain, in channels that are wider by 1/0.52 or 1/0.65
@@ -84,8 +84,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Sequence[str]]:
     return footers
 
 
-def report(runs: Sequence[Path], output: Path) -> StudyReport:
-    return analyse([*runs, output / "absent"], output, **ORIGIN)
+def report(runs: Sequence[Path], output: Path) -> Report[Finding]:
+    return Chain().analyse([*runs, output / "absent"], output, **ORIGIN)
 
 
 def test_means_over_trials_are_those_put_in(runs: list[Path], tmp_path: Path, drawn: list[Sequence[str]]) -> None:
@@ -146,4 +146,4 @@ def test_a_study_without_a_packing_fraction_defines_none(
 
 def test_a_trial_given_twice_is_refused(runs: list[Path], tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"point = baseline n 2 h/H 0.52 with seed 1 is given twice"):
-        analyse([runs[0], runs[0]], tmp_path / "out", **ORIGIN)
+        Chain().analyse([runs[0], runs[0]], tmp_path / "out", **ORIGIN)

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from released import stack, write_released
 from scipy.spatial.transform import Rotation
+from synthetic.released import stack, write_released
 
 from dem.errors import InputError
 from postprocess.manifest import read_run
@@ -20,13 +20,14 @@ from studies.melting.measure import (
     HEIGHT,
     LIFT,
     OFFSET,
+    SINCE,
     SLOUGHED,
     SPREAD,
     TILT,
     TOPPLED,
     measure_melting,
 )
-from studies.melting.study import analyse
+from studies.melting.study import Melting
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 AWAY = np.array([0.05, 0.0, 0.0])
@@ -73,16 +74,16 @@ def report(study):
     root, runs = study
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(melting_figures, "draw_strip", lambda rows, output, **_: output)
-        return root / "out", analyse([*runs, root / "absent"], root / "out", **ORIGIN)
+        return root / "out", Melting().analyse([*runs, root / "absent"], root / "out", **ORIGIN)
 
 
 def test_a_run_is_measured_against_time_from_when_the_wall_went(study):
     melted = measure_melting(read_run(study[0] / "internal_lw0.70_seed1"))
-    assert melted.times == pytest.approx([0, 0.5, 1, 1.5, 2])
-    assert melted.values[SLOUGHED].tolist() == [0, 0, 0.3, 0.3, 0.3]
-    assert melted.values[CONTACT].tolist() == [1, 1, 0.7, 0.7, 0.7]
-    assert melted.values[HEIGHT][0] == 1
-    assert melted.values[SPREAD][-1] > 5
+    assert melted.history[SINCE] == pytest.approx([0, 0.5, 1, 1.5, 2])
+    assert melted.history[SLOUGHED].tolist() == [0, 0, 0.3, 0.3, 0.3]
+    assert melted.history[CONTACT].tolist() == [1, 1, 0.7, 0.7, 0.7]
+    assert melted.history[HEIGHT][0] == 1
+    assert melted.history[SPREAD][-1] > 5
     assert melted.row[SLOUGHED] == 0.3
     assert melted.row[LIFT] == 0
 
@@ -101,17 +102,17 @@ def test_a_pile_that_fell_over_is_told_from_one_that_sank(study):
 
 def test_the_study_judges_what_the_paper_says(report):
     output, found = report
-    verdicts = {one.paper: one.verdict for one in found.findings}
+    verdicts = {one.paper: one.verdict for one in found.judged}
     assert verdicts["Shape change: the pile does not break apart"] == "found"
     assert verdicts["Internal oscillation: some smarticles slough off the outer edge"] == "found"
-    edge = next(one for one in found.findings if "do not come off" in one.paper)
+    edge = next(one for one in found.judged if "do not come off" in one.paper)
     assert edge.verdict == "found"
     assert "less internal -0.267 ± 0.0333 (n = 3)" in edge.ours
-    topples = next(one for one in found.findings if "onto its side" in one.paper)
+    topples = next(one for one in found.judged if "onto its side" in one.paper)
     assert (topples.verdict, topples.ours[:18]) == ("found", "1 of 3 fell over; ")
     # Before the wall goes all piles are the same: nothing is narrower, higher or lower.
     assert verdicts["Shape change narrows the base and raises the pile"] == "not resolved"
-    lifted = found.findings[-1]
+    lifted = found.judged[-1]
     assert lifted.verdict == "found"
     assert "internal sloughed -0.267" in lifted.ours
     table = pd.read_csv(output / "runs.csv", comment="#")
@@ -128,25 +129,23 @@ def test_the_study_judges_what_the_paper_says(report):
     assert {"time_lw0.70.png", "time_lw0.70_lifted.png", "pictures.png"} <= set(found.files)
 
 
-def test_few_that_stand_do_not_prove_that_none_falls(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(melting_figures, "draw", lambda *_, **__: [])
+def test_few_that_stand_do_not_prove_that_none_falls(study, tmp_path, undrawn):
     runs = [study[0] / f"{name}_lw0.70_seed1" for name in ("static", "shape-change")]
-    found = {one.paper: one for one in analyse(runs, tmp_path, **ORIGIN).findings}
+    found = {one.paper: one for one in Melting().analyse(runs, tmp_path, **ORIGIN).judged}
     topples = found["Shape change: the pile may fall onto its side (one example is shown)"]
     assert topples.verdict == "not resolved"
     assert "0 of 1 fell over, so at most 95% of such piles do" in topples.ours
     assert found["Internal oscillation: some smarticles slough off the outer edge"].verdict == "no data"
 
 
-def test_runs_that_are_no_melting_are_listed(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(melting_figures, "draw", lambda *_, **__: [])
+def test_runs_that_are_no_melting_are_listed(study, tmp_path, undrawn):
     good = study[0] / "static_lw0.70_seed1"
     bad = write_released(tmp_path / "walled", "static", before=stack(), after=stack())
     for file in ("run.json", "done.json"):
         path = bad / file
         path.write_text(path.read_text().replace("remove-container", "relax"))
-    report = analyse([good, bad], tmp_path / "out", **ORIGIN)
+    report = Melting().analyse([good, bad], tmp_path / "out", **ORIGIN)
     missing = pd.read_csv(report.files["missing.csv"], comment="#")
     assert "does not end with a rest and remove-container" in missing["cause"].iloc[0]
     with pytest.raises(InputError, match="with seed 1 is given twice"):
-        analyse([good, good], tmp_path / "out", **ORIGIN)
+        Melting().analyse([good, good], tmp_path / "out", **ORIGIN)

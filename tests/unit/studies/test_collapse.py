@@ -6,13 +6,12 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from column_runs import H0, PHASES, Column, F, write_column
 from PIL import Image
+from synthetic.columns import H0, PHASES, Column, F, write_column
 
 from dem.errors import InputError
 from postprocess.manifest import read_run
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from studies.collapse import figures as collapse_figures
 from studies.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
 from studies.collapse.findings import findings
 from studies.collapse.law import (
@@ -30,7 +29,7 @@ from studies.collapse.law import (
 )
 from studies.collapse.measure import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
 from studies.collapse.reference import read_collapse_reference, reference_delta
-from studies.collapse.study import analyse
+from studies.collapse.study import Collapse
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}
 DELTAS = {0.13: 6.0, 0.40: 9.0, 1.02: 7.5}
@@ -59,13 +58,7 @@ def study(tmp_path_factory):
                     tau=tau(factor * delta, gamma), aspect_ratio=aspect, gamma=gamma, seed=seed, status=status
                 )
                 runs.append(write_column(root / f"lw{aspect}_gamma{gamma}_seed{seed}", column))
-    return root, runs, analyse(runs, root / "out", **ORIGIN)
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the figures, which take most of the time."""
-    monkeypatch.setattr(collapse_figures, "draw", lambda *_, **__: [])
+    return root, runs, Collapse().analyse(runs, root / "out", **ORIGIN)
 
 
 def test_each_height_is_one_before_and_falls_as_it_was_made_to(one):
@@ -118,7 +111,7 @@ def test_delta_is_that_put_in(study):
 
 
 def test_findings_of_a_study_that_obeys_the_law(study):
-    verdicts = {finding.paper: finding.verdict for finding in study[2].findings}
+    verdicts = {finding.paper: finding.verdict for finding in study[2].judged}
     assert verdicts == {
         "Columns collapse the later the gentler the vibration": "found",
         "τ = (1/f) exp(Δ/Γ) with one Δ at each l/w": "found",
@@ -228,14 +221,14 @@ def test_the_reference_has_its_peak_and_is_not_interpolated():
 def test_runs_that_must_not_be_mixed_are_refused(tmp_path, undrawn, columns, expected):
     runs = [write_column(tmp_path / str(k), column) for k, column in enumerate(columns)]
     with pytest.raises(InputError) as caught:
-        analyse(runs, tmp_path / "out", **ORIGIN)
+        Collapse().analyse(runs, tmp_path / "out", **ORIGIN)
     assert str(caught.value).startswith(expected)
 
 
 def test_a_run_without_a_free_column_is_missing(tmp_path, undrawn):
     good = write_column(tmp_path / "good", Column(tau=0.5))
     bad = write_column(tmp_path / "bad", Column(tau=0.5, phases=PHASES[:3]))
-    analyse([good, bad], tmp_path / "out", **ORIGIN)
+    Collapse().analyse([good, bad], tmp_path / "out", **ORIGIN)
     missing = pd.read_csv(tmp_path / "out" / "missing.csv", comment="#")
     assert missing["cause"].tolist() == [
         f"{bad}: no shake after a remove-container: its phases are deposit, shake, relax"

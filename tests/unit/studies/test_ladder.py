@@ -11,9 +11,6 @@ from dem.phases.actuation import actuated
 from dem.scene.scene import Scene, load_scene, scene_hash
 from dem.setting.parts import FIDELITIES
 from studies.accuracy.ladder import (
-    ACTIVITIES,
-    ACTUATED,
-    BASE,
     KNOBS,
     Ladder,
     affordable,
@@ -22,6 +19,7 @@ from studies.accuracy.ladder import (
     parse_knobs,
     parse_seeds,
 )
+from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE
 from templates.sweep.expand import expand
 
 SCENE = """\

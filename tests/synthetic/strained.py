@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from series_file import write_series
+
 from synthetic import SyntheticRun, write_run
+from synthetic.series import write_series
 
 LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
 WIDTH = 0.062

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from series_file import write_series
+
 from synthetic import RADIUS, SyntheticRun, W, u_shape, write_frame, write_manifest
+from synthetic.series import write_series
 
 F = 30.0
 PHASES = ("deposit", "shake", "relax", "remove-container", "shake")

@@ -7,14 +7,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
-from hooked import weight, write_hooked_run
 from PIL import Image
 from synthetic import SyntheticRun, write_run
+from synthetic.hooked import weight, write_hooked_run
 
 from dem.errors import InputError
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked
-from studies.accuracy import figures as accuracy_figure
 from studies.accuracy.advice import advise, told_closing
 from studies.accuracy.measure import (
     ACTIVITY,
@@ -27,10 +26,10 @@ from studies.accuracy.measure import (
     SPHERES,
     TIME_STEP,
     WALL,
-    Rung,
     work_precision,
 )
-from studies.accuracy.study import analyse_accuracy
+from studies.accuracy.rung import Rung
+from studies.accuracy.study import TABLE, Accuracy
 from studies.base.runs import DEFINITION
 from studies.base.variants import VARIANT
 
@@ -41,8 +40,8 @@ STEPS = [
     Rung(knob="time-step", value="0.225", unit="", setting="quarter"),
 ]
 RESTITUTIONS = [
-    Rung(knob="restitution", value="0.2", unit="", setting="bouncy", sensitivity=True),
-    Rung(knob="restitution", value="0.7", unit="", setting="base", sensitivity=True),
+    Rung(knob="restitution", value="0.2", unit="", setting="bouncy"),
+    Rung(knob="restitution", value="0.7", unit="", setting="base"),
 ]
 COSTS = {"base": 1.0, "half": 2.0, "quarter": 4.0, "bouncy": 3.0}
 
@@ -203,12 +202,12 @@ def ladder(tmp_path_factory):
             )
             write_run(directories[-1], made)
     expected = {path.name: 4.0 for path in directories}
-    report = analyse_accuracy(directories, root / "out", rungs=STEPS + RESTITUTIONS, expected_s=expected, **ORIGIN)
+    report = Accuracy(rungs=STEPS + RESTITUTIONS, expected_s=expected).analyse(directories, root / "out", **ORIGIN)
     return root, directories, report
 
 
 def test_runs_are_measured(ladder):
-    runs = ladder[2].runs.set_index("run")
+    runs = ladder[2].tables["runs"].set_index("run")
     row = runs.loc["base_seed2"]
     assert row[COST] == pytest.approx(1.0)  # 2 s for 2 s of shaking
     assert row[WALL] == pytest.approx(8.0)  # four phases
@@ -222,12 +221,12 @@ def test_runs_are_measured(ladder):
 
 def test_the_report_advises_and_lists_what_is_missing(ladder):
     report = ladder[2]
-    table = report.table.set_index(["knob", VARIANT])
+    table = report.tables[TABLE].set_index(["knob", VARIANT])
     assert table.loc[("time-step", "base"), "phi_f error [%]"] == pytest.approx(100 * (0.13 / 0.12 - 1), rel=1e-3)
     assert table.loc[("time-step", "base"), "verdict"] == "resolved"
     assert table.loc[("time-step", "half"), "seeds [-]"] == 2
-    assert report.advice[0].use == "0.45"
-    assert report.closing.startswith("Use time-step 0.45 (")
+    assert report.judged[0].use == "0.45"
+    assert report.told[-1].startswith("Use time-step 0.45 (")
     assert {run.status for run in report.missing} == {"failed", "not started"}
     assert "time-step 0.225, restitution 0.7" in " ".join(report.footer)
 
@@ -235,7 +234,7 @@ def test_the_report_advises_and_lists_what_is_missing(ladder):
 def test_tables_and_texts_name_their_origin(ladder):
     report = ladder[2]
     table = pd.read_csv(report.files["work_precision.csv"], comment="#")
-    assert list(table.columns) == list(report.table.columns)
+    assert list(table.columns) == list(report.tables[TABLE].columns)
     assert len(table) == 5
     words = [
         "Study accuracy, fidelity draft, standard: 10 of 12 runs, 2 missing",
@@ -252,7 +251,7 @@ def test_tables_and_texts_name_their_origin(ladder):
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["reference"] == {"time-step": "quarter", "restitution": "base"}
     lines = report.files["accuracy.md"].read_text().splitlines()
-    assert f"**{report.closing}**" in lines
+    assert f"**{report.told[-1]}**" in lines
     row = next(line for line in lines if line.startswith("| time-step | 0.9 |"))
     assert "| +8.3 ± " in row
     assert " * | " in row
@@ -277,10 +276,10 @@ def test_the_figure_has_a_marker_per_knob_and_a_band(ladder):
 
 def test_a_ladder_with_one_seed_is_drawn_without_a_band(ladder, tmp_path):
     first = [path for path in ladder[1] if path.name.endswith("seed2")]
-    report = analyse_accuracy(first, tmp_path / "out", rungs=STEPS, **ORIGIN)
+    report = Accuracy(rungs=STEPS).analyse(first, tmp_path / "out", **ORIGIN)
     assert "seed-to-seed band, 95 %" not in report.files["accuracy.svg"].read_text()
-    assert report.closing.startswith("Nothing can be recommended yet")
-    assert report.table[EXPECTED].isna().all()
+    assert report.told[-1].startswith("Nothing can be recommended yet")
+    assert report.tables[TABLE][EXPECTED].isna().all()
 
 
 def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path):
@@ -296,13 +295,13 @@ def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path):
                     tmp_path / f"{setting}_seed{seed}", made, lambda time, force=force: np.full_like(time, force)
                 )
             )
-    report = analyse_accuracy(directories, tmp_path / "out", rungs=STEPS, **ORIGIN)
-    table = report.table.set_index(VARIANT)
+    report = Accuracy(rungs=STEPS).analyse(directories, tmp_path / "out", **ORIGIN)
+    table = report.tables[TABLE].set_index(VARIANT)
     assert table.loc["base", COMPARED["hook_force"]] == pytest.approx(3.15 / run().count)
     assert table.loc["base", "hook_force error [%]"] == pytest.approx(100 * (3.15 / 2.15 - 1))
     assert table.loc["base", "hook_force resolved"]
     assert "F_peak" in (tmp_path / "out" / "accuracy.md").read_text()
-    assert "nan" not in report.closing
+    assert "nan" not in report.told[-1]
 
 
 @pytest.mark.parametrize(
@@ -317,11 +316,11 @@ def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path):
 def test_runs_that_cannot_be_compared_are_refused(ladder, tmp_path, name, made, message):
     other = write_run(tmp_path / name, run(**made))
     with pytest.raises(InputError, match=message):
-        analyse_accuracy([ladder[1][0], other], tmp_path / "out", rungs=STEPS, **ORIGIN)
+        Accuracy(rungs=STEPS).analyse([ladder[1][0], other], tmp_path / "out", **ORIGIN)
 
 
-def test_a_run_without_activity_is_unusable(ladder, tmp_path, monkeypatch):
-    monkeypatch.setattr(accuracy_figure, "draw", lambda *_, **__: [])
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_without_activity_is_unusable(ladder, tmp_path):
     other = write_run(tmp_path / "half_seed1", run(phases=("deposit", "relax")))
-    report = analyse_accuracy([ladder[1][0], other], tmp_path / "out", rungs=STEPS, **ORIGIN)
+    report = Accuracy(rungs=STEPS).analyse([ladder[1][0], other], tmp_path / "out", **ORIGIN)
     assert "no activity after another phase: its phases are deposit, relax" in report.missing[0].cause

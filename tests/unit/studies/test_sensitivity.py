@@ -13,8 +13,7 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from studies.base.runs import DEFINITION
-from studies.sensitivity import figure as sensitivity_figure
-from studies.sensitivity.study import analyse_sensitivity
+from studies.sensitivity.study import Sensitivity
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study sensitivity --out 'my study'"}
@@ -44,19 +43,13 @@ def study(tmp_path_factory):
             made = run(seed=seed, packing=(0.1, before * factor, after * factor), status=status)
             directories.append(write_run(root / f"{variant}_seed{seed}", made))
     directories.append(root / "diameter-1.27mm_seed1")
-    return root, directories, analyse_sensitivity(directories, root / "out", **ORIGIN)
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the figure, which takes most of the time."""
-    monkeypatch.setattr(sensitivity_figure, "draw", lambda *_, **__: [])
+    return root, directories, Sensitivity("sensitivity").analyse(directories, root / "out", **ORIGIN)
 
 
 def test_means_and_changes_are_those_put_in(study):
     report = study[2]
-    table = report.summary.set_index("variant")
-    assert report.baseline == "draft"
+    table = report.tables["summary"].set_index("variant")
+    assert report.told == ("Changes are against draft; * beyond the error at 95 %.",)
     assert list(table.index) == [*LEVELS, "diameter-1.27mm"]
     assert table["seeds [-]"].tolist() == [3, 3, 2, 0]
     assert table.loc["draft", PHI_0] == pytest.approx(0.100, rel=1e-4)
@@ -71,7 +64,7 @@ def test_means_and_changes_are_those_put_in(study):
 
 
 def test_a_change_is_clear_only_beyond_its_error(study):
-    table = study[2].summary.set_index("variant")
+    table = study[2].tables["summary"].set_index("variant")
     # Nothing was changed, seed by seed: no change may be found, and its error is no zero.
     assert table.loc["pitch-0.5", "phi_f change [%]"] == pytest.approx(0, abs=1e-6)
     error = 1.0 / math.sqrt(3) * math.sqrt(2) * 2.776445  # t(0.975; 4): equal spreads of 1 %
@@ -83,7 +76,7 @@ def test_a_change_is_clear_only_beyond_its_error(study):
 
 def test_variant_without_a_finished_run_stays_empty(study):
     report = study[2]
-    row = report.summary.set_index("variant").loc["diameter-1.27mm"]
+    row = report.tables["summary"].set_index("variant").loc["diameter-1.27mm"]
     assert row[[PHI_0, PHI_F, "phi_0 change [%]", "phi_f change 95 % [%]"]].isna().all()
     assert not row["phi_f clear"]
     assert {(r.directory.rpartition("/")[2], r.status) for r in report.missing} == {
@@ -96,7 +89,7 @@ def test_tables_on_disk_are_those_of_the_report(study):
     report = study[2]
     for name in ("runs", "summary"):
         table = pd.read_csv(report.files[f"{name}.csv"], comment="#")
-        expected = getattr(report, name)
+        expected = report.tables[name]
         assert list(table.columns) == list(expected.columns)
         assert len(table) == len(expected) > 0
     assert pd.read_csv(report.files["missing.csv"], comment="#")["status"].tolist() == ["failed", "not started"]
@@ -119,13 +112,13 @@ def test_every_output_names_its_origin(study):
         assert all(word in text for word in words)
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["study"] == "sensitivity"
-    assert {run["directory"] for run in origin["runs"]} == {str(root / name) for name in report.runs["run"]}
+    assert {run["directory"] for run in origin["runs"]} == {str(root / name) for name in report.tables["runs"]["run"]}
 
 
 def test_figure_has_a_row_per_variant_and_gravish(study):
     report = study[2]
     svg = report.files["sensitivity.svg"].read_text()
-    assert all(variant in svg for variant in report.summary["variant"])
+    assert all(variant in svg for variant in report.tables["summary"]["variant"])
     assert "Gravish et al. 2012" in svg
     assert "baseline, 95 %" in svg
     with Image.open(report.files["sensitivity.png"]) as image:
@@ -138,7 +131,7 @@ def test_figure_has_a_row_per_variant_and_gravish(study):
 
 def test_without_a_point_of_gravish_there_is_no_line(tmp_path):
     directory = write_run(tmp_path / "draft_seed1", run(aspect_ratio=0.65))
-    report = analyse_sensitivity([directory], tmp_path / "out", **ORIGIN)
+    report = Sensitivity("sensitivity").analyse([directory], tmp_path / "out", **ORIGIN)
     assert "Gravish et al. 2012" not in report.files["sensitivity.svg"].read_text().split("Small dots")[0]
     assert "Gravish has no point at this l/w" in report.files["summary.md"].read_text()
     assert "One seed per variant: no error bars" in report.footer[1]
@@ -146,10 +139,10 @@ def test_without_a_point_of_gravish_there_is_no_line(tmp_path):
 
 @pytest.mark.usefixtures("undrawn")
 def test_baseline_without_a_finished_run_leaves_no_changes(study, tmp_path):
-    report = analyse_sensitivity([tmp_path / "standard_seed1", *study[1]], tmp_path / "out", **ORIGIN)
-    assert report.baseline == "standard"
-    assert report.summary[["phi_0 change [%]", "phi_f change [%]"]].isna().all(axis=None)
-    assert report.summary[PHI_0].notna().sum() == 3
+    report = Sensitivity("sensitivity").analyse([tmp_path / "standard_seed1", *study[1]], tmp_path / "out", **ORIGIN)
+    assert "against standard;" in report.told[0]
+    assert report.tables["summary"][["phi_0 change [%]", "phi_f change [%]"]].isna().all(axis=None)
+    assert report.tables["summary"][PHI_0].notna().sum() == 3
 
 
 @pytest.mark.parametrize(
@@ -168,7 +161,7 @@ def test_baseline_without_a_finished_run_leaves_no_changes(study, tmp_path):
 def test_runs_that_cannot_be_compared_are_refused(study, tmp_path, name, made, message):
     other = write_run(tmp_path / name, run(**made))
     with pytest.raises(InputError, match=message):
-        analyse_sensitivity([study[1][0], other], tmp_path / "out", **ORIGIN)
+        Sensitivity("sensitivity").analyse([study[1][0], other], tmp_path / "out", **ORIGIN)
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -181,7 +174,7 @@ def test_runs_that_cannot_be_compared_are_refused(study, tmp_path, name, made, m
 )
 def test_run_of_another_name_is_listed_as_unusable(study, tmp_path, name, cause):
     other = shutil.copytree(study[1][0], tmp_path / name)
-    report = analyse_sensitivity([study[1][0], other], tmp_path / "out", **ORIGIN)
+    report = Sensitivity("sensitivity").analyse([study[1][0], other], tmp_path / "out", **ORIGIN)
     (missing,) = report.missing
     assert missing.status == "unusable"
     assert cause in missing.cause
@@ -189,4 +182,4 @@ def test_run_of_another_name_is_listed_as_unusable(study, tmp_path, name, cause)
 
 def test_no_finished_run_is_an_error(study, tmp_path):
     with pytest.raises(InputError, match="study sensitivity: none of 1 runs is done"):
-        analyse_sensitivity(study[1][-1:], tmp_path / "out", **ORIGIN)
+        Sensitivity("sensitivity").analyse(study[1][-1:], tmp_path / "out", **ORIGIN)

@@ -12,7 +12,6 @@ from synthetic import SyntheticRun, write_run
 from dem.errors import InputError
 from studies.base.references import DIGITISING_ERROR, read_reference
 from studies.base.runs import DEFINITION
-from studies.gravish import figures as gravish_figures
 from studies.gravish import findings as gravish_findings
 from studies.gravish.findings import (
     answers,
@@ -20,7 +19,7 @@ from studies.gravish.findings import (
     steps_between_ratios,
     summarise_runs,
 )
-from studies.gravish.study import analyse_gravish
+from studies.gravish.study import Gravish
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
 CHEAP = (DEFINITION, "top-percentile")
@@ -181,12 +180,6 @@ def test_without_a_common_point_the_deviation_is_undetermined():
 # The whole analysis, from run directories
 
 
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the figures, which take most of the time."""
-    monkeypatch.setattr(gravish_figures, "draw", lambda *_, **__: [])
-
-
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Three aspect ratios with two seeds each, one of them failed and one unfinished, and the report."""
@@ -203,12 +196,12 @@ def study(tmp_path_factory):
         write_run(root / "lw1.1-s1", SyntheticRun(aspect_ratio=1.1, status="unfinished", frames_per_phase=1))
     )
     directories.append(root / "lw1.1-s2")
-    report = analyse_gravish(directories, root / "out", **ORIGIN, definitions=CHEAP)
+    report = Gravish(CHEAP).analyse(directories, root / "out", **ORIGIN)
     return root, directories, report
 
 
 def test_known_packing_fractions_are_found(study):
-    runs = study[2].runs.set_index("run")
+    runs = study[2].tables["runs"].set_index("run")
     # Frames scatter by 0.2 % about the φ that was asked for, symmetrically.
     for ratio, (before, after) in LEVELS.items():
         if ratio != 0.5:
@@ -222,7 +215,7 @@ def test_known_packing_fractions_are_found(study):
 
 
 def test_summary_counts_seeds(study):
-    summary = study[2].summary.set_index("aspect ratio [-]")
+    summary = study[2].tables["summary"].set_index("aspect ratio [-]")
     assert summary["seeds [-]"].to_dict() == {0.4: 2, 0.5: 1, 0.7: 2}
     assert summary["seeds"].to_dict() == {0.4: "1 2", 0.5: "2", 0.7: "1 2"}
     # Two seeds 1 % to either side: s/√n = 1 %, times t(0.975; 1).
@@ -234,9 +227,9 @@ def test_summary_counts_seeds(study):
 
 
 def test_crossings_are_those_of_the_frames(study):
-    runs = study[2].runs
+    runs = study[2].tables["runs"]
     assert (runs["crossings before [-]"] > 0).all()
-    assert (study[2].summary["crossings after [-]"] > 0).all()
+    assert (study[2].tables["summary"]["crossings after [-]"] > 0).all()
 
 
 def test_missing_runs_are_listed(study):
@@ -254,11 +247,11 @@ def test_tables_on_disk_are_those_of_the_report(study):
     _, _, report = study
     for name in ("runs", "summary", "deviations", "steps"):
         table = pd.read_csv(report.files[f"{name}.csv"], comment="#")
-        expected = getattr(report, name)
+        expected = report.tables[name]
         assert list(table.columns) == list(expected.columns)
         assert len(table) == len(expected) > 0
     written = pd.read_csv(report.files["summary.csv"], comment="#")[PHI_0]
-    np.testing.assert_allclose(written, report.summary[PHI_0], rtol=1e-5)
+    np.testing.assert_allclose(written, report.tables["summary"][PHI_0], rtol=1e-5)
     # Gravish has no φ_0 at l/w = 0.5: the cell is empty, not filled from its neighbours.
     rows = report.files["summary.csv"].read_text().splitlines()
     position = rows[0].split(",").index(f"phi_0 {DEFINITION} Gravish [-]")
@@ -285,7 +278,7 @@ def test_provenance_lists_runs_and_hashes(study):
     root, _, report = study
     origin = json.loads(report.files["provenance.json"].read_text())
     assert {run["directory"]: run["scene_sha256"] for run in origin["runs"]} == {
-        str(root / name): sha for name, sha in report.runs[["run", "scene_sha256"]].itertuples(index=False)
+        str(root / name): sha for name, sha in report.tables["runs"][["run", "scene_sha256"]].itertuples(index=False)
     }
     assert (origin["note"], origin["command"]) == (ORIGIN["note"], ORIGIN["command"])
     assert len(origin["missing"]) == 3
@@ -304,7 +297,7 @@ def test_figures_are_drawn_at_column_width(study):
 
 def test_analysis_is_repeatable(study, tmp_path):
     _, directories, report = study
-    again = analyse_gravish(directories[::-1], tmp_path / "out", **ORIGIN, definitions=CHEAP)
+    again = Gravish(CHEAP).analyse(directories[::-1], tmp_path / "out", **ORIGIN)
     for name in ("runs.csv", "summary.csv", "phi.svg", "phi.png"):
         assert again.files[name].read_bytes() == report.files[name].read_bytes()
 
@@ -312,9 +305,9 @@ def test_analysis_is_repeatable(study, tmp_path):
 @pytest.mark.usefixtures("undrawn")
 def test_analysis_replaces_an_earlier_one(study, tmp_path):
     _, directories, _ = study
-    first = analyse_gravish(directories[:1], tmp_path, **ORIGIN, definitions=[DEFINITION])
-    assert len(first.runs) == 1
-    second = analyse_gravish(directories[:2], tmp_path, **ORIGIN, definitions=[DEFINITION])
+    first = Gravish([DEFINITION]).analyse(directories[:1], tmp_path, **ORIGIN)
+    assert len(first.tables["runs"]) == 1
+    second = Gravish([DEFINITION]).analyse(directories[:2], tmp_path, **ORIGIN)
     assert len(pd.read_csv(second.files["runs.csv"], comment="#")) == 2
     assert {path.name for path in tmp_path.iterdir()} == set(second.files)  # no temporary file is left
 
@@ -323,7 +316,7 @@ def test_run_without_series_is_named_in_the_history(study, tmp_path):
     _, directories, _ = study
     run = shutil.copytree(directories[0], tmp_path / "bare")
     (run / "series.h5").unlink()
-    report = analyse_gravish([run], tmp_path / "out", **ORIGIN, definitions=[DEFINITION])
+    report = Gravish([DEFINITION]).analyse([run], tmp_path / "out", **ORIGIN)
     assert "No time series of φ: bare." in report.files["phi_time.svg"].read_text()
 
 
@@ -331,9 +324,9 @@ def test_run_without_series_is_named_in_the_history(study, tmp_path):
 def test_costly_definitions_are_tabulated_when_asked_for(tmp_path):
     scene = SyntheticRun(count=30, packing=(0.1, 0.1, 0.12, 0.12), frames_per_phase=1)
     run = write_run(tmp_path / "a", scene)
-    report = analyse_gravish([run], tmp_path / "out", **ORIGIN)
+    report = Gravish().analyse([run], tmp_path / "out", **ORIGIN)
     for definition in ("voxel", "voronoi"):
-        values = report.runs[[f"phi_0 {definition} [-]", f"phi_f {definition} [-]"]].to_numpy()
+        values = report.tables["runs"][[f"phi_0 {definition} [-]", f"phi_f {definition} [-]"]].to_numpy()
         assert ((values > 0.01) & (values < 0.5)).all()
 
 
@@ -341,21 +334,21 @@ def test_runs_of_different_fidelity_are_refused(study, tmp_path):
     _, directories, _ = study
     other = write_run(tmp_path / "other", SyntheticRun(aspect_ratio=0.9, fidelity="reference", frames_per_phase=1))
     with pytest.raises(InputError, match=r"different fidelity must not be averaged: .* is draft, .*other is reference"):
-        analyse_gravish([directories[0], other], tmp_path / "out", **ORIGIN, definitions=CHEAP)
+        Gravish(CHEAP).analyse([directories[0], other], tmp_path / "out", **ORIGIN)
 
 
 def test_the_same_run_twice_is_refused(study, tmp_path):
     _, directories, _ = study
     with pytest.raises(InputError, match=r"l/w = 0\.4 with seed 1 is given twice"):
-        analyse_gravish([directories[0], directories[0]], tmp_path / "out", **ORIGIN, definitions=CHEAP)
+        Gravish(CHEAP).analyse([directories[0], directories[0]], tmp_path / "out", **ORIGIN)
 
 
 def test_no_finished_run_is_an_error(study, tmp_path):
     root, directories, _ = study
     with pytest.raises(InputError, match=r"none of 2 runs is done; the first: .*lw1\.1-s1: it has not finished"):
-        analyse_gravish(directories[-2:], tmp_path / "out", **ORIGIN)
+        Gravish().analyse(directories[-2:], tmp_path / "out", **ORIGIN)
     with pytest.raises(InputError, match="none of 0 runs is done; finish a run first"):
-        analyse_gravish([], root / "none", **ORIGIN)
+        Gravish().analyse([], root / "none", **ORIGIN)
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -363,7 +356,7 @@ def test_run_that_was_not_shaken_is_listed_as_unusable(study, tmp_path):
     _, directories, _ = study
     calm = SyntheticRun(phases=("deposit", "relax"), packing=(0.1, 0.1), frames_per_phase=1)
     run = write_run(tmp_path / "calm", calm)
-    report = analyse_gravish([directories[0], run], tmp_path / "out", **ORIGIN, definitions=CHEAP)
+    report = Gravish(CHEAP).analyse([directories[0], run], tmp_path / "out", **ORIGIN)
     (missing,) = report.missing
     assert missing.status == "unusable"
     assert "no shaking after another phase: its phases are deposit, relax" in missing.cause
@@ -371,13 +364,13 @@ def test_run_that_was_not_shaken_is_listed_as_unusable(study, tmp_path):
 
 def test_unknown_definition_is_refused(tmp_path):
     with pytest.raises(InputError, match="unknown definition 'mass' of φ: choose from second-highest-com"):
-        analyse_gravish([], tmp_path, **ORIGIN, definitions=["mass"])
+        Gravish(["mass"]).analyse([], tmp_path, **ORIGIN)
 
 
 def test_output_that_is_a_file_is_refused(study, tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(InputError, match="choose another folder as output"):
-        analyse_gravish(study[1], tmp_path / "out", **ORIGIN)
+        Gravish().analyse(study[1], tmp_path / "out", **ORIGIN)
 
 
 def test_accepted_deviation_is_that_of_the_study():

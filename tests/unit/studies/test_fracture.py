@@ -6,18 +6,17 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hooked import AFTER_REST, UPPER, weight, write_hooked_run
-from hooked import HELD as GOES_ON
 from PIL import Image
 from synthetic import SyntheticRun, W
+from synthetic.hooked import AFTER_REST, UPPER, weight, write_hooked_run
+from synthetic.hooked import HELD as GOES_ON
 
 from dem.errors import InputError
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
-from smarticles.commands.studies import STUDIES, Analysis
+from smarticles.commands.study import told_report
 from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
-from studies.fracture import figures as fracture_figures
 from studies.fracture.findings import findings
 from studies.fracture.measure import (
     ABOVE,
@@ -36,7 +35,7 @@ from studies.fracture.measure import (
     WINDOWS,
     WORK,
 )
-from studies.fracture.study import analyse
+from studies.fracture.study import Fracture
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out 'my study'"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
@@ -60,12 +59,6 @@ def write(directory, procedure, *, seed=1, factor=1.0, **changes):
     return write_hooked_run(directory, made, lambda time: height * np.clip(1 - np.abs(time - APEX) / BASE, 0, None))
 
 
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the figures, which take most of the time."""
-    monkeypatch.setattr(fracture_figures, "draw", lambda *_, **__: [])
-
-
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Four procedures of three seeds, θ = 30° of one, l/w = 1 of one; one run failed and one was not started."""
@@ -73,7 +66,7 @@ def study(tmp_path_factory):
     runs = [write(root / f"{name}_seed{seed}", name, seed=seed) for name in LEVELS for seed in SPREAD]
     runs += [write(root / "internal30", INTERNAL, theta=30.0), write(root / "long", INTERNAL, aspect_ratio=1.0)]
     runs += [write(root / "failed", STATIC, status="failed"), root / "never"]
-    return root, analyse(runs, root / "out", **ORIGIN)
+    return root, Fracture().analyse(runs, root / "out", **ORIGIN)
 
 
 def table_of(root, name):
@@ -117,7 +110,7 @@ def test_a_hook_that_stops_on_the_way_was_held_fast(tmp_path, undrawn):
     held = write_hooked_run(
         tmp_path / "held", made, lambda time: 1.5 * total * (time > 0.8), limit=1.5 * total, stops=0.8
     )
-    analyse([held, write(tmp_path / "free", SHAPE, seed=2)], tmp_path / "out", **ORIGIN)
+    Fracture().analyse([held, write(tmp_path / "free", SHAPE, seed=2)], tmp_path / "out", **ORIGIN)
     runs = table_of(tmp_path, "runs").set_index(SEED)
     assert (runs.loc[1, HELD_FAST], runs.loc[2, HELD_FAST]) == (1, 0)
     assert (runs.loc[1, LIMIT], runs.loc[2, LIMIT]) == (pytest.approx(1.5), math.inf)
@@ -147,7 +140,7 @@ def test_missing_runs_are_listed_and_the_rest_is_used(study):
 
 
 def test_findings_are_judged_by_the_runs(study):
-    found = {finding.paper: finding.verdict for finding in study[1].findings}
+    found = {finding.paper: finding.verdict for finding in study[1].judged}
     assert found["Shape change has the highest peak force of the three procedures, l/w = 0.7"] == "found"
     assert found["Internal oscillation has the least peak force of the three procedures, l/w = 0.7"] == "found"
     report = (study[0] / "out" / "findings.md").read_text()
@@ -178,15 +171,15 @@ def test_runs_that_must_not_be_averaged_are_refused(tmp_path, undrawn):
         (write(tmp_path / "c", STATIC), "point = static l/w 0.7 with seed 1 is given twice"),
     ):
         with pytest.raises(InputError, match=message):
-            analyse([one, other], tmp_path / "out", **ORIGIN)
+            Fracture().analyse([one, other], tmp_path / "out", **ORIGIN)
     shaken = [write(tmp_path / f"d{time:g}", EXTERNAL, seed=int(time), shake_time=time) for time in (1.0, 2.0)]
     with pytest.raises(InputError, match="runs of different duration"):
-        analyse(shaken, tmp_path / "out", **ORIGIN)
+        Fracture().analyse(shaken, tmp_path / "out", **ORIGIN)
 
 
 def test_the_terminal_is_told_points_and_findings(tmp_path, undrawn):
     runs = [write(tmp_path / name, name) for name in (STATIC, SHAPE)]
-    told = STUDIES["fracture"].analyse(Analysis(runs=runs, output=tmp_path / "out", quick=True, **ORIGIN)).splitlines()
+    told = told_report(Fracture().analyse(runs, tmp_path / "out", **ORIGIN)).splitlines()
     assert told[0].split()[:5] == ["procedure", "θ", "l/w", "seeds", "peak"]
     assert [line.split()[0] for line in told[1:3]] == [STATIC, SHAPE]
     assert "NO DATA: Internal oscillation: over θ, the peak force goes with ⟨N⟩" in told
@@ -203,7 +196,7 @@ def test_the_terminal_is_told_points_and_findings(tmp_path, undrawn):
 )
 def test_a_run_of_other_phases_is_unusable(tmp_path, undrawn, phases):
     other = write_hooked_run(tmp_path / "b", run(STATIC, phases=phases, packing=(0.1,) * len(phases)), np.zeros_like)
-    report = analyse([write(tmp_path / "a", STATIC), other], tmp_path / "out", **ORIGIN)
+    report = Fracture().analyse([write(tmp_path / "a", STATIC), other], tmp_path / "out", **ORIGIN)
     missing = pd.read_csv(tmp_path / "out" / "missing.csv", comment="#")
     assert len(report.rows) == 1
     assert "its phases are deposit, " in missing["cause"].iloc[0]

@@ -12,7 +12,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from series_file import write_series
+
+from synthetic.series import write_series
 
 W, T1, T2, RADIUS = 0.0117, 0.00127, 0.0005, 0.0234
 PHASES = ("deposit", "relax", "shake", "relax")
