@@ -3,8 +3,10 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from synthetic import SyntheticRun, write_run
@@ -14,12 +16,29 @@ LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
 WIDTH = 0.062
 
 
-def write_strained_run(directory: Path, force: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Path:
-    """A whole run of one phase that strains a chain; `force` [N] of strains [-]."""
-    run = SyntheticRun(count=2, phases=("strain",))
+def write_strained_run(
+    directory: Path,
+    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    channel: float = 0.08,
+    **changes: Any,
+) -> Path:
+    """A whole run of one phase that strains a chain.
+
+    Args:
+        directory: The run directory.
+        force: On the pulled string [N], of strains [-].
+        channel: Distance of the walls [m].
+        changes: Of the `SyntheticRun`.
+    """
+    run = SyntheticRun(phases=("strain",), **{"count": 2, **changes})
     write_run(directory, run)
     manifest = json.loads((directory / "run.json").read_text())
-    (directory / "run.json").write_text(json.dumps(manifest | {"planar": True, "channel_width_m": 0.08}))
+    (directory / "run.json").write_text(json.dumps(manifest | {"planar": True, "channel_width_m": channel}))
+    path = directory / "scene.yaml"
+    scene = yaml.safe_load(path.read_text())
+    scene["phases"][0]["speed_m_per_s"] = SPEED
+    path.write_text(yaml.safe_dump(scene))
     times = np.arange(1, round(run.durations["strain"] / INTERVAL) + 1) * INTERVAL
     strains = SPEED * (times - times[0]) / LENGTH
     pulled = np.zeros((len(times), 3))
