@@ -19,7 +19,7 @@ from postprocess.report import figures
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, marker
 from studies.chain.findings import COUNTS, RANGE
-from studies.chain.runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,9 +47,9 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `chain_runs.points`.
-        runs: See `chain_runs.chain_row`.
-        changes: See `chain_findings.sensitivity`.
+        points: See `measure.points`.
+        runs: See `measure.chain_row`.
+        changes: See `findings.sensitivity`.
         manifests: The runs.
         footer: Origin, one statement each.
 
