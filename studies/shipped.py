@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from templates.sweep.expand import Point
 from templates.sweep.render import Value
-from templates.sweep.texts import nearest
 
 _FOLDER = Path(__file__).parent
 
@@ -26,7 +25,7 @@ def study_file(name: str, *, quick: bool = False) -> Path:
         InputError: there is no such study, or it has no quick variant.
     """
     if name not in study_names():
-        msg = f"study {name!r} does not exist; {nearest(name, study_names())}"
+        msg = f"study {name!r} does not exist; {nearest(name, sorted(study_names()))}"
         raise InputError(msg)
     file = _FOLDER / name.partition("-")[0] / (f"{name}.quick.yaml" if quick else f"{name}.yaml")
     if not file.is_file():

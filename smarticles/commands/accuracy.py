@@ -19,7 +19,7 @@ from smarticles.sweeps import expected_wall_s, folder_of
 if TYPE_CHECKING:
     from studies.accuracy.ladder import Ladder
     from templates.sweep.expand import Point
-    from templates.sweep.sweep import Sweep
+    from templates.sweep.sweep_file import Sweep
 
 _SEEDS = "1,2,3"
 
@@ -135,7 +135,7 @@ def _study(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Study:
 def _listing(study: _Study, seeds: int, jobs: int | None) -> str:
     """The ladder as a table, and what it is expected to take."""
     from dem.plan.outlook import plan  # noqa: PLC0415
-    from templates.local.local import slots_here  # noqa: PLC0415
+    from templates.local.runner import slots_here  # noqa: PLC0415
 
     ladder = study.ladder
     references = ladder.references()

@@ -114,7 +114,7 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     """
     from dem.setting.parts import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity is None:
         return {}
@@ -146,7 +146,7 @@ def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
     """How what is run differs from the full study as it ships, one line."""
     from studies.shipped import differences, study_file  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     here = expand(with_constants(load_sweep(file), changed))
     lines = differences(here, expand(load_sweep(study_file(name))))

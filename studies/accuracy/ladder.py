@@ -14,12 +14,11 @@ from types import MappingProxyType
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.scene import Scene, parse_scene
 from dem.setting.parts import FIDELITIES, Fidelity
 from templates.sweep.render import Value, render_yaml
-from templates.sweep.sweep import SEED, Sweep, SweepFile
-from templates.sweep.texts import nearest
+from templates.sweep.sweep_file import SEED, Sweep, SweepFile
 
 BASE = "base"
 """Setting of the scene as it stands."""
@@ -134,7 +133,7 @@ def parse_knobs(text: str) -> tuple[str, ...]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
-            msg = f"--knobs: {word!r} is no knob; {nearest(word, KNOBS)}"
+            msg = f"--knobs: {word!r} is no knob; {nearest(word, sorted(KNOBS))}"
             raise InputError(msg)
     if not words:
         msg = f"--knobs {text!r}: names none; known: {', '.join(KNOBS)}"

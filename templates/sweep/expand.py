@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from dem.errors import InputError
 from dem.scene.scene import Scene, parse_scene, scene_hash
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
-from templates.sweep.sweep import SEED, Sweep
+from templates.sweep.sweep_file import SEED, Sweep
 
 MAX_POINTS = 10_000
 """Runs of one sweep, unless the user asks for more: a slip in a grid makes millions."""

@@ -22,9 +22,9 @@ from dem.errors import InputError
 from dem.record.files import write_json, write_text
 from dem.scene.scene import Scene, dump_scene
 from templates.sweep.expand import Point
+from templates.sweep.files import read_json
 from templates.sweep.render import Value
-from templates.sweep.sweep import SEED, Sweep
-from templates.sweep.texts import read_json
+from templates.sweep.sweep_file import SEED, Sweep
 
 FORMAT = 1
 MANIFEST = "sweep.json"

@@ -13,7 +13,7 @@ from dem.setting.hooks import PullHook
 from dem.setting.parts import Deposit, Relax, Shake
 from studies.shipped import differences, study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 STUDIES = Path(studies.__file__).parent
 W, T2 = 0.0117, 0.5e-3

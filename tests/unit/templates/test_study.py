@@ -15,7 +15,7 @@ from dem.phases.actuation import InternalOscillation, ShapeChange
 from dem.setting.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
 from studies.shipped import differences, study_file, study_names
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 STUDIES = Path(studies.__file__).parent
 
