@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from dem.body.state import State
 from dem.engine.yade.engine import Engine
-from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
+from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frames import FrameWriter
 from dem.record.progress import Progress
 from dem.record.series import SeriesWriter
 from dem.run.sampler import Sampler

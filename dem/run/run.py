@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
@@ -26,17 +25,12 @@ from dem.physics.stability import contact_law, hinge_law, time_steps
 from dem.plan import effects
 from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
-from dem.record.files import write_json, write_text
+from dem.record.files import write_text
 from dem.record.frames import FrameWriter
-from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, SCENE
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
+from dem.record.names import DONE, FAILED, SCENE
 from dem.record.progress import Progress
-from dem.record.rundir import (
-    claimed,
-    log_of,
-    mark_done,
-    mark_failed,
-    recorded_scene_hash,
-)
+from dem.record.rundir import claimed, log_of, recorded_scene_hash
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.sampler import Sampler
@@ -100,7 +94,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(out / MANIFEST, manifest(scene, steps=steps, command=command, yade=yade, threads=yade_threads()))
+            write_manifest(manifest(scene, out, steps=steps, command=command, yade=yade, threads=yade_threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
@@ -147,16 +141,7 @@ def _run(
         if resume:
             _restore(simulation, scene, out, log, yade)
         phases = simulation.run()
-        mark_done(
-            out,
-            {
-                "time_s": engine.time,
-                "steps": engine.steps,
-                "wall_s": simulation.wall,
-                "cpu_s": simulation.cpu,
-                "phases": phases,
-            },
-        )
+        mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
     except RunError as error:
         _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
@@ -216,45 +201,49 @@ def _keep_series(simulation: Simulation | None) -> None:
         return
 
 
-def manifest(scene: Scene, *, steps: Sequence[float], command: str, yade: str, threads: int) -> dict[str, Any]:
-    """The content of `run.json`: what made the run, and the numbers that measures need.
+def manifest(scene: Scene, out: Path, *, steps: Sequence[float], command: str, yade: str, threads: int) -> RunManifest:
+    """What makes the run, and the numbers that measures need.
 
     Args:
         scene: what is run.
+        out: the run directory.
         steps: time step of each phase [s].
         command: the command line.
         yade: version of YADE.
         threads: of YADE.
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
-    return {
-        "format": MANIFEST_FORMAT,
-        "name": scene.name,
-        "scene_sha256": scene_hash(scene),
-        "seed": scene.seed,
-        "command": command,
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(yade),
-        "threads": threads,
-        "fidelity": scene.fidelity.base,
-        "count": scene.count,
-        "aspect_ratio": scene.smarticle.aspect_ratio,
-        "middle_length_m": boxes.middle_length,
-        "barb_length_m": boxes.barb_length,
-        "thickness_normal_m": boxes.thickness_normal,
-        "thickness_in_plane_m": boxes.thickness_in_plane,
-        "smarticle_mass_kg": boxes.mass,
-        "solid_volume_m3": boxes.volume,
-        "container_radius_m": scene.container.radius_m,
-        "container_tiers": 1 + len(scene.cylinder.upper),
-        "sphere_diameter_m": particle.chain.diameter,
-        "spheres_per_smarticle": len(particle.centres),
-        "time_step_s": min(steps),
-        "phases": [
-            {"index": k, "type": phase.type, "time_step_s": dt}
+    return RunManifest(
+        directory=out,
+        name=scene.name,
+        scene_sha256=scene_hash(scene),
+        seed=scene.seed,
+        command=command,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=versions(yade),
+        threads=threads,
+        fidelity=scene.fidelity.base,
+        count=scene.count,
+        aspect_ratio=scene.smarticle.aspect_ratio,
+        middle_length=boxes.middle_length,
+        barb_length=boxes.barb_length,
+        thickness_normal=boxes.thickness_normal,
+        thickness_in_plane=boxes.thickness_in_plane,
+        smarticle_mass=boxes.mass,
+        solid_volume=boxes.volume,
+        container_radius=scene.container.radius_m,
+        container_tiers=1 + len(scene.cylinder.upper),
+        sphere_diameter=particle.chain.diameter,
+        spheres_per_smarticle=len(particle.centres),
+        time_step=min(steps),
+        phases=tuple(
+            PhaseRecord(index=k, type=phase.type, time_step=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
-        ],
-    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
+        ),
+        status="unfinished",
+        planar=scene.plane is not None,
+        channel_width=None if scene.plane is None else scene.plane.width_m,
+    )
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:

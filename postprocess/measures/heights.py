@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
+from dem.record.packing import second_highest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.geometry import centres_of_mass, checked_vertices, link_lengths
 from postprocess.statistics.bisection import least_reaching
@@ -60,7 +61,7 @@ def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95
         # Smarticles may differ in length, so their centres are weighted by it.
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
         highest_com=float(com[-1]),
-        second_highest_com=float(com[-2]) if len(com) > 1 else float("nan"),
+        second_highest_com=second_highest(com),
         top=material_height(vertices, floor_z=floor_z, percentile=percentile),
         percentile=percentile,
     )

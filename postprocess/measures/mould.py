@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from postprocess.measures.geometry import checked_vertices, link_lengths
 from postprocess.measures.outline import outlines
+from postprocess.measures.region import Cylinder
+from postprocess.scene_file import read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.measures.region import Cylinder
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,6 +86,27 @@ def cast(
         likeness=_share(other & mould, other | mould),
         likeness_before=_share(one & mould, one | mould),
     )
+
+
+def read_tiers(directory: Path | str) -> tuple[Cylinder, ...]:
+    """The tiers of a run's container, heights above its floor.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The tiers from below; none where the container is one cylinder.
+
+    Raises:
+        InputError: The file is missing or damaged, or a tier lacks its sizes.
+    """
+    container = read_scene(directory).part("container")
+    found, bottom = [], 0.0
+    for tier in container.parts("tiers") if container is not None else ():
+        top = bottom + tier.number("height_m", positive=True)
+        found.append(Cylinder(radius=tier.number("radius_m", positive=True), bottom=bottom, top=top))
+        bottom = top
+    return tuple(found)
 
 
 def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:

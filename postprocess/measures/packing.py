@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.record.packing import filled
 from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.geometry import checked_vertices
 from postprocess.measures.heights import heights, material_height
@@ -143,5 +144,5 @@ def packing_fraction(
             spacing=spacing,
         ).value
     else:
-        value = len(vertices) * solid_volume / pile.volume
+        value = filled(len(vertices), solid_volume=solid_volume, radius=radius, height=pile.top - pile.bottom)
     return PackingFraction(value=value, definition=definition, height=height)

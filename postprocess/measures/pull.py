@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from dem.record.series import Series
 from postprocess.scene_file import Settings, read_phases, read_scene
-from postprocess.series import Series
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,7 +17,7 @@ from postprocess.statistics.bisection import least_reaching
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from postprocess.manifest import RunManifest
+    from dem.record.manifest import RunManifest
 
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
-from postprocess.series import Series, read_series
+from dem.record.manifest import RunManifest
+from dem.record.series import Series, read_series
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,12 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
+from dem.record.columns import EVERY
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
+from dem.record.names import SERIES
+from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
-from postprocess.frames import read_frames
-from postprocess.manifest import read_run
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.geometry import centres_of_mass
 from postprocess.measures.heights import heights
@@ -20,14 +23,14 @@ from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, packin
 from postprocess.measures.pull import PULL, has_pull, pull_columns
 from postprocess.measures.spread import free_pile
 from postprocess.measures.strain import STRAIN, has_strain, strain_columns
-from postprocess.series import Series, read_series
 from postprocess.statistics.averages import Mean, mean_with_error
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from postprocess.frames import Frame, FrameSequence
-    from postprocess.manifest import RunManifest
+    from dem.record.frame import Frame
+    from dem.record.frames import FrameSequence
+    from dem.record.manifest import RunManifest
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
@@ -39,34 +42,6 @@ LAST_FRAMES = 20
 """Frames averaged at the end of a phase, as in Savoie et al."""
 
 _LABELS = ("run", "name", "seed", "aspect ratio [-]", "count", "fidelity", "scene_sha256")
-_SERIES_COLUMNS = {
-    "container_z_m": "container z",
-    "container_velocity_m_per_s": "container velocity",
-    "container_force_N": "container force",
-    "kinetic_energy_J": "kinetic energy",
-    "max_speed_m_per_s": "max speed",
-    "unbalanced_force": "unbalanced force",
-    "gravitational_energy_J": "gravitational energy",
-    "container_work_J": "container work",
-    "motor_work_J": "motor work",
-    "commanded_angle_rad": "commanded angle",
-    "angle_rad": "angle",
-    "schedule_error_rad": "schedule error",
-    "tracking_error_rad": "tracking error",
-    "motor_torque_N_m": "motor torque",
-    "halted_fraction": "halted fraction",
-    "joint_gap_m": "joint gap",
-    "hook_upper_force_N": "upper hook force",
-    "hook_lower_force_N": "lower hook force",
-    "hook_upper_z_m": "upper hook z",
-    "string_fixed_force_N": "fixed string force",
-    "string_pulled_force_N": "pulled string force",
-    "channel_lower_force_N": "lower wall force",
-    "channel_upper_force_N": "upper wall force",
-    "pulled_m": "pulled",
-    "chain_length_m": "chain length",
-    "chain_width_m": "chain width",
-}
 # What the columns of a series of vectors are, by their number.
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 # Recorded by the engine and measured here from the frames as well.
@@ -256,7 +231,7 @@ def _open(directory: Path | str, definitions: Iterable[str]) -> tuple[RunManifes
     manifest = read_run(directory)
     frames = read_frames(directory)
     # A run that failed early may have frames and no series.
-    has_series = (manifest.directory / "series.h5").exists()
+    has_series = (manifest.directory / SERIES).exists()
     return manifest, frames, read_series(directory) if has_series else None
 
 
@@ -382,7 +357,8 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
     for name, values in series.data.items():
         if name in _SERIES_MEASURED:
             continue
-        label = _SERIES_COLUMNS.get(name, name)
+        # Of a column that this version does not know, as its file has it.
+        label = EVERY[name].label if name in EVERY else name
         # The recorder writes the SI unit one; the tables write a dash.
         unit = "-" if series.units[name] in {"1", ""} else series.units[name]
         if values.ndim == 1:

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 
-from postprocess.frames import Frame
+from dem.record.frame import Frame
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.geometry import centres_of_mass, link_lengths
 from postprocess.report import figures

@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess.frames import FrameSequence, read_frames
-from postprocess.manifest import RunManifest, read_run
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import RunManifest, read_run
 from postprocess.pictures import film
 from postprocess.pictures.camera import Look, extent
 from postprocess.pictures.stage import Stage

@@ -20,9 +20,9 @@ import numpy as np
 from PIL import Image
 
 from dem.errors import InputError, RunError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
-from postprocess.frames import Frame
-from postprocess.manifest import RunManifest
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.geometry import checked_vertices, link_lengths, plane_frames
 from postprocess.measures.packing import packing_fraction

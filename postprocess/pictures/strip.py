@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from postprocess.frames import Frame, read_frames
-from postprocess.manifest import read_run
+from dem.record.frame import Frame
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
 from postprocess.pictures.camera import Look, extent
 from postprocess.pictures.surroundings import read_surroundings
 from postprocess.report import figures

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
-from postprocess.scene_file import Settings, read_scene, read_tiers
-from postprocess.series import Series, read_series
+from dem.record.manifest import RunManifest
+from dem.record.names import SERIES
+from dem.record.series import Series, read_series
+from postprocess.measures.mould import read_tiers
+from postprocess.scene_file import Settings, read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,7 +120,7 @@ def read_surroundings(run: RunManifest) -> Surroundings:
         InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
     """
     scene = read_scene(run.directory)
-    series = read_series(run.directory) if (run.directory / "series.h5").exists() else None
+    series = read_series(run.directory) if (run.directory / SERIES).exists() else None
     hooks = scene.part("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
     return Surroundings(

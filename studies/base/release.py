@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.frames import Frame, FrameSequence, read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
+from dem.record.frame import Frame
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
 from postprocess.measures.table import PASSIVE_PHASES
 from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.statistics.findings import Finding, Verdict

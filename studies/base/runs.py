@@ -12,7 +12,7 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import PhaseRecord, RunManifest, read_run
+from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 

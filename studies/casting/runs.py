@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.heights import heights
-from postprocess.measures.mould import cast
+from postprocess.measures.mould import cast, read_tiers
 from postprocess.measures.outline import BALL
 from postprocess.measures.region import Cylinder
-from postprocess.scene_file import read_tiers
 from studies.base.release import around, labels, removal
 from studies.base.runs import duration
 

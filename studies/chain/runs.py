@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_pull
 from postprocess.scene_file import read_phases
 from postprocess.statistics.points import averaged

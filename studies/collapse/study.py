@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.statistics.findings import CRITERION, Finding, findings_table, without_criterion
 from postprocess.statistics.points import ToldTable, told_number

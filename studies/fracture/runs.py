@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.frames import read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
+from dem.record.frames import read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.series import Series, read_series
 from postprocess.measures.geometry import centres_of_mass
 from postprocess.measures.pull import (
     END,
@@ -31,7 +32,6 @@ from postprocess.measures.pull import (
 )
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
-from postprocess.series import Series, read_series
 from studies.base.runs import ASPECT, DEFINITION, SEED, duration
 from studies.procedures.runs import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
 

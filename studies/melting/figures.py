@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
 from studies.base.figures import COLOURS, History, bin_width, draw_history, finished

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.points import marked, seeds_of, told_number
 from postprocess.statistics.seeds import mean_over_seeds, relative_difference

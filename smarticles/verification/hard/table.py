@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from dem.record.files import write_text
 from dem.run.run import _git_revision
 from smarticles.verification.hard.cases import CASES, Size, checked
 from smarticles.verification.hard.check import Check
@@ -62,9 +63,7 @@ def write(table: pd.DataFrame, out: Path) -> None:
             "",
         ]
     for name, text in (("cases.csv", table.to_csv(index=False)), ("cases.md", "\n".join(lines))):
-        partial = out / f".{name}.partial"
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(out / name)
+        write_text(out / name, text)
 
 
 def run_cases(out: Path, *, form: Size, only: Sequence[str], again: bool) -> bool:

@@ -10,7 +10,7 @@ from column_runs import H0, PHASES, Column, F, write_column
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
 from studies.base.runs import ASPECT, SEED, SEEDS
 from studies.collapse import figures as collapse_figures
 from studies.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration

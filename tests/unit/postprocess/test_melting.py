@@ -9,7 +9,7 @@ from released import stack, write_released
 from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
 from postprocess.measures.spread import centre_of_mass
 from studies.base.runs import SEED
 from studies.melting import figures as melting_figures

@@ -9,7 +9,8 @@ from hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
+from dem.record.series import read_series
 from postprocess.measures.pull import (
     END,
     FREE,
@@ -23,7 +24,6 @@ from postprocess.measures.pull import (
     weight_of_one,
 )
 from postprocess.measures.table import summarise_run
-from postprocess.series import read_series
 from smarticles.main import main
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side

@@ -10,8 +10,8 @@ from PIL import Image
 from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_run
 
 from dem.errors import InputError, RunError
-from postprocess.frames import read_frames
-from postprocess.manifest import read_run
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
 from postprocess.pictures import film
 from postprocess.pictures.camera import VIEWS, Look, extent, fitted_camera
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
