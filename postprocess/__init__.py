@@ -10,6 +10,7 @@ from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.contacts import ContactPairs, contact_pairs, neighbours_in_contact
 from postprocess.measures.entanglement import (
     CrossingPairs,
@@ -20,7 +21,6 @@ from postprocess.measures.entanglement import (
     link_crossings,
     linking_pairs,
 )
-from postprocess.measures.geometry import centres_of_mass
 from postprocess.measures.heights import Heights, material_height
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run

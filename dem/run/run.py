@@ -29,7 +29,7 @@ from dem.record.files import write_text
 from dem.record.frames import FrameWriter
 from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
 from dem.record.names import DONE, FAILED, SCENE
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.record.rundir import claimed, log_of, recorded_scene_hash
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
@@ -123,7 +123,7 @@ def _run(
     progress: bool,
     resume: bool,
 ) -> RunOutcome:
-    bar = Progress(out, scene.count, show=progress)
+    bar = ProgressWriter(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
         engine = build_engine(scene, min(steps))
@@ -278,7 +278,7 @@ def motor_law(scene: Scene) -> MotorLaw:
     )
 
 
-def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
+def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
     """The recorder of a scene, with the watchdog's limits."""
     gravity, recording = scene.gravity_m_per_s2, scene.recording
     # No one radius gives the volume of a mould of tiers.

@@ -13,8 +13,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 
 from dem.record.frame import Frame
+from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.measures.entanglement import link_crossings
-from postprocess.measures.geometry import centres_of_mass, link_lengths
 from postprocess.report import figures
 
 if TYPE_CHECKING:

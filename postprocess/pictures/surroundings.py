@@ -21,7 +21,7 @@ _REMOVAL = "remove-container"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hooks:
+class DrawnHooks:
     """Two crosses of two square bars each.
 
     Attributes:
@@ -87,7 +87,7 @@ class Surroundings:
     tiers: tuple[tuple[float, float], ...] = ()
     removed: int | None = None
     lift: Lift | None = None
-    hooks: Hooks | None = field(default=None, repr=False)
+    hooks: DrawnHooks | None = field(default=None, repr=False)
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -127,7 +127,7 @@ def read_surroundings(run: RunManifest) -> Surroundings:
         tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run.directory)),
         removed=removed,
         lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
-        hooks=None if hooks is None else Hooks.of(hooks, series),
+        hooks=None if hooks is None else DrawnHooks.of(hooks, series),
     )
 
 

@@ -15,6 +15,7 @@ from dem.errors import InputError
 from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
+from postprocess.statistics import points
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction that is compared with Gravish's."""
@@ -22,7 +23,7 @@ DEFINITION = "second-highest-com"
 QUICK_DEFINITIONS = tuple(name for name in DEFINITIONS if name != "voronoi")
 """Definitions that take tenths of a second per frame at most; `voronoi` takes seconds."""
 
-ASPECT, SEED, SEEDS, SHAKEN = "aspect ratio [-]", "seed", "seeds [-]", "time shaken [s]"
+ASPECT, SEED, SEEDS, SHAKEN = points.ASPECT, points.SEED, points.SEEDS, "time shaken [s]"
 
 STAGES: Mapping[str, str] = MappingProxyType(
     {

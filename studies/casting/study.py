@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.measures.outline import BALL
+from postprocess.geometry.outline import BALL
 from postprocess.statistics.findings import CRITERION, findings_table, without_criterion
 from postprocess.statistics.points import told_means
 from studies.base.origin import SAVOIE, Origin, make_folder

@@ -6,7 +6,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
-from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_pull
+from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_strain_test
 from postprocess.scene_file import read_phases
 from postprocess.statistics.points import averaged
 from studies.base.runs import SEED, SEEDS
@@ -26,7 +26,7 @@ def chain_row(run: RunManifest) -> dict[str, object]:
     if len(strained) != 1:
         msg = f"{run.directory}: {len(strained)} phases that strain a chain; give runs of the study chain"
         raise InputError(msg)
-    pull = read_pull(run)
+    pull = read_strain_test(run)
     row: dict[str, object] = {
         VARIANT: run.name,
         COUNT: run.count,

@@ -19,7 +19,7 @@ from dem.errors import InputError
 from dem.record.frames import read_frames
 from dem.record.manifest import PhaseRecord, RunManifest
 from dem.record.series import read_series
-from postprocess.measures.geometry import centres_of_mass
+from postprocess.geometry.links import centres_of_mass
 from postprocess.scene_file import read_phases
 from studies.collapse.time import CollapseTime, collapse_time
 

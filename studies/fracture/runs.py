@@ -16,13 +16,13 @@ from dem.errors import InputError
 from dem.record.frames import read_frames
 from dem.record.manifest import PhaseRecord, RunManifest
 from dem.record.series import Series, read_series
-from postprocess.measures.geometry import centres_of_mass
+from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import (
     END,
     FREE,
     PULL,
     WINDOW,
-    Pull,
+    HookPull,
     freed,
     held_at,
     held_fast,
@@ -140,7 +140,7 @@ def _limit(asked: PhaseSettings) -> float:
     return math.inf if asked.values.get("force_limit_N") is None else asked.number("force_limit_N", positive=True)
 
 
-def _of_pull(run: RunManifest, pull: Pull) -> dict[str, float]:
+def _of_pull(run: RunManifest, pull: HookPull) -> dict[str, float]:
     total = run.count * weight_of_one(run)
     highest, free = peak(pull), freed(pull)
     return {

@@ -14,7 +14,7 @@ from dem.engine.yade.engine import Engine
 from dem.errors import RunError
 from dem.phases.stages import begin
 from dem.physics.stability import contact_law, time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.run import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
@@ -117,7 +117,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
     before = engine.strain(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
         strain = engine.strain(limit)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from dem.engine.yade.engine import Engine
 from dem.errors import RunError
 from dem.physics.stability import time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.recorder import Recorder
 from dem.run.run import build_engine, build_recorder
 from dem.scene.scene import Scene, parse_scene
@@ -29,7 +29,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     scene = load(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = build_engine(scene, time_step(scene) if dt is None else dt)
-    progress = Progress(Path(out), scene.count, show=False)
+    progress = ProgressWriter(Path(out), scene.count, show=False)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 
