@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
+from dem.engine.interface import Engine
 from dem.record.frame import frame_mesh, sphere_mesh
 from dem.record.frames import FrameWriter
 from dem.record.progress import ProgressWriter
@@ -64,14 +64,14 @@ class Recorder:
         row = self.sampler.sample(engine, state, phase)
         self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
-            motors = engine.motors if engine.articulated else None
+            motors = engine.motors.readings if engine.motors.articulated else None
             mesh = frame_mesh(
                 state,
-                contacts=engine.contacts(),
+                contacts=engine.neighbours(),
                 time=engine.time,
-                floor=engine.floor,
+                floor=engine.fixtures.floor,
                 phase=phase,
-                hinged=engine.hinged,
+                hinged=engine.motors.present,
                 torques=None if motors is None else motors.torques,
                 work=None if motors is None else motors.work,
                 halted=None if motors is None else motors.halted,
@@ -100,17 +100,17 @@ class Recorder:
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         watchdog.check(
             state,
-            floor=engine.floor,
+            floor=engine.fixtures.floor,
             time=time,
             spheres=state.spheres(engine.particle),
             raised=engine.fixtures.raised,
-            gaps=engine.joint_gaps() if engine.articulated else None,
+            gaps=engine.motors.gaps() if engine.motors.articulated else None,
         )
-        strain = engine.strain(watchdog.depth)
-        watchdog.check_depths(strain, time=time)
-        given = engine.account.given + engine.motor_work
+        overlaps = engine.overlaps(watchdog.depth)
+        watchdog.check_depths(overlaps, time=time)
+        given = engine.account.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
-        watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
+        watchdog.check_energy(state, energy=energy, elastic=overlaps.elastic_energy, time=time)
 
     @property
     def memory(self) -> dict[str, Any]:

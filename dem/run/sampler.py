@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.chain import extent
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.phases.chain import extent
-from dem.physics.motor import Motors
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
@@ -26,6 +26,16 @@ from dem.record.columns import (
 )
 from dem.record.packing import packing_fraction
 
+COLUMNS_OF: Mapping[EffectName, Columns] = {
+    EffectName.MOTORS: MOTOR_COLUMNS,
+    EffectName.ENERGIES: ENERGY_COLUMNS,
+    EffectName.ENERGY_ACCOUNT: LEDGER_COLUMNS,
+    EffectName.HOOKS: HOOK_COLUMNS,
+    EffectName.WALL_REMOVAL: RELEASE_COLUMNS,
+    EffectName.STRINGS: STRAIN_COLUMNS,
+}
+"""What effects add to the rows."""
+
 
 @dataclass
 class Sampler:
@@ -33,21 +43,11 @@ class Sampler:
 
     Args:
         radius: of the container [m].
-        motors: whether the scene has motors.
-        energy: whether the scene asks for energy.
-        ledger: whether the scene samples dissipation, and energy with it.
-        hooks: whether the scene has hooks.
-        release: whether the scene takes the container away.
-        strained: whether the scene strains a chain.
+        effects: what the scene calls for.
     """
 
     radius: float
-    motors: bool = False
-    energy: bool = False
-    ledger: bool = False
-    hooks: bool = False
-    release: bool = False
-    strained: bool = False
+    effects: Set[EffectName] = frozenset()
     _before: tuple[float, float, NDArray[np.float64]] | None = None
     _hooks_before: tuple[int, NDArray[np.float64]] | None = None
     _strain_before: tuple[int, NDArray[np.float64]] | None = None
@@ -56,15 +56,8 @@ class Sampler:
     def described(self) -> Columns:
         """The columns of its rows."""
         columns = dict(COLUMNS)
-        for wanted, more in (
-            (self.motors, MOTOR_COLUMNS),
-            (self.energy, ENERGY_COLUMNS),
-            (self.ledger, LEDGER_COLUMNS),
-            (self.hooks, HOOK_COLUMNS),
-            (self.release, RELEASE_COLUMNS),
-            (self.strained, STRAIN_COLUMNS),
-        ):
-            if wanted:
+        for effect, more in COLUMNS_OF.items():
+            if effect in self.effects:
                 columns |= more
         return columns
 
@@ -77,11 +70,11 @@ class Sampler:
             phase: index of the phase.
         """
         boxes = engine.particle.boxes
-        heights = state.positions[:, 2] - engine.floor
+        heights = state.positions[:, 2] - engine.fixtures.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
         more: dict[str, Any] = {}
-        if self.hooks:
+        if EffectName.HOOKS in self.effects:
             lower, upper = self._hook_forces(engine)
             # The balance does not tell hooks from the container.
             container_force -= lower + upper
@@ -90,12 +83,12 @@ class Sampler:
                 "hook_lower_force_N": lower,
                 "hook_upper_z_m": engine.fixtures.upper_height,
             }
-        if self.release:
+        if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
             more["outside_count"] = np.count_nonzero(outside)
             if not engine.fixtures.enclosed:
                 phi = math.nan  # a pile that spreads fills no cylinder
-        if self.strained:
+        if EffectName.STRINGS in self.effects:
             more |= self._strain_row(engine, state)
             # Nor does it tell strings, whose pull the smarticles received from elsewhere.
             pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
@@ -104,8 +97,8 @@ class Sampler:
             "time_s": engine.time,
             "phase": phase,
             "count": engine.count,
-            "container_z_m": engine.floor,
-            "container_velocity_m_per_s": engine.container_velocity,
+            "container_z_m": engine.fixtures.floor,
+            "container_velocity_m_per_s": engine.fixtures.velocity,
             "container_force_N": container_force,
             "com_height_m": heights.mean() if len(heights) else math.nan,
             "kinetic_energy_J": state.kinetic_energy,
@@ -113,14 +106,14 @@ class Sampler:
             "unbalanced_force": engine.unbalanced_force(),
             "packing_fraction": phi,
         }
-        if self.motors:
+        if EffectName.MOTORS in self.effects:
             row |= _motor_row(engine, state)
-        if self.energy:
+        if EffectName.ENERGIES in self.effects:
             row |= {
                 "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
                 "container_work_J": engine.account.container_work,
             }
-        if self.ledger:
+        if EffectName.ENERGY_ACCOUNT in self.effects:
             row |= _ledger_row(engine, row)
         return row | more
 
@@ -152,7 +145,7 @@ class Sampler:
             return row
         row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
         before, self._strain_before = self._strain_before, None
-        if strings is None:
+        if not strings.tied:
             return row
         walls = engine.fixtures.channel_sums
         sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
@@ -184,9 +177,9 @@ class Sampler:
 
 
 def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
-    motors: Motors | None = engine.motors
+    motors = engine.motors.readings
     angles = _mean(state.angles)
-    if motors is None or not engine.articulated:
+    if motors is None or not engine.motors.articulated:
         unknown = math.nan
         held = angles if motors is None else _mean(motors.commands)
         behind = error = torque = halted = unknown
@@ -204,7 +197,7 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
         "motor_torque_N_m": torque,
         "halted_fraction": halted,
         "motor_work_J": 0.0 if motors is None else motors.work.sum(),
-        "joint_gap_m": engine.joint_gaps().max(initial=0.0),
+        "joint_gap_m": engine.motors.gaps().max(initial=0.0),
     }
 
 

@@ -1,10 +1,9 @@
-"""Contact stiffness, damping and the stable time step, from masses and inertias rather than from sphere size."""
+"""The stable time step on YADE, from masses and inertias rather than from sphere size."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +11,8 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
 from dem.body.particle import LINKS, Boxes, Particle
-from dem.engine.yade.hinges import HingeLaw
-from dem.errors import InputError
-from dem.phases.actuation import actuated
-from dem.phases.chain import Strain
-from dem.scene.scene import Scene
+from dem.engine.yade.hinge_law import HingeLaw
+from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
 
@@ -26,85 +22,6 @@ CONTACTS_AT_A_TIP = 2
 # Contacts of a sphere in a row with another row along it, as far as it is pressed in by less than a twentieth of the
 # square of the pitch, in diameters: the spheres beside the nearest one are touched, those beyond are not.
 CONTACTS_IN_A_ROW = 3
-# Sphere diameters by which a phase may move walls, hooks or strings in a step. Measured with a hook drawn out of piles
-# of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at 0.03, 0.42 to 0.70 at
-# 0.05 and 0.61 to 0.66 at 0.1, where the watchdog's limit is 0.5; at 0.3 the hook leaves the pile behind.
-MOST_PER_STEP = 0.05
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactLaw:
-    """Linear spring, dashpot and Coulomb friction of one contact.
-
-    Args:
-        normal_stiffness: kn [N/m].
-        tangential_stiffness: ks [N/m].
-        normal_damping: cn between smarticles [N s/m].
-        wall_damping: cn against the container [N s/m].
-        tangential_damping: cs over cn [1].
-        friction: Coulomb coefficient between smarticles [1].
-        wall_friction: Coulomb coefficient against the container [1].
-    """
-
-    normal_stiffness: float
-    tangential_stiffness: float
-    normal_damping: float
-    wall_damping: float
-    tangential_damping: float
-    friction: float
-    wall_friction: float
-
-
-def typical_effective_mass(particle: Particle) -> float:
-    """Harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
-
-    The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace.
-    """
-    inverse = 1.0 / particle.boxes.inertia
-    x, y, z = particle.centres.T
-    rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3
-    return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
-
-
-def restitution_of(damping_ratio: float) -> float:
-    """Restitution [1] of a linear spring and dashpot that never pulls.
-
-    The contact ends when its force is zero, before the spring is back at zero length.
-
-    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007): with ω = √(1 - ζ²) in units of the undamped frequency,
-    e = exp[-(ζ/ω)(π - arg(ω² - ζ² + 2iζω))] for ζ < 1, and its continuation above.
-    """
-    zeta = damping_ratio
-    if zeta < 1:
-        omega = math.sqrt(1 - zeta**2)
-        return math.exp(-zeta / omega * (math.pi - math.atan2(2 * zeta * omega, omega**2 - zeta**2)))
-    if zeta == 1:
-        return math.exp(-2)
-    omega = math.sqrt(zeta**2 - 1)
-    return float(((zeta + omega) / (zeta - omega)) ** (-zeta / omega))
-
-
-def damping_ratio(restitution: float) -> float:
-    """Damping ratio ζ [1] of a contact with the given restitution, the inverse of `restitution_of`."""
-    if restitution == 1:
-        return 0.0
-    return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
-
-
-def contact_law(scene: Scene) -> ContactLaw:
-    """The contact law of a scene; restitution holds at the typical effective mass of a pair."""
-    stiffness = scene.fidelity.stiffness_N_per_m
-    single = typical_effective_mass(scene.particle)
-    zeta = damping_ratio(scene.contact.restitution)
-    return ContactLaw(
-        normal_stiffness=stiffness,
-        tangential_stiffness=stiffness * scene.contact.tangential_stiffness_ratio,
-        normal_damping=2 * zeta * math.sqrt(stiffness * single / 2),
-        wall_damping=2 * zeta * math.sqrt(stiffness * single),
-        tangential_damping=scene.contact.tangential_damping_ratio,
-        friction=scene.contact.friction_smarticle,
-        wall_friction=scene.contact.friction_wall,
-    )
 
 
 def stable_time_step(particle: Particle, law: ContactLaw) -> float:
@@ -281,105 +198,3 @@ def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -
         rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])
         shape += rows.T @ rows
     return shape
-
-
-def hinge_law(scene: Scene) -> HingeLaw:
-    """The hinges of a scene that actuates."""
-    motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
-    return HingeLaw(
-        pin_stiffness=pin,
-        # As if the pin were held at both faces of the links.
-        tilt_stiffness=pin * (scene.smarticle.thickness_normal_m / 2) ** 2,
-        shaft_stiffness=motor.stiffness_N_m_per_rad,
-        torque_cap=scene.torque_limit if motor.law in ("slip", "servo") else None,
-        shaft_damping=motor.damping_N_m_s_per_rad,
-    )
-
-
-def stable_step(scene: Scene) -> float:
-    """Largest stable time step [s] of a scene, articulated where a phase actuates."""
-    law = contact_law(scene)
-    stable = stable_time_step(scene.particle, law)
-    if scene.actuates and scene.plane is not None:
-        strings = [
-            (phase.string_stiffness_N_per_m, phase.string_damping_N_s_per_m)
-            for phase in scene.phases
-            if isinstance(phase, Strain)
-        ]
-        return planar_stable_time_step(scene.particle, law, hinge_law(scene), strings)
-    if scene.actuates:
-        stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
-    return stable
-
-
-def time_step(scene: Scene) -> float:
-    """The time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
-
-    Raises:
-        InputError: the given `time_step_s` is above the stable one, the recording intervals do not fit, or a phase
-            moves something so fast that contacts cannot follow.
-    """
-    stable = stable_step(scene)
-    given = scene.fidelity.time_step_s
-    if given is not None and given > stable:
-        # Half a percent less, so that the three digits are not above it.
-        msg = (
-            f"fidelity.time_step_s: {given:g} s is above the stable step {stable:.4g} s of this smarticle at "
-            f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
-        )
-        raise InputError(msg)
-    wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
-    whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
-    steps = _steps_in(whole, wanted)
-    if scene.actuates and scene.motor.law == "servo" and steps > 1:
-        # A damper that acts a period late drives vibrations that are faster than the period.
-        msg = (
-            f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
-            f"each; use at most {wanted:.3g} s, or softer contacts, servos and strings"
-        )
-        raise InputError(msg)
-    return whole / steps
-
-
-def time_steps(scene: Scene) -> tuple[float, ...]:
-    """The time step [s] of each phase.
-
-    Until motors act for the first time, smarticles are the rigid bodies that were poured, which hinges do not concern:
-    these phases have the step of a scene without motors, and so the same bits. After that a welded smarticle has
-    whatever shape its motors left it in, for which no longer step than that of the hinges is known to be stable. A
-    step given by hand is that of all phases.
-
-    Raises:
-        InputError: as in `time_step`, or something moves too fast for the step of its phase.
-    """
-    count, shortest = len(scene.phases), time_step(scene)
-    first = next((k for k, phase in enumerate(scene.phases) if actuated(phase)), count)
-    steps = (shortest,) * count
-    if scene.fidelity.time_step_s is None and scene.plane is None and first < count:
-        whole = scene.recording.series_interval_s
-        stable = stable_time_step(scene.particle, contact_law(scene))
-        poured = whole / _steps_in(whole, scene.fidelity.time_step_fraction * stable)
-        steps = (poured,) * first + (shortest,) * (count - first)
-    _check_speeds(scene, steps)
-    return steps
-
-
-def _steps_in(interval: float, wanted: float) -> int:
-    """How many equal time steps an interval has, of at most the length that is wanted [s]."""
-    return max(1, math.ceil(interval / wanted * (1 - 1e-12)))
-
-
-def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Refuse speeds of walls, hooks and strings that pass through smarticles before a contact can push them away."""
-    diameter = scene.sphere_diameter
-    for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
-        most = MOST_PER_STEP * diameter / step
-        speed = getattr(phase, "speed_m_per_s", None) or 0.0
-        if speed > most:
-            # Half a percent less, so that the three digits are not above it.
-            msg = (
-                f"phases.{index}.speed_m_per_s: {speed:g} m/s ({phase.type}) is {speed * step / diameter:.3g} sphere "
-                f"diameters in a time step of {step:.3g} s, which contacts cannot follow; use at most "
-                f"{0.995 * most:.3g} m/s or a shorter fidelity.time_step_s"
-            )
-            raise InputError(msg)

@@ -1,9 +1,8 @@
-"""How far contacts and hinges are strained: what the watchdog asks of the engine."""
+"""How deep contacts are, read from YADE."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -11,48 +10,13 @@ from numpy.typing import NDArray
 
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.dissipation import contacts_of
-from dem.engine.yade.fixtures import Fixtures
+from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.library import Yade
-from dem.physics.stability import ContactLaw
-
-Array = NDArray[np.float64]
-
-APART = 0.1  # of the depth that is too deep; fixtures that have moved against each other by less have not
+from dem.physics.contact import ContactLaw
+from dem.physics.overlaps import APART, Held, Overlaps
 
 
-@dataclass(frozen=True)
-class Held:
-    """A smarticle between two fixtures that have moved apart: what gives way is the contact alone.
-
-    Args:
-        smarticle: its number.
-        between: names of the two fixtures.
-        apart: by how much they have moved against each other since the start [m].
-    """
-
-    smarticle: int
-    between: tuple[str, str]
-    apart: float
-
-
-@dataclass(frozen=True)
-class Strain:
-    """All contacts and hinges at one instant.
-
-    Args:
-        deepest: overlap of the deepest contact [m].
-        deep: (N,) bool, smarticles with a contact that is deeper than asked for.
-        elastic_energy: no less than what the springs of all contacts and hinges hold [J].
-        held: those of the deep ones that two fixtures hold.
-    """
-
-    deepest: float
-    deep: NDArray[np.bool_]
-    elastic_energy: float
-    held: tuple[Held, ...] = ()
-
-
-def measure_strain(yade: Yade, assembly: Assembly, fixtures: Fixtures, law: ContactLaw, limit: float) -> Strain:
+def measure_overlaps(yade: Yade, assembly: Assembly, fixtures: YadeFixtures, law: ContactLaw, limit: float) -> Overlaps:
     """Look at all contacts and hinges of a running simulation.
 
     Args:
@@ -79,11 +43,11 @@ def measure_strain(yade: Yade, assembly: Assembly, fixtures: Fixtures, law: Cont
     # Friction bounds what tangential springs hold by what normal ones do.
     friction = max(law.friction, law.wall_friction)
     tangential = friction**2 * law.normal_stiffness / law.tangential_stiffness * normal
-    return Strain(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()), held)
+    return Overlaps(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()), held)
 
 
 def _held(
-    yade: Yade, assembly: Assembly, fixtures: Fixtures, deep: NDArray[np.bool_], least: float
+    yade: Yade, assembly: Assembly, fixtures: YadeFixtures, deep: NDArray[np.bool_], least: float
 ) -> tuple[Held, ...]:
     """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m] or more."""
     parts = fixtures.parts()
