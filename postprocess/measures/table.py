@@ -17,7 +17,7 @@ from dem.record.series import Series, read_series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.averages import Mean, mean_with_error
-from postprocess.statistics.points import ASPECT, SEED
+from postprocess.statistics.columns import ASPECT, SEED
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence

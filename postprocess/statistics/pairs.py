@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Verdict, all_of, judge, negative, told
-from postprocess.statistics.points import ASPECT, SEED
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 

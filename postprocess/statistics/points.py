@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import pandas as pd
 
+from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-
-ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
-"""Columns that tell runs apart, and the one that says how many seeds a mean is over."""
 
 ToldTable = tuple[list[str], list[list[str]]]
 """Header and rows of a table for a person to read."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from postprocess.statistics.columns import SEEDS
 from postprocess.statistics.points import told_number
-from studies.accuracy.runs import (
+from studies.accuracy.measure import (
     COMPARED,
     COST,
     IS_REFERENCE,
@@ -22,7 +23,6 @@ from studies.accuracy.runs import (
     VALUE,
     VERDICT,
 )
-from studies.base.runs import SEEDS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,11 +11,12 @@ import numpy as np
 from dem.record.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, legend_above, procedure_marker
+from studies.base.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
-from studies.base.runs import SEED
-from studies.casting.runs import (
+from studies.casting.measure import (
     AFTER,
     FILLED,
     FILLED_AFTER,
@@ -28,7 +29,6 @@ from studies.casting.runs import (
     WHOLE_AFTER,
     WHOLE_KEPT,
 )
-from studies.procedures.runs import INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,7 @@ from postprocess.report import figures
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, marker
 from studies.chain.findings import COUNTS, RANGE
-from studies.chain.runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,10 +19,10 @@ from postprocess.measures.strain import (
     WIDENING,
     YIELD,
 )
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
-from studies.base.runs import SEED
-from studies.chain.runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
 
 RANGE = (0.52, 0.65)
 """h/H of the paper."""

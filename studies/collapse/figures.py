@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postprocess.report import figures
+from postprocess.statistics.columns import ASPECT
 from studies.base.figures import ASPECT_LABEL, History, bin_width, draw_history, draw_means, finished, marker
-from studies.base.runs import ASPECT
 from studies.collapse.column import COM, CORE, REMAINING, column_history, vibration
 from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
+from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
 from studies.collapse.reference import ACCELERATIONS, read_collapse_reference
-from studies.collapse.runs import DEFINITION, GAMMA, LOG, WATCHED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -48,8 +48,8 @@ def draw(
 
     Args:
         output: Folder.
-        summary: See `gravish_answers.summarise_runs`.
-        reference: See `gravish_reference.read_reference`.
+        summary: See `findings.summarise_runs`.
+        reference: See `references.read_reference`.
         manifests: The runs behind the summary.
         definition: Of the packing fraction that is compared.
         reading_error: Of the reference's points [-].

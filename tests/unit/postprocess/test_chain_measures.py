@@ -26,9 +26,9 @@ from postprocess.measures.strain import (
     first_drop,
     measured,
 )
-from studies.base.runs import SEED
+from postprocess.statistics.columns import SEED
 from studies.chain.findings import findings, sensitivity
-from studies.chain.runs import CONFINEMENT, COUNT, SPEED, VARIANT
+from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT
 
 
 def pull(*, yields: bool, jolt: float = 0.0) -> StrainTest:

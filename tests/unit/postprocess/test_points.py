@@ -15,11 +15,12 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest, read_run
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.bisection import least_reaching
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import CRITERION, without_criterion
 from postprocess.statistics.pairs import compared, mean_difference, pairs, told_less
 from postprocess.statistics.points import averaged, marked, ordered, seeds_of, told_means, told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.runs import ASPECT, SEED, SEEDS, refuse_mixed_counts, refuse_mixture
+from studies.base.runs import refuse_mixed_counts, refuse_mixture
 
 FORCE = "force [N]"
 

@@ -5,8 +5,8 @@ import math
 import h5py
 import numpy as np
 import pytest
-from hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 from synthetic import SyntheticRun, write_run
+from synthetic.hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 
 from dem.errors import InputError
 from dem.record.manifest import read_run

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 import yaml
-from hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 from PIL import Image
 from synthetic import RADIUS, SyntheticRun, W, write_run
+from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 
 from dem.errors import InputError
 from dem.record.frames import read_frames

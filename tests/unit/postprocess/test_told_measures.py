@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hooked import AFTER_REST, write_hooked_run
 from numpy.typing import NDArray
-from strained import LENGTH, SPEED, write_strained_run
 from synthetic import SyntheticRun, write_run
+from synthetic.hooked import AFTER_REST, write_hooked_run
+from synthetic.strained import LENGTH, SPEED, write_strained_run
 
 from postprocess import measure_run, summarise_run
 from postprocess.measures.strain import AT_PEAK, FRACTURE, PEAK, WIDENING, YIELD
