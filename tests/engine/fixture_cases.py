@@ -14,7 +14,7 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
 from dem.plan.steps import time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
@@ -117,7 +117,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
     before = engine.overlaps(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
         strain = engine.overlaps(limit)

@@ -22,7 +22,7 @@ from postprocess.measures.strain import (
     WALL,
     WIDENING,
     YIELD,
-    Pull,
+    StrainTest,
     first_drop,
     measured,
 )
@@ -31,7 +31,7 @@ from studies.chain.findings import findings, sensitivity
 from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT
 
 
-def pull(*, yields: bool, jolt: float = 0.0) -> Pull:
+def pull(*, yields: bool, jolt: float = 0.0) -> StrainTest:
     """Force 3 N times strain to 1.2 N at 0.4, a loss of 0.3 N or of all; in the former case on to 1.8 N at 0.7."""
     strains = np.linspace(0, 0.9, 9001)
     forces = 3 * strains
@@ -40,7 +40,7 @@ def pull(*, yields: bool, jolt: float = 0.0) -> Pull:
     forces[after] = 0.9 + 3 * (strains[after] - 0.4) if yields else 0.0
     forces[strains > 0.7] = 0.0
     widths = 0.06 * (1 + 0.01 * strains + np.where(after, 0.3, 0.0))
-    return Pull(
+    return StrainTest(
         times=strains / 0.06,
         strains=strains,
         forces=forces,

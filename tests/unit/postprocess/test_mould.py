@@ -7,9 +7,9 @@ import pytest
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.outline import outlines
+from postprocess.geometry.region import Region
 from postprocess.measures.mould import cast
-from postprocess.measures.outline import outlines
-from postprocess.measures.region import Cylinder
 
 T = 1e-3
 BALL = 4e-3
@@ -43,7 +43,7 @@ def brick(size, corner, gap=GAP):
     return np.array([line([low[0], y, z], [high[0], y, z]) for y in ys for z in zs])
 
 
-TIERS = [Cylinder(radius=0.02, bottom=0.0, top=0.01), Cylinder(radius=0.013, bottom=0.01, top=0.02)]
+TIERS = [Region(radius=0.02, bottom=0.0, top=0.01), Region(radius=0.013, bottom=0.01, top=0.02)]
 
 
 def compared(before, after, tiers=TIERS, **changes):
@@ -96,7 +96,7 @@ def test_a_tier_filled_to_half_its_height_is_half_filled():
 def test_a_brick_that_moved_overlaps_by_what_is_left():
     size, shift = (0.03, 0.02, 0.015), 0.01
     before = brick(size, (-0.015, -0.01, 0.0))
-    tiers = [Cylinder(radius=0.05, bottom=0.0, top=0.015)]
+    tiers = [Region(radius=0.05, bottom=0.0, top=0.015)]
     found = compared(before, before + np.array([shift, 0, 0]), tiers)
     assert found.overlap == pytest.approx((0.03 - shift) / (0.03 + shift), rel=0.04)
     assert found.kept[0] == pytest.approx(1 - shift / 0.03, rel=0.03)

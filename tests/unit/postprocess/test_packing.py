@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import DEFINITIONS, UndefinedMeasureError, packing_fraction
-from postprocess.measures.region import Cylinder, inner_region
-from postprocess.measures.voronoi import local_packing
-from postprocess.measures.voxel import solid_fraction
+from postprocess.geometry.region import Region, inner_region
+from postprocess.geometry.voronoi import local_packing
+from postprocess.geometry.voxel import solid_fraction
 
 T1, T2 = 0.11, 0.05
 SOLID = T1 * T2 * 2.4
@@ -72,7 +72,7 @@ def test_voxels_find_the_lattice_density(shape):
     # an inner radius of many cells.
     turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
     pile = lattice(shape, CELL, radius=8.0, layers=5, turn=turn)
-    region = Cylinder(radius=6.5, bottom=1.1, top=1.1 + 2 * CELL[2])
+    region = Region(radius=6.5, bottom=1.1, top=1.1 + 2 * CELL[2])
     value = solid_fraction(pile, region, thickness_normal=T1, thickness_in_plane=T2)
     assert value == pytest.approx(DENSITY * UNION / SOLID, rel=0.02)
 
@@ -106,7 +106,7 @@ def test_top_percentile_by_hand():
 @pytest.mark.parametrize("rotation", [(0, 0, 0), (0.5, 0.1, 1.3)])
 def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
     turn = Rotation.from_rotvec(rotation).as_matrix()
-    region = Cylinder(radius=2.0, bottom=-2.0, top=2.0)
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
     value = solid_fraction(
         [shape(1.0, 0.7) @ turn.T],
         region,
@@ -119,7 +119,7 @@ def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
 
 def test_voxels_tell_the_two_thicknesses_apart(shape):
     # A slab thinner than the box is tall cuts t1 (along z here) but not t2.
-    slab = Cylinder(radius=2.0, bottom=-T2 / 2, top=T2 / 2)
+    slab = Region(radius=2.0, bottom=-T2 / 2, top=T2 / 2)
     sizes = {"thickness_normal": T1, "thickness_in_plane": T2, "pitch": T2 / 8}
     value = solid_fraction([shape(1.0, 0.7)], slab, **sizes)
     assert value * slab.volume == pytest.approx(UNION * T2 / T1, rel=0.02)
@@ -127,20 +127,20 @@ def test_voxels_tell_the_two_thicknesses_apart(shape):
 
 def test_voxels_inside_solid_are_all_full():
     bar = np.array([[[-2.0, 0, 0], [-1, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    inside = Cylinder(radius=0.4, bottom=-0.4, top=0.4)
+    inside = Region(radius=0.4, bottom=-0.4, top=0.4)
     value = solid_fraction(bar, inside, thickness_normal=1, thickness_in_plane=1, pitch=0.02)
     assert value == pytest.approx(1.0, rel=0.01)
 
 
 def test_voxels_count_overlaps_once(shape):
-    region = Cylinder(radius=2.0, bottom=-2.0, top=2.0)
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
     sizes = {"thickness_normal": T1, "thickness_in_plane": T2}
     once = solid_fraction([shape(1.0)], region, **sizes)
     assert solid_fraction([shape(1.0), shape(1.0)], region, **sizes) == once
 
 
 def test_voxels_of_bars_without_barbs(shape):
-    region = Cylinder(radius=2.0, bottom=-2.0, top=2.0)
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
     bar = [shape(1.0, 0.0)]
     value = solid_fraction(bar, region, thickness_normal=T1, thickness_in_plane=T2, pitch=T2 / 5)
     assert value * region.volume == pytest.approx(T1 * T2, rel=0.01)
@@ -148,7 +148,7 @@ def test_voxels_of_bars_without_barbs(shape):
 
 def test_voronoi_cells_of_a_lattice_are_its_cells(pile):
     # Wall, floor and lid further off than any void of the lattice is wide.
-    container = Cylinder(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
+    container = Region(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
     region = inner_region(container, inner=0.4, low=0.4, high=0.6)
     local = local_packing(pile, container, region, solid_volume=SOLID, spacing=0.25)
     assert 10 < local.interior.sum() < len(pile) / 4
@@ -162,7 +162,7 @@ def test_voronoi_cells_fill_the_container(scene):
     angle, distance = rng.uniform(0, 2 * np.pi, count), 0.8 * np.sqrt(rng.uniform(0, 1, count))
     places = [distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.2, 1.8, count)]
     vertices = 0.2 * scene(count, 2, box=0.0) + np.stack(places, axis=1)[:, None]
-    container = Cylinder(radius=1.0, bottom=0.0, top=2.0)
+    container = Region(radius=1.0, bottom=0.0, top=2.0)
     local = local_packing(vertices, container, container, solid_volume=1.0, spacing=0.05)
     assert local.interior.all()
     # The wall is a polygon around the circle, so the sum comes out a little high.

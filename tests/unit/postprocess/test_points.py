@@ -12,7 +12,7 @@ import pytest
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest, read_run
+from dem.record.manifest import RunManifest, read_run
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.bisection import least_reaching
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS

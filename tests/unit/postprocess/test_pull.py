@@ -9,7 +9,8 @@ from synthetic import SyntheticRun, write_run
 from synthetic.hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
+from dem.record.series import read_series
 from postprocess.measures.pull import (
     END,
     FREE,
@@ -18,12 +19,10 @@ from postprocess.measures.pull import (
     held_at,
     moving_mean,
     peak,
-    pull_columns,
     read_pull,
     weight_of_one,
 )
 from postprocess.measures.table import summarise_run
-from postprocess.series import read_series
 from smarticles.main import main
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
@@ -132,7 +131,7 @@ def test_columns_are_over_the_weight_of_all(tmp_path):
     directory = write_hooked_run(tmp_path / "run", run, lambda time: np.full_like(time, load))
     manifest = read_run(directory)
     assert weight_of_one(manifest) == pytest.approx(weight(run))
-    found = pull_columns(manifest, read_series(directory), 2)
+    found = summarise_run(directory).iloc[2]
     assert found["hook peak force over n W_s [-]"] == pytest.approx(3 / 12)
     assert found["hook load at the end [smarticles]"] == pytest.approx(3)
     assert found["hook work [J]"] == pytest.approx(load * DISTANCE)

@@ -10,8 +10,8 @@ from synthetic import RADIUS, SyntheticRun, W, write_run
 from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 
 from dem.errors import InputError
-from postprocess.frames import read_frames
-from postprocess.manifest import read_run
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
 from postprocess.pictures.camera import MILLIMETRE, Look, extent, wall_corners
 from postprocess.pictures.render import render_run
 from postprocess.pictures.surroundings import Lift, Surroundings, read_surroundings

@@ -1,4 +1,4 @@
-"""The stage of a picture: container, lights and smarticles, drawn by VTK. The only module that imports PyVista.
+"""The canvas of a picture: container, lights and smarticles, drawn by VTK. The only module that imports PyVista.
 
 The three-dimensional part is drawn at twice its size and scaled down; caption and colour bar are
 set by matplotlib around it. No display is needed: VTK falls back to EGL.
@@ -20,15 +20,15 @@ import numpy as np
 from PIL import Image
 
 from dem.errors import InputError, RunError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
-from postprocess.frames import Frame
-from postprocess.manifest import RunManifest
+from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
 from postprocess.measures.entanglement import entanglement
-from postprocess.measures.geometry import checked_vertices, link_lengths, plane_frames
 from postprocess.measures.packing import packing_fraction
 from postprocess.pictures.camera import FIELD_OF_VIEW, MILLIMETRE, Look, channel, circle, fitted_camera, wall_corners
 from postprocess.pictures.colouring import ColourScale
-from postprocess.pictures.surroundings import Hooks, Surroundings
+from postprocess.pictures.surroundings import DrawnHooks, Surroundings
 from postprocess.report import figures
 
 with warnings.catch_warnings():
@@ -89,7 +89,7 @@ def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_pla
     return mesh
 
 
-class Stage:
+class Canvas:
     """Container, camera and lights of one picture or film; draws frame after frame."""
 
     def __init__(
@@ -319,7 +319,7 @@ def _outline(rims: NDArray[np.float64]) -> pv.PolyData:
     return mesh
 
 
-def _cross(hooks: Hooks) -> pv.PolyData:
+def _cross(hooks: DrawnHooks) -> pv.PolyData:
     """The two bars of a hook, centred at the origin [mm]."""
     long, thick = MILLIMETRE * hooks.length / 2, MILLIMETRE * hooks.side / 2
     bars = [pv.Box((-x, x, -y, y, -thick, thick)) for x, y in ((long, thick), (thick, long))]

@@ -1,20 +1,19 @@
-"""What a run directory says about its run: `run.json` with `done.json` or `failed.json`."""
+"""What a run directory says about its run: `run.json` with `done.json` or `failed.json`, written and read."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
-from postprocess.errors import refuse
+from dem.errors import RunError
+from dem.record.files import cannot_read, write_json
+from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-_FORMAT = 1
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
 
@@ -25,6 +24,7 @@ class PhaseRecord:
     Attributes:
         index: Position in the run, as in `Frame.phase`.
         type: Name of the kind of phase, e.g. "deposit", "relax", "shake".
+        time_step: Of the integration [s]; None where the manifest does not say.
         start: Simulated time at which it began [s]; None unless the run is done.
         end: Simulated time at which it ended [s]; None unless the run is done.
         wall_time: Wall time it took [s]; None unless the run is done.
@@ -33,6 +33,7 @@ class PhaseRecord:
 
     index: int
     type: str
+    time_step: float | None = None
     start: float | None = None
     end: float | None = None
     wall_time: float | None = None
@@ -116,6 +117,83 @@ class RunManifest:
         return self.container_tiers == 1 and self.walled(phase)
 
 
+def manifest_data(run: RunManifest) -> dict[str, Any]:
+    """The content of `run.json`: what made a run; how it ended is in another file."""
+    plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
+    return {
+        "format": MANIFEST_FORMAT,
+        "name": run.name,
+        "scene_sha256": run.scene_sha256,
+        "seed": run.seed,
+        "command": run.command,
+        "started": run.started,
+        "versions": dict(run.versions),
+        "threads": run.threads,
+        "fidelity": run.fidelity,
+        "count": run.count,
+        "aspect_ratio": run.aspect_ratio,
+        "middle_length_m": run.middle_length,
+        "barb_length_m": run.barb_length,
+        "thickness_normal_m": run.thickness_normal,
+        "thickness_in_plane_m": run.thickness_in_plane,
+        "smarticle_mass_kg": run.smarticle_mass,
+        "solid_volume_m3": run.solid_volume,
+        "container_radius_m": run.container_radius,
+        "container_tiers": run.container_tiers,
+        "sphere_diameter_m": run.sphere_diameter,
+        "spheres_per_smarticle": run.spheres_per_smarticle,
+        "time_step_s": run.time_step,
+        "phases": [{"index": phase.index, "type": phase.type, "time_step_s": phase.time_step} for phase in run.phases],
+        **plane,
+    }
+
+
+def write_manifest(run: RunManifest) -> None:
+    """Write `run.json` into the directory of a run.
+
+    Raises:
+        RunError: it cannot be written.
+    """
+    write_json(run.directory / MANIFEST, manifest_data(run))
+
+
+def mark_done(
+    out: Path, *, time: float, steps: int, wall: float, cpu: float, phases: Sequence[Mapping[str, Any]]
+) -> None:
+    """Write `done.json`, the last file of a run.
+
+    Args:
+        out: the run directory.
+        time: simulated time at the end [s].
+        steps: made in all.
+        wall: wall time spent [s].
+        cpu: processor time spent [s].
+        phases: of each `index`, `type`, `start_s`, `end_s`, `wall_s`, `cpu_s`.
+
+    Raises:
+        RunError: it cannot be written.
+    """
+    (out / FAILED).unlink(missing_ok=True)
+    data = {"status": "done", "time_s": time, "steps": steps, "wall_s": wall, "cpu_s": cpu, "phases": list(phases)}
+    write_json(out / DONE, data)
+
+
+def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
+    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too.
+
+    Args:
+        out: the run directory.
+        status: "failed" or "interrupted".
+        cause: why.
+        time: simulated time that the run came to [s].
+        checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
+    """
+    try:
+        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
+    except RunError:
+        return
+
+
 @dataclass(frozen=True)
 class _Document:
     """A JSON object with its file, so that every complaint can name both."""
@@ -128,19 +206,19 @@ class _Document:
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            refuse("manifest", path, error, _REMEDY)
+            cannot_read("manifest", path, error, _REMEDY)
         if not isinstance(data, dict):
-            refuse("manifest", path, "it holds no JSON object", _REMEDY)
+            cannot_read("manifest", path, "it holds no JSON object", _REMEDY)
         return cls(path, data)
 
     def _get(self, key: str) -> Any:
         try:
             return self.data[key]
         except KeyError:
-            refuse("manifest", self.path, f"key '{key}' is missing", _REMEDY)
+            cannot_read("manifest", self.path, f"key '{key}' is missing", _REMEDY)
 
     def _refuse(self, key: str, value: object, wanted: str) -> NoReturn:
-        refuse("manifest", self.path, f"'{key}' must be {wanted}: got {value!r}", _REMEDY)
+        cannot_read("manifest", self.path, f"'{key}' must be {wanted}: got {value!r}", _REMEDY)
 
     def text(self, key: str) -> str:
         value = self._get(key)
@@ -191,17 +269,25 @@ def read_run(directory: Path | str) -> RunManifest:
     """
     directory = Path(directory)
     if not directory.is_dir():
-        refuse("run directory", directory, "no such directory", _REMEDY)
-    run = _Document.read(directory / "run.json")
-    if run.data.get("format") != _FORMAT:
+        cannot_read("run directory", directory, "no such directory", _REMEDY)
+    run = _Document.read(directory / MANIFEST)
+    if run.data.get("format") != MANIFEST_FORMAT:
         found = run.data.get("format")
-        refuse("manifest", run.path, f"'format' must be {_FORMAT}: got {found!r}", _REMEDY)
+        cannot_read("manifest", run.path, f"'format' must be {MANIFEST_FORMAT}: got {found!r}", _REMEDY)
     versions = run.data.get("versions", {})
     if not isinstance(versions, dict):
-        refuse("manifest", run.path, "'versions' must be an object", _REMEDY)
-    phases = tuple(PhaseRecord(index=phase.integer("index"), type=phase.text("type")) for phase in run.phases())
+        cannot_read("manifest", run.path, "'versions' must be an object", _REMEDY)
+    phases = tuple(
+        PhaseRecord(
+            index=phase.integer("index"),
+            type=phase.text("type"),
+            # Runs of before each phase had its own do not say.
+            time_step=phase.number("time_step_s", positive=True) if phase.data.get("time_step_s") else None,
+        )
+        for phase in run.phases()
+    )
     if [phase.index for phase in phases] != list(range(len(phases))):
-        refuse("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", _REMEDY)
+        cannot_read("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", _REMEDY)
     return RunManifest(
         directory=directory,
         name=run.text("name"),
@@ -235,8 +321,8 @@ def read_run(directory: Path | str) -> RunManifest:
 def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
     """The fields that depend on whether and how the run ended."""
     # done.json first: a resumed run may have left an older failed.json behind.
-    if (directory / "done.json").exists():
-        done = _Document.read(directory / "done.json")
+    if (directory / DONE).exists():
+        done = _Document.read(directory / DONE)
         return {
             "phases": _timed(phases, done),
             "status": "done",
@@ -244,8 +330,8 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
             "steps": done.integer("steps"),
             "wall_time": done.number("wall_s"),
         }
-    if (directory / "failed.json").exists():
-        failed = _Document.read(directory / "failed.json")
+    if (directory / FAILED).exists():
+        failed = _Document.read(directory / FAILED)
         return {
             "phases": phases,
             "status": failed.text("status"),
@@ -255,21 +341,21 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
     return {"phases": phases, "status": "unfinished"}
 
 
-def _timed(phases: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseRecord, ...]:
+def _timed(planned: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseRecord, ...]:
     timed = tuple(
         PhaseRecord(
             index=phase.integer("index"),
             type=phase.text("type"),
+            time_step=planned[k].time_step if k < len(planned) else None,
             start=phase.number("start_s"),
             end=phase.number("end_s"),
             wall_time=phase.number("wall_s"),
             # Runs of before it was measured do not say.
             cpu_time=phase.number("cpu_s") if "cpu_s" in phase.data else None,
         )
-        for phase in done.phases()
+        for k, phase in enumerate(done.phases())
     )
-    planned = [(phase.index, phase.type) for phase in phases]
-    if [(phase.index, phase.type) for phase in timed] != planned:
+    if [(phase.index, phase.type) for phase in timed] != [(phase.index, phase.type) for phase in planned]:
         cause = f"its phases differ from those of run.json: {[phase.type for phase in timed]}"
-        refuse("manifest", done.path, cause, _REMEDY)
+        cannot_read("manifest", done.path, cause, _REMEDY)
     return timed

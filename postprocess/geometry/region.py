@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cylinder:
+class Region:
     """An upright cylinder.
 
     Attributes:
@@ -43,7 +43,7 @@ class Cylinder:
         return inside
 
 
-def inner_region(pile: Cylinder, *, inner: float = 0.75, low: float = 0.2, high: float = 0.8) -> Cylinder:
+def inner_region(pile: Region, *, inner: float = 0.75, low: float = 0.2, high: float = 0.8) -> Region:
     """The part of a pile that stays clear of wall, floor and free surface.
 
     Args:
@@ -69,7 +69,7 @@ def inner_region(pile: Cylinder, *, inner: float = 0.75, low: float = 0.2, high:
     if not height > 0:
         msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
         raise UndefinedMeasureError(msg)
-    return Cylinder(
+    return Region(
         radius=inner * pile.radius,
         bottom=pile.bottom + low * height,
         top=pile.bottom + high * height,

@@ -9,14 +9,14 @@ import numpy as np
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.geometry import checked_vertices, link_lengths, plane_frames
+from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import ArrayLike, NDArray
 
-    from postprocess.measures.region import Cylinder
+    from postprocess.geometry.region import Region
 
 # Point tests held in memory at a time.
 _CHUNK = 1_000_000
@@ -24,7 +24,7 @@ _CHUNK = 1_000_000
 
 def solid_fraction(
     vertices: ArrayLike,
-    region: Cylinder,
+    region: Region,
     *,
     thickness_normal: float,
     thickness_in_plane: float,
@@ -115,7 +115,7 @@ class _Pieces:
             reach=float(np.linalg.norm(halves, axis=1).max(initial=0.0)),
         )
 
-    def near(self, region: Cylinder) -> _Pieces:
+    def near(self, region: Region) -> _Pieces:
         """The pieces that may reach into the region."""
         x, y, z = (self.centres - [*region.axis, 0.0]).T
         keep = np.hypot(x, y) < region.radius + self.reach

@@ -1,4 +1,7 @@
-"""The frames of a run, read one at a time from `frames.pvd` and its `.vtu` files."""
+"""One frame: a small VTK file of the centrelines of all smarticles at one recorded time; and one of their spheres.
+
+ARCHITECTURE.md describes the format.
+"""
 
 from __future__ import annotations
 
@@ -6,29 +9,140 @@ import contextlib
 import io
 import math
 import warnings
-from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn, overload
-from xml.etree import ElementTree as ET
+from typing import Any, NoReturn
 
 import meshio
 import numpy as np
+from numpy.typing import NDArray
 
-from postprocess.errors import refuse
+from dem.body.particle import LINKS, Particle
+from dem.body.state import State
+from dem.record.files import cannot_read
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
+VERTICES = 4
+_REMEDY = "remove its line from frames.pvd, or run again with --resume"
 
-_REMEDY_FRAME = "remove its line from frames.pvd, or run again with --resume"
-_REMEDY_RUN = "give the directory of a run that has written a frame"
-_LINKS = 3
-_CORNERS = 4
+
+def frame_mesh(
+    state: State,
+    *,
+    contacts: NDArray[np.int64],
+    time: float,
+    floor: float,
+    phase: int,
+    hinged: bool = False,
+    torques: NDArray[np.float64] | None = None,
+    work: NDArray[np.float64] | None = None,
+    halted: NDArray[np.bool_] | None = None,
+) -> meshio.Mesh:
+    """One frame as a mesh of lines.
+
+    Args:
+        state: all smarticles at this time.
+        contacts: (N,) how many others each smarticle touches.
+        time: simulated time [s].
+        floor: height of the container's floor [m].
+        phase: index of the phase.
+        hinged: whether the scene has hinges and motors at all.
+        torques: (N, 2) of the motors on the barbs [N m]; None while welded.
+        work: (N, 2) of the motors since the start [J]; None while welded.
+        halted: (N, 2) whether a motor is halted; None while welded.
+    """
+    extra = {}
+    if hinged:
+        none = np.full((state.count, 2), np.nan)
+        extra = {
+            "angle_rad": _per_link(state.angles),
+            "motor_torque_N_m": _per_link(none if torques is None else torques),
+            "motor_work_J": _per_link(none if work is None else work),
+            "halted": np.nan_to_num(_per_link(none if halted is None else halted)).astype(np.int64),
+        }
+    return centreline_mesh(
+        state.vertices,
+        velocities=state.link_velocities,
+        spins=state.link_spins,
+        contacts=contacts,
+        time=time,
+        floor=floor,
+        phase=phase,
+        extra=extra,
+    )
+
+
+def centreline_mesh(
+    vertices: Array,
+    *,
+    velocities: Array,
+    spins: Array,
+    contacts: NDArray[np.int64],
+    time: float,
+    floor: float,
+    phase: int,
+    extra: Mapping[str, NDArray[Any]] | None = None,
+) -> meshio.Mesh:
+    """One frame of smarticles of any shape, each its own.
+
+    Args:
+        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
+        velocities: (N, 3, 3) of the links' centres [m/s].
+        spins: (N, 3, 3) angular velocities of the links [rad/s].
+        contacts: (N,) how many others each smarticle touches.
+        time: simulated time [s].
+        floor: height of the container's floor [m].
+        phase: index of the phase.
+        extra: (3N,) further values, one per link.
+    """
+    n = len(vertices)
+    first = VERTICES * np.arange(n)[:, None] + np.arange(LINKS)
+    lines = np.stack([first, first + 1], axis=-1).reshape(-1, 2)
+    number = LINKS * n
+    data = {
+        "smarticle_id": np.repeat(np.arange(n), LINKS),
+        "link": np.tile(np.arange(LINKS), n),
+        "velocity_m_per_s": velocities.reshape(-1, 3),
+        "angular_velocity_rad_per_s": spins.reshape(-1, 3),
+        "contacts": np.repeat(contacts, LINKS),
+        "time_s": np.full(number, time),
+        "floor_z_m": np.full(number, floor),
+        "phase": np.full(number, phase, dtype=np.int64),
+        **(extra or {}),
+    }
+    return meshio.Mesh(
+        vertices.reshape(-1, 3),
+        [("line", lines)],
+        cell_data={name: [values] for name, values in data.items()},
+    )
+
+
+def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
+    """The spheres of all smarticles as points, for ParaView's glyphs: what the engine sees of them.
+
+    Args:
+        state: all smarticles at this time.
+        particle: one smarticle, of S spheres.
+    """
+    count, spheres = state.count, len(particle.centres)
+    number = count * spheres
+    data = {
+        "radius_m": np.full(number, particle.radius),
+        "smarticle_id": np.repeat(np.arange(count), spheres),
+        "link": np.tile(particle.links, count).astype(np.int64),
+    }
+    points = state.spheres(particle).reshape(-1, 3)
+    return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
+
+
+def _per_link(barbs: NDArray[Any]) -> Array:
+    """(3N,) values on the barbs, from (N, 2); NaN on the middle links."""
+    links = np.full((len(barbs), LINKS), np.nan)
+    links[:, [0, 2]] = barbs
+    return links.ravel()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,93 +182,6 @@ class Frame:
         return len(self.vertices)
 
 
-class FrameSequence(Sequence[Frame]):
-    """The frames of a run in time order; a file is read only when its frame is asked for.
-
-    A slice is again a lazy sequence. Frames are not kept: each access reads the file anew.
-
-    Attributes:
-        times: (n,) float64 [s], as listed in `frames.pvd`; needs no frame to be read.
-        paths: The files, in time order.
-    """
-
-    def __init__(self, times: NDArray[np.float64], paths: tuple[Path, ...]) -> None:
-        self.times = times
-        self.paths = paths
-
-    def __repr__(self) -> str:
-        if not self.paths:
-            return "FrameSequence(empty)"
-        span = f"{self.times[0]:g} s … {self.times[-1]:g} s"
-        return f"FrameSequence({len(self)} frames, {span})"
-
-    def __len__(self) -> int:
-        return len(self.paths)
-
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> FrameSequence: ...
-
-    def __getitem__(self, index: int | slice) -> Frame | FrameSequence:
-        if isinstance(index, slice):
-            return FrameSequence(self.times[index], self.paths[index])
-        return read_frame(self.paths[index])
-
-    def in_phase(self, phase: int) -> FrameSequence:
-        """The frames of one phase, found by bisection: phases follow each other in time.
-
-        Args:
-            phase: Index into `RunManifest.phases`.
-
-        Returns:
-            Its frames; empty if the run has not recorded any.
-        """
-        first = bisect_left(self, phase, key=attrgetter("phase"))
-        last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
-        return self[first:last]
-
-
-def read_frames(directory: Path | str) -> FrameSequence:
-    """Opens the frames of a run; the run may be done, failed or still going on.
-
-    Args:
-        directory: A run directory.
-
-    Returns:
-        The frames in time order, read lazily.
-
-    Raises:
-        InputError: `frames.pvd` is missing, damaged or not in time order.
-
-    Source:
-        ARCHITECTURE.md, "The run directory".
-
-    Example:
-        >>> for frame in read_frames("runs/pile")[-20:]:  # doctest: +SKIP
-        ...     print(frame.time, frame.vertices.shape)
-    """
-    path = Path(directory) / "frames.pvd"
-    try:
-        root = ET.parse(path).getroot()
-    except (OSError, ET.ParseError) as error:
-        refuse("list of frames", path, error, _REMEDY_RUN)
-    times, files = [], []
-    for entry in root.iter("DataSet"):
-        try:
-            times.append(float(entry.attrib["timestep"]))
-            files.append(path.parent / entry.attrib["file"])
-        except (KeyError, ValueError) as error:
-            cause = f"entry {len(files)} lacks a time or a file ({error})"
-            refuse("list of frames", path, cause, _REMEDY_RUN)
-    if not files:
-        refuse("list of frames", path, "it lists no frame", _REMEDY_RUN)
-    if not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0):
-        refuse("list of frames", path, "its times do not ascend", _REMEDY_RUN)
-    return FrameSequence(np.array(times), tuple(files))
-
-
 def read_frame(path: Path | str) -> Frame:
     """Reads one frame file.
 
@@ -187,10 +214,10 @@ def _read_mesh(path: Path) -> Any:
         ):
             return meshio.vtu.read(str(path))
     except OSError as error:
-        refuse("frame", path, error, _REMEDY_FRAME)
+        cannot_read("frame", path, error, _REMEDY)
     except (Exception, SystemExit) as error:
         cause = f"truncated or not VTK ({type(error).__name__})"
-        refuse("frame", path, cause, _REMEDY_FRAME)
+        cannot_read("frame", path, cause, _REMEDY)
 
 
 class _FrameReader:
@@ -204,13 +231,13 @@ class _FrameReader:
         self._points = np.asarray(mesh.points)
         self._lines = np.asarray(blocks[0].data)
         self._data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
-        self._count = len(self._lines) // _LINKS
+        self._count = len(self._lines) // LINKS
 
     def frame(self) -> Frame:
         self._check_topology()
         identifiers = self._per_link("smarticle_id", np.int64, ())
         links = self._per_link("link", np.int64, ())
-        if np.any(identifiers != identifiers[:, :1]) or np.any(links != np.arange(_LINKS)):
+        if np.any(identifiers != identifiers[:, :1]) or np.any(links != np.arange(LINKS)):
             self._refuse("'smarticle_id' and 'link' are not in smarticle-major order")
         phase = self._constant("phase")
         if phase < 0 or phase != math.floor(phase):
@@ -230,17 +257,17 @@ class _FrameReader:
         )
 
     def _refuse(self, cause: str) -> NoReturn:
-        refuse("frame", self._path, cause, _REMEDY_FRAME)
+        cannot_read("frame", self._path, cause, _REMEDY)
 
     def _check_topology(self) -> None:
         if self._count == 0:
             self._refuse("it holds no smarticle")
-        if self._points.shape != (_CORNERS * self._count, 3):
+        if self._points.shape != (VERTICES * self._count, 3):
             self._refuse(
-                f"{len(self._lines)} lines need {_CORNERS * self._count} points of 3 coordinates: "
+                f"{len(self._lines)} lines need {VERTICES * self._count} points of 3 coordinates: "
                 f"got {self._points.shape}"
             )
-        first = _CORNERS * np.arange(self._count)[:, None] + np.arange(_LINKS)
+        first = VERTICES * np.arange(self._count)[:, None] + np.arange(LINKS)
         expected = np.stack([first, first + 1], axis=-1).reshape(-1, 2)
         if not np.array_equal(self._lines, expected):
             self._refuse("its lines do not join tip, hinge, hinge, tip in order")
@@ -248,16 +275,16 @@ class _FrameReader:
     def _vertices(self) -> NDArray[np.float64]:
         if not np.all(np.isfinite(self._points)):
             self._refuse("a point is not finite")
-        return _frozen(self._points.astype(np.float64).reshape(self._count, _CORNERS, 3))
+        return _frozen(self._points.astype(np.float64).reshape(self._count, VERTICES, 3))
 
     def _folded(self, values: NDArray[Any]) -> NDArray[Any]:
-        return values.reshape(self._count, _LINKS, *values.shape[1:])
+        return values.reshape(self._count, LINKS, *values.shape[1:])
 
     def _per_link(self, name: str, kind: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         values = self._data.pop(name, None)
         if values is None:
             self._refuse(f"cell data '{name}' is missing")
-        if values.shape != (_LINKS * self._count, *shape):
+        if values.shape != (LINKS * self._count, *shape):
             self._refuse(f"cell data '{name}' has shape {values.shape}")
         return _frozen(self._folded(values.astype(kind)))
 

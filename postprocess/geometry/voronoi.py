@@ -11,7 +11,7 @@ from scipy.spatial import Voronoi
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.geometry import (
+from postprocess.geometry.links import (
     bounding_spheres,
     centres_of_mass,
     checked_vertices,
@@ -21,7 +21,7 @@ from postprocess.measures.geometry import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from postprocess.measures.region import Cylinder
+    from postprocess.geometry.region import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,8 +41,8 @@ class LocalPacking:
 
 def local_packing(
     vertices: ArrayLike,
-    container: Cylinder,
-    region: Cylinder,
+    container: Region,
+    region: Region,
     *,
     solid_volume: float,
     spacing: float | None = None,
@@ -119,7 +119,7 @@ def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.f
     return start + share[:, None] * along, link // 3
 
 
-def _mirrored(points: NDArray[np.float64], container: Cylinder, lid: float, band: float) -> NDArray[np.float64]:
+def _mirrored(points: NDArray[np.float64], container: Region, lid: float, band: float) -> NDArray[np.float64]:
     """Images of the points nearer than `band` to floor, lid or wall."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom

@@ -18,12 +18,12 @@ from scipy.ndimage import distance_transform_edt
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.geometry import checked_vertices
+from postprocess.geometry.links import checked_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from postprocess.measures.region import Cylinder
+    from postprocess.geometry.region import Region
 
 BALL = 0.25
 """Radius of the ball over w [-].
@@ -52,7 +52,7 @@ class Outlines:
     origin: NDArray[np.float64]
     inside: NDArray[np.bool_] = field(repr=False)
 
-    def within(self, region: Cylinder) -> NDArray[np.bool_]:
+    def within(self, region: Region) -> NDArray[np.bool_]:
         """(x, y, z) bool, which voxels have their centre in a cylinder whose heights are above the floor."""
         x, y, z = (
             start + self.pitch * np.arange(count)
@@ -74,7 +74,7 @@ def outlines(
     thickness: float,
     ball: float,
     pitch: float | None = None,
-    regions: Sequence[Cylinder] = (),
+    regions: Sequence[Region] = (),
 ) -> Outlines:
     """The regions that piles take up, all on one grid.
 
