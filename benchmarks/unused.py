@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dem.body.placement import place_layer
+from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import YadeKind
 from dem.plan.steps import time_step
 from dem.scene.reading import parse_scene

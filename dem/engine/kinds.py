@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine
 from dem.errors import InputError
-from dem.phases.phase import Phase
-from dem.scene.scene import Scene
 
 
 class EngineKind(Protocol):
@@ -39,7 +38,7 @@ class EngineKind(Protocol):
     def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
         """What runs in every step, in the order in which it does."""
 
-    def stable_step(self, scene: Scene, *, articulated: bool) -> float:
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         """Largest stable time step [s] of a scene.
 
         Args:
@@ -47,10 +46,15 @@ class EngineKind(Protocol):
             articulated: whether barbs may turn, or have turned before.
         """
 
-    def seconds_per_step(self, scene: Scene, phase: Phase) -> float:
-        """Wall seconds that a step of a phase costs in the full pile, one core, about."""
+    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+        """Wall seconds that a step costs in the full pile, one core, about.
 
-    def build(self, scene: Scene, time_step: float) -> Engine:
+        Args:
+            scene: the scene.
+            actuated: whether motors are at work.
+        """
+
+    def build(self, scene: Demand, time_step: float) -> Engine:
         """A simulation of a scene, empty, with a time step [s] of its phases with motors that is not checked."""
 
 

@@ -110,6 +110,11 @@ class Phase:
         """How far it raises a hook [m]."""
         return 0.0
 
+    @property
+    def pulled_by(self) -> tuple[float, float] | None:
+        """Stiffness [N/m] and damping [N s/m] of the strings that it pulls by; None: it has none."""
+        return None
+
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         """The effects that it calls for, and what for, in words."""
         return {}

@@ -66,6 +66,11 @@ class Strain(Part, ActuatedPhase):
         """See `Phase.pushing_speed`."""
         return self.speed_m_per_s
 
+    @property
+    def pulled_by(self) -> tuple[float, float]:
+        """See `Phase.pulled_by`."""
+        return self.string_stiffness_N_per_m, self.string_damping_N_s_per_m
+
     def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
         """See `ActuatedPhase.gait`: barbs stay."""
         hold = Hold(type="hold")

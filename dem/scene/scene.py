@@ -163,6 +163,11 @@ class Scene(Part):
         """Whether a phase moves the barbs or holds them, so that there are hinges and motors."""
         return any(phase.actuates for phase in self.phases)
 
+    @property
+    def pulled_by(self) -> tuple[tuple[float, float], ...]:
+        """Stiffness [N/m] and damping [N s/m] of the strings of each phase that pulls by some."""
+        return tuple(phase.pulled_by for phase in self.phases if phase.pulled_by is not None)
+
     def calls_for(self, effect: EffectName) -> bool:
         """Whether a phase calls for an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))

@@ -95,8 +95,8 @@ def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
     """A chain strained by the phase itself: how far it has left the plane, and its angles."""
     scene = load(data)
     engine = build(scene)
-    scene.phases[0].scene.phases[0].begin(scene, 0).proceed(engine)
-    stage = scene.phases[1].scene.phases[1].begin(scene, 1)
+    scene.phases[0].scene.phases[0].scene.phases[0].begin(scene, 0).proceed(engine)
+    stage = scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
     first = chain_of(scene).length
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))

@@ -300,7 +300,7 @@ def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dic
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].scene.phases[1].begin(scene, 1)
+    stage = scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.yade.adds import ADDS
 from dem.engine.yade.construction import in_order
@@ -12,11 +13,8 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.hinge_law import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
-from dem.phases.phase import Phase
-from dem.phases.strain import Strain
 from dem.physics.contact import ContactLaw, contact_law
 from dem.physics.motor import MotorLaw
-from dem.scene.scene import Scene
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
@@ -47,27 +45,22 @@ class YadeKind:
         """See the interface."""
         return in_order(engines)
 
-    def stable_step(self, scene: Scene, *, articulated: bool) -> float:
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         """See the interface."""
         law = contact_law_of(scene)
-        if articulated and scene.plane is not None:
-            strings = [
-                (phase.string_stiffness_N_per_m, phase.string_damping_N_s_per_m)
-                for phase in scene.phases
-                if isinstance(phase, Strain)
-            ]
-            return planar_stable_time_step(scene.particle, law, hinge_law(scene), strings)
+        if articulated and scene.channel is not None:
+            return planar_stable_time_step(scene.particle, law, hinge_law(scene), scene.pulled_by)
         stable = stable_time_step(scene.particle, law)
         if articulated:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
         return stable
 
-    def seconds_per_step(self, scene: Scene, phase: Phase) -> float:
+    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
         """See the interface."""
-        share = ARTICULATED_SHARE if phase.actuates else 1.0
+        share = ARTICULATED_SHARE if actuated else 1.0
         return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count * share
 
-    def build(self, scene: Scene, time_step: float) -> YadeEngine:
+    def build(self, scene: Demand, time_step: float) -> YadeEngine:
         """See the interface."""
         return YadeEngine(
             particle=scene.particle,
@@ -88,12 +81,12 @@ class YadeKind:
         )
 
 
-def contact_law_of(scene: Scene) -> ContactLaw:
+def contact_law_of(scene: Demand) -> ContactLaw:
     """The contact law of a scene, of one sphere with another."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
-def hinge_law(scene: Scene) -> HingeLaw:
+def hinge_law(scene: Demand) -> HingeLaw:
     """The hinges of a scene that actuates."""
     motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
     return HingeLaw(
@@ -106,7 +99,7 @@ def hinge_law(scene: Scene) -> HingeLaw:
     )
 
 
-def motor_law(scene: Scene) -> MotorLaw:
+def motor_law(scene: Demand) -> MotorLaw:
     """The motors of a scene that actuates."""
     return MotorLaw(
         torque_limit=scene.torque_limit,

@@ -1,9 +1,9 @@
 """Where steps above the stable one begin to chatter and to blow up.
 
 A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
-four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes from
-nowhere, or YADE ends in numbers that are none. Every scene is run with several seeds, which move where and how high
-smarticles begin. A scene and seed that is in the table already is skipped.
+four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
+from nowhere, or YADE ends in numbers that are none. Every scene is run with several seeds, which move where and how
+high smarticles begin. A scene and seed that is in the table already is skipped.
 """
 
 from __future__ import annotations

@@ -203,7 +203,7 @@ def test_nothing_heavy_is_imported_to_show_help() -> None:
     assert answer.stderr == "[]\n"
 
 
-def test_python_m_cli_is_the_command(tmp_path: Path) -> None:
+def test_python_m_smarticles_is_the_command(tmp_path: Path) -> None:
     answer = subprocess.run(command("plan", str(tmp_path / "absent.yaml")), capture_output=True, check=False, text=True)
     assert answer.returncode == 2
     assert answer.stderr.startswith(f"smarticles: error: {tmp_path}/absent.yaml: ")
