@@ -21,14 +21,13 @@ from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
+from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
-from dem.phases.phase import Phase
 from dem.physics.overlaps import Overlaps
 from dem.physics.strings import StringLaw
-from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -225,21 +224,21 @@ class EngineDouble:
         self._seconds = 0.0
 
     @classmethod
-    def of(cls, scene: Scene, time_step: float) -> EngineDouble:
+    def of(cls, scene: Demand, time_step: float) -> EngineDouble:
         """The double that a scene calls for."""
         engine = cls(
             particle=scene.particle,
             cylinder=scene.cylinder,
             gravity=scene.gravity_m_per_s2,
             time_step=time_step,
-            planar=scene.plane is not None,
+            planar=scene.channel is not None,
         )
         engine.motors.present = scene.actuates
         engine.fixtures.bottom = scene.cylinder.bottom
         if scene.hooks is not None:
             engine.fixtures.upper_start = scene.hooks.upper_height_m
             engine.fixtures.hook_sums = np.zeros((2, 3))
-        if scene.plane is not None and scene.plane.width_m is not None:
+        if scene.channel is not None and scene.channel.width is not None:
             engine.fixtures.channel_sums = np.zeros((2, 3))
         return engine
 
@@ -368,13 +367,13 @@ class KindDouble:
     def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
         return tuple(engines)
 
-    def stable_step(self, scene: Scene, *, articulated: bool) -> float:
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_step(self, scene: Scene, phase: Phase) -> float:
+    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
         return 1e-6
 
-    def build(self, scene: Scene, time_step: float) -> EngineDouble:
+    def build(self, scene: Demand, time_step: float) -> EngineDouble:
         self.built.append(EngineDouble.of(scene, time_step))
         return self.built[-1]
 

@@ -135,11 +135,11 @@ def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
     scene = load(data | {"count": 1, "phases": phases})
     engine = build(scene, shaken=True)
     add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
-    lifting = scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
+    lifting = scene.phases[1].begin(scene, 1)
     while wait := lifting.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     try:
-        scene.phases[2].scene.phases[2].scene.phases[2].scene.phases[2].scene.phases[2].begin(scene, 2).proceed(engine)
+        scene.phases[2].begin(scene, 2).proceed(engine)
     except RunError as error:
         return str(error)
     return "nothing"

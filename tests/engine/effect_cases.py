@@ -139,8 +139,8 @@ def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)
     engine.advance(2500)
-    before, path = engine.account.elastic(), Path(out) / "engine.yade"
-    engine.load(path, engine.save(path))
+    before, folder = engine.account.elastic(), Path(out)
+    engine.load(engine.save(folder), folder)
     after = engine.account.elastic()
     engine.fixtures.remove_wall()
     return {"before": before, "after": after, "dissipated": engine.account.dissipated}

@@ -10,6 +10,7 @@ import numpy as np
 from cases import load, pour
 from scipy.spatial.transform import Rotation
 
+from dem.engine.effect import EffectName
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
@@ -288,7 +289,7 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(Sampler(1.0, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, {EffectName.HOOKS} if scene.hooks is not None else set()).described),
     }
 
 
@@ -300,7 +301,7 @@ def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dic
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
+    stage = scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

@@ -68,7 +68,7 @@ def gait(
         "energy_before": start[2],
         "elastic": engine.motors._hinges.elastic_energy(),
         "work": ((tau[1:] + tau[:-1]) / 2 * np.diff(alpha, axis=0)).sum(axis=1).cumsum(),
-        "told": float(engine.motors.work.sum()),
+        "told": float(engine.motors.readings.work.sum()),
         "twisted": float((tau[-1] ** 2).sum() / (2 * scene.motor.stiffness_N_m_per_rad)),
         "angles": engine.state().angles - begun,
     }
@@ -80,7 +80,7 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
     engine.motors.articulate()
     touching, reached, gap = 0, [engine.state().angles[0]], 0.0
     for corner in np.radians(corners):
-        begun = engine.motors.deciding.commands[0].copy()
+        begun = engine.motors.readings.commands[0].copy()
         duration = max(np.abs(corner - begun).max() / speed, 1e-3)
         for _ in drive(engine, scene, duration, lambda t, a=begun, b=corner, d=duration: a + (b - a) * min(t / d, 1)):
             touching += own_contacts(engine)
@@ -103,7 +103,7 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
             kinetic_energy(engine),
             engine.motors.gaps().max(),
             *engine.state().angles[0],
-            *engine.motors.deciding.commands[0],
+            *engine.motors.readings.commands[0],
         )
         for _ in drive(engine, scene, duration, lambda _: [to, to])
     ]
@@ -116,7 +116,7 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
         "angles": table[:, 2:4],
         "commands": table[:, 4:],
         "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
-        "halted": engine.motors.deciding.halted,
+        "halted": engine.motors.readings.halted,
         "interval": scene.fidelity.control_interval_s,
     }
 
@@ -138,7 +138,7 @@ def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) ->
             break
         height, twist = (
             float(engine.state().positions[0, 2]),
-            engine.motors.deciding.commands - engine.motors._hinges.angles(),
+            engine.motors.readings.commands - engine.motors._hinges.angles(),
         )
         springs = engine.motors._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
         energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
@@ -187,15 +187,15 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
 
     def follow(duration: float, targets: Targets) -> None:
         for _ in drive(engine, scene, duration, targets):
-            commands.append(engine.motors.deciding.commands[0])
+            commands.append(engine.motors.readings.commands[0])
             torques.append(engine.motors._hinges.torques()[0])
-            halted.append(engine.motors.deciding.halted[0])
+            halted.append(engine.motors.readings.halted[0])
 
     follow(0.02, lambda t: begun - 5 * t)
     marks = [len(commands)]
     if freed:
         hold(engine, range(3), still=False)
-    goal = begun - 0.1 if freed else engine.motors.deciding.commands[0] + back
+    goal = begun - 0.1 if freed else engine.motors.readings.commands[0] + back
     follow(0.1, lambda _: goal)
     return {
         "begun": begun,
@@ -233,7 +233,7 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
     return {
         "torques": np.array(torques),
         "angles": engine.state().angles[0] - begun[0],
-        "command": engine.motors.deciding.commands[0] - begun[0],
+        "command": engine.motors.readings.commands[0] - begun[0],
         "gap": engine.motors.gaps().max(),
         "limit": scene.torque_limit,
     }
@@ -248,13 +248,13 @@ def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest:
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
-        motors = engine.motors
+        told = engine.motors.readings
         rows.append(
             (
                 time,
-                *motors.commands[0],
+                *told.commands[0],
                 *engine.motors._hinges.torques()[0],
-                *motors.halted[0],
+                *told.halted[0],
                 engine.motors.gaps().max(),
             )
         )
