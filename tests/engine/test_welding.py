@@ -192,7 +192,7 @@ def test_a_scene_with_all_kinds_of_actuation_runs_through(
     assert halted.min() >= 0
     assert halted.max() <= 1
     # Draft's softer pin, in a pile: 1 % of a diameter.
-    assert 0 < rows["joint_gap_m"].max() < 0.01 * cases.load(data).sphere_diameter
+    assert 0 < rows["joint_gap_m"].max() < 0.01 * cases.scene_of(data).sphere_diameter
     # All energy that the links ever have is less than what they fell through.
     assert rows["kinetic_energy_J"][rows["phase"] > 0].max() < 0.5 * rows["gravitational_energy_J"].max()
     # Where motors were halted they fell behind; told to hold the pace of the schedule they do not.
