@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from cases import add, advance_watched, build, load, pour
+from cases import add, advance_watched, build, pour
 from fixture_cases import damped
 
 from dem.engine.yade.engine import YadeEngine
@@ -14,6 +14,7 @@ from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 
 def last_shake(scene: Scene) -> tuple[float, float]:
@@ -132,7 +133,7 @@ def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
         {"type": "remove-container", "speed_m_per_s": 0.05, "duration_s": 0.06},
         {"type": "shake", "duration_s": 0.1},
     ]
-    scene = load(data | {"count": 1, "phases": phases})
+    scene = scene_of(data | {"count": 1, "phases": phases})
     engine = build(scene, shaken=True)
     add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
     lifting = scene.phases[1].begin(scene, 1)

@@ -18,6 +18,7 @@ from dem.plan.steps import time_step
 from dem.run.build import build_engine
 from dem.run.run import run_scene
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 

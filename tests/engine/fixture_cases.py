@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import load, pour
+from cases import pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine.effect import EffectName
@@ -15,11 +15,11 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
 from dem.plan.steps import time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from smarticles.verification.bench import FLAT, add, advance_watched
+from smarticles.verification.bench import FLAT, add, advance_watched, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
@@ -118,7 +118,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
     before = engine.overlaps(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
         strain = engine.overlaps(limit)
@@ -296,7 +296,7 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
 def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """The phase itself, on one smarticle that lies on the floor."""
     phase = {"type": "remove-container", "speed_m_per_s": speed, "duration_s": duration}
-    scene = load(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
+    scene = scene_of(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
     engine = build(scene)
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
