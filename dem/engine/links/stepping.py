@@ -1,0 +1,143 @@
+"""Many steps in one call: everything that happens in a step, in order."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
+from dem.engine.links.compiler import kernel
+from dem.engine.links.moving import drift, kick
+from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
+from dem.engine.links.pairs import push_apart
+from dem.engine.links.poses import find_motion, find_spin, pose
+from dem.engine.links.shape import Shape
+from dem.engine.links.walls import push_up
+
+LOST, WORK = 0, 1  # places in `totals`
+DISPLACED, NEAR_SKIN, WIDE_SKIN, PIECE = range(4)  # places in `lengths`
+
+
+@kernel
+def shaken_to(ground: Ground, time: float) -> None:
+    """Put what is shaken where it is at a time [s]; `place` and `speed` are written."""
+    if ground.wave[1] > 0.0:
+        phase = ground.wave[1] * (time - ground.wave[2])
+        for part in range(4):
+            if ground.shaken[part]:
+                ground.place[part] = ground.base[part] + ground.wave[0] * math.sin(phase)
+                ground.speed[part] = ground.wave[0] * ground.wave[1] * math.cos(phase)
+
+
+@kernel
+def look_for_neighbours(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, lengths: Array) -> int:
+    """Bring the lists up to date where links have moved too far; GOOD, or FULL.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles, posed.
+        pairs: written.
+        cells: scratch.
+        lengths: (4,) -, skins of the tight and the wide list, longest piece of a link [m].
+    """
+    near, wide = lengths[NEAR_SKIN], lengths[WIDE_SKIN]
+    if 2 * moved(bodies, pairs.near_marks, pairs.near_centres) < near:
+        return GOOD
+    if 2 * moved(bodies, pairs.wide_marks, pairs.wide_centres) + near > wide:
+        if build(shape, bodies, pairs, cells, wide, lengths[PIECE]) == FULL:
+            return FULL
+    tighten(shape, bodies, pairs, near)
+    return GOOD
+
+
+@kernel
+def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) -> float:
+    """Energy that the forces in the ledger dissipated in the step [J]; velocities after the kick are now known.
+
+    A force takes from the kinetic energy what it does along the mean of the velocities before and after.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `spin` and `motion` are written.
+        motors: None while welded.
+        ledger: see `dem.engine.links.pairs.put_down`; emptied.
+        dt: time step [s].
+    """
+    for i in range(bodies.position.shape[0]):
+        find_spin(bodies, i, motors)
+        find_motion(shape, bodies, i, motors)
+    motion, position, total = bodies.motion, bodies.position, 0.0
+    for n in range(1, int(ledger[0, 0]) + 1):
+        row = ledger[n]
+        total -= row[10]
+        for side in range(2):
+            m, i = int(row[side]), int(row[2 + side])
+            if m >= 0:
+                x, y, z = row[4] - position[i, 0], row[5] - position[i, 1], row[6] - position[i, 2]
+                vx = motion[m, 0] + motion[m, 4] * z - motion[m, 5] * y
+                vy = motion[m, 1] + motion[m, 5] * x - motion[m, 3] * z
+                vz = motion[m, 2] + motion[m, 3] * y - motion[m, 4] * x
+                power = row[7] * vx + row[8] * vy + row[9] * vz
+                total += 0.5 * dt * (power if side else -power)
+    ledger[0, 0] = 0.0
+    return total
+
+
+@kernel
+def advance(
+    steps: int, made: int, begin: float, dt: float, gravity: float, planar: bool, lengths: Array, shape: Shape,
+    law: Law, wall_law: Law, bodies: Bodies, pairs: Pairs, cells: Cells, ends: Ends, ground: Ground, motors: Any,
+    ledger: Any, out: Array, row: Array, totals: Array,
+) -> int:  # fmt: skip
+    """Make steps.
+
+    Args:
+        steps: how many.
+        made: how many were made since `begin`.
+        begin: when steps of this length began [s].
+        dt: time step [s].
+        gravity: g, downwards [m/s²].
+        planar: whether all motion is confined to a horizontal plane.
+        lengths: see `look_for_neighbours`.
+        shape: what all smarticles have in common.
+        law: of their contacts.
+        wall_law: of their contacts with fixtures.
+        bodies: the smarticles.
+        pairs: which of their links are near each other.
+        cells: scratch.
+        ends: what contacts with fixtures remember.
+        ground: the fixtures.
+        motors: None while welded.
+        ledger: of forces that dissipate; None where nobody asks.
+        out: scratch of `dem.engine.links.meeting.meet`.
+        row: (PLANE,) scratch.
+        totals: (2,) energy dissipated, work of the fixtures [J]; added to.
+
+    Returns:
+        Steps that were made; fewer where a list is full.
+    """
+    for step in range(steps):
+        shaken_to(ground, begin + (made + step) * dt)
+        pose(shape, bodies, motors)
+        if look_for_neighbours(shape, bodies, pairs, cells, lengths) == FULL:
+            return step
+        bodies.load[:] = 0.0
+        ground.force[:] = 0.0
+        if motors is not None:
+            bodies.lever[:] = 0.0
+        lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
+        lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)
+        for part in range(6):
+            for d in range(3):
+                ground.sums[part, d] += ground.force[part, d]
+            if part < 4:
+                totals[WORK] -= ground.force[part, 2] * ground.speed[part] * dt
+        kick(shape, bodies, motors, gravity, planar, dt)
+        if ledger is not None:
+            totals[LOST] += lost + settle(shape, bodies, motors, ledger, dt)
+        drift(shape, bodies, motors, dt, row)
+        for part in range(4):
+            if not ground.shaken[part]:
+                ground.place[part] += ground.speed[part] * dt
+    shaken_to(ground, begin + (made + steps) * dt)
+    return steps

@@ -1,0 +1,201 @@
+"""Forces of floor and wall on the ends of links.
+
+A plane, and the inside of a round wall, are met by a straight link with its ends: they tell all. Hinges count once, as
+ends of the middle link.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from dem.engine.links.arrays import Bodies, Ends, Ground, Law
+from dem.engine.links.compiler import kernel
+from dem.engine.links.law import resist
+from dem.engine.links.pairs import push, put_down
+from dem.engine.links.shape import Shape
+
+
+@kernel
+def press(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    p: int, end: int, surface: int, part: int, depth: float,
+    x: float, y: float, z: float, nx: float, ny: float, nz: float,
+) -> None:  # fmt: skip
+    """Let a fixture push an end of a link.
+
+    Args:
+        shape: what all smarticles have in common.
+        law: of contacts with fixtures.
+        bodies: the smarticles; `load`, `lever` and `deepest` are written.
+        ends: what contacts remember; brought up to date.
+        ground: the fixtures; `force` is written.
+        hinged: None while welded.
+        ledger: of forces that dissipate; None where nobody asks.
+        dt: time step [s].
+        p: the link.
+        end: 0 its start, 1 its end.
+        surface: which one, for memory.
+        part: of the fixtures.
+        depth: of the contact [m].
+        x: end of the link's axis [m].
+        y: the same.
+        z: the same.
+        nx: normal, from the fixture to the link [1].
+        ny: the same.
+        nz: the same.
+    """
+    links = shape.kinds.shape[0]
+    i, kind = p // (links * shape.offsets.shape[0]), shape.kinds[p % links]
+    row = i
+    if hinged is not None:
+        row = 3 * i + kind
+    arm = shape.radius - 0.5 * depth
+    x, y, z = x - arm * nx, y - arm * ny, z - arm * nz
+    motion, position = bodies.motion, bodies.position
+    rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
+    ax, ay, az = motion[row, 3], motion[row, 4], motion[row, 5]
+    vx = motion[row, 0] + ay * rz - az * ry
+    vy = motion[row, 1] + az * rx - ax * rz
+    vz = motion[row, 2] + ax * ry - ay * rx
+    if part < 4:
+        vz -= ground.speed[part]
+    slip = ends.slip[p, end, surface]
+    stored, load = slip[3], law.stiffness * depth
+    twist = 0.5 * dt * (ax * nx + ay * ny + az * nz)
+    fx, fy, fz = resist(law, load, 1.0, nx, ny, nz, vx, vy, vz, twist, dt, slip)
+    if ledger is not None:
+        known = 0.5 * dt * (fx * vx + fy * vy + fz * vz) + slip[3] - stored
+        if part < 4:
+            known -= 0.5 * dt * fz * ground.speed[part]
+        put_down(ledger, (row, -1), (i, -1), x, y, z, fx, fy, fz, known)
+    fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
+    push(shape, bodies, i, kind, hinged, x, y, z, fx, fy, fz)
+    ground.force[part, 0] -= fx
+    ground.force[part, 1] -= fy
+    ground.force[part, 2] -= fz
+    ends.used[p, end] |= 1 << surface
+    bodies.deepest[i] = max(bodies.deepest[i], depth)
+
+
+@kernel
+def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
+    """Forget contacts of an end of a link that have ended.
+
+    Args:
+        ends: what contacts remember; brought up to date.
+        p: the link.
+        end: 0 its start, 1 its end.
+        now: the surfaces that it touches, as bits.
+
+    Returns:
+        Energy that their tangential springs held [J].
+    """
+    energy = 0.0
+    over = ends.used[p, end] & ~now
+    if over:
+        for surface in range(3):
+            if over & (1 << surface):
+                energy += ends.slip[p, end, surface, 3]
+                for d in range(4):
+                    ends.slip[p, end, surface, d] = 0.0
+    ends.used[p, end] = now
+    return energy
+
+
+@kernel
+def push_up(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float
+) -> float:
+    """Add the forces of floor and wall; arguments as in `press`.
+
+    Returns:
+        Energy of tangential springs whose contacts have ended [J].
+    """
+    segments, radius = bodies.segments, shape.radius
+    links, lost = shape.kinds.shape[0], 0.0
+    floor, lift = ground.place[0], ground.place[1]
+    walled, lifted = ground.flags[0] != 0, ground.flags[1] != 0
+    tiers = ground.radii.shape[0]
+    inner = ground.radii[tiers - 1] - radius
+    least = inner * inner if walled else math.inf
+    for p in range(segments.shape[0]):
+        kind = shape.kinds[p % links]
+        for end in range(0 if kind == 1 else 1, 2):
+            x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
+            if end == 1:
+                x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]
+            before = ends.used[p, end]
+            squared = x * x + y * y
+            low = z - floor < radius
+            if not (low or before or squared > least):
+                continue
+            ends.used[p, end] = 0
+            if low:
+                depth = radius - (z - floor)
+                press(
+                    shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 0, 0, depth, x, y, z, 0.0, 0.0, 1.0
+                )
+            if squared > least:
+                _wall(shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, x, y, z, lift, lifted)
+            now = ends.used[p, end]
+            ends.used[p, end] = before
+            lost += end_contacts(ends, p, end, now)
+    return lost
+
+
+@kernel
+def _wall(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    p: int, end: int, x: float, y: float, z: float, lift: float, lifted: bool,
+) -> None:  # fmt: skip
+    """Let wall and ceilings push an end of a link."""
+    radius, tiers = shape.radius, ground.radii.shape[0]
+    height, r = z - lift, math.sqrt(x * x + y * y)
+    if height > ground.top:
+        return
+    ex, ey = x / r, y / r
+    if lifted and height < ground.bottoms[0]:
+        # Under the wall: its lower edge is all that there is of it.
+        _edge(
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 1, x, y, z, ex, ey,
+            r - ground.radii[0], height - ground.bottoms[0],
+        )  # fmt: skip
+        return
+    tier = 0
+    while tier + 1 < tiers and height > ground.bottoms[tier + 1]:
+        tier += 1
+    depth = r + radius - ground.radii[tier]
+    if lifted and r > ground.radii[tier]:
+        depth = ground.radii[tier] + radius - r
+        ex, ey = -ex, -ey
+    if depth > 0.0:
+        press(
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 1, 1, depth, x, y, z, -ex, -ey, 0.0
+        )  # fmt: skip
+    if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
+        above = height - ground.bottoms[tier + 1]
+        if r >= ground.radii[tier + 1]:
+            press(
+                shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 2, 1, radius + above,
+                x, y, z, 0.0, 0.0, -1.0,
+            )  # fmt: skip
+        else:
+            _edge(
+                shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 2, x, y, z, ex, ey,
+                r - ground.radii[tier + 1], above,
+            )  # fmt: skip
+
+
+@kernel
+def _edge(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    p: int, end: int, surface: int, x: float, y: float, z: float, ex: float, ey: float, out: float, up: float,
+) -> None:  # fmt: skip
+    """Let a round edge push an end that is `out` [m] outside of it and `up` [m] above it, (ex, ey) outwards."""
+    distance = math.sqrt(out * out + up * up)
+    if distance < shape.radius and distance > 0.0:
+        press(
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, surface, 1, shape.radius - distance, x, y, z,
+            ex * out / distance, ey * out / distance, up / distance,
+        )  # fmt: skip
