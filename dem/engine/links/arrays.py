@@ -66,8 +66,8 @@ class Pairs(NamedTuple):
         used: (P,) which of the points touched in the last step, as bits.
         near: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list.
         counts: (4,) pairs, near pairs, times the list was built, times the tight one was.
-        wide_marks: (N S, 6) ends of all links when the list was built [m].
-        near_marks: (N S, 6) the same for the tight list [m].
+        wide_marks: (N S, 7) ends of all links when the list was built [m], and the squares of their skins [m²].
+        near_marks: (N S, 7) the same for the tight list.
         wide_centres: (N, 3) centres of mass when the list was built [m].
         near_centres: (N, 3) the same for the tight list [m].
     """
@@ -88,10 +88,13 @@ class Cells(NamedTuple):
     """What the search for neighbours needs for itself. Pieces are parts of links, no longer than half a cell.
 
     Args:
-        places: (pieces, 3) middles of the pieces, by cell [m].
-        owners: (pieces,) their links, by cell.
-        cells: (pieces,) cell of each piece, by link.
-        starts: (cells + 2,) where each cell begins in `places`, from the second number on.
+        owners: (pieces,) links, by cell, in order within each.
+        cells: (pieces,) cells of each link, by link.
+        begins: (N S + 1,) where each link begins in `cells`.
+        visited: (cells,) the last link that each cell was looked at for.
+        marks: (N S, 7) as in `Pairs`.
+        centres: (N, 3) as in `Pairs`.
+        starts: (cells + 2,) where each cell begins in `owners`, from the second number on.
         rows: (N S + 1,) where the old list's rows begin.
         seen: (N S,) the last link that each link was looked at for.
         first: (P,) the list before.
@@ -100,9 +103,12 @@ class Cells(NamedTuple):
         used: (P,) the same.
     """
 
-    places: Array
     owners: Indices
     cells: Indices
+    begins: Indices
+    visited: Indices
+    marks: Array
+    centres: Array
     starts: Indices
     rows: Indices
     seen: Indices
@@ -233,19 +239,22 @@ def pairs_for(links: int, smarticles: int, capacity: int) -> Pairs:
         np.zeros(capacity, np.uint8),
         np.zeros(capacity, np.int32),
         np.zeros(4, np.int64),
-        np.zeros((links, 6)),
-        np.zeros((links, 6)),
+        np.zeros((links, 7)),
+        np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
         np.zeros((smarticles, 3)),
     )
 
 
-def cells_for(links: int, pieces: int, capacity: int, cells: int) -> Cells:
-    """Room for a search among `links` links in so many pieces, of `capacity` pairs, in so many cells."""
+def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: int) -> Cells:
+    """Room for a search among `links` links of some smarticles in so many pieces, of `capacity` pairs, in so many cells."""
     return Cells(
-        np.zeros((pieces, 3)),
         np.zeros(pieces, np.int32),
         np.zeros(pieces, np.int32),
+        np.zeros(links + 1, np.int32),
+        np.zeros(cells, np.int32),
+        np.zeros((links, 7)),
+        np.zeros((smarticles, 3)),
         np.zeros(cells + 2, np.int32),
         np.zeros(links + 1, np.int32),
         np.zeros(links, np.int32),

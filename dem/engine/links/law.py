@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Law
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 
 
-@kernel
+@part
 def resist(
     law: Law,
     load: float,

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 from dem.engine.links.nearest import nearest_on_segments
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
@@ -36,12 +36,12 @@ PX, NX, LOAD, CARRIED, WEIGHT = 0, 3, 6, 7, 8
 COLUMNS = 9
 
 
-@kernel
+@part
 def _clamp(value: float) -> float:
     return min(1.0, max(0.0, value))
 
 
-@kernel
+@part
 def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool, out: Array) -> int:
     """Points of contact of two links, and the springs there.
 
@@ -84,7 +84,7 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
     return 1 + bare
 
 
-@kernel
+@part
 def _note(
     out: Array, k: int, p: Array, q: Array, s: float, t: float,
     x: float, y: float, z: float, distance: float, load: float, weight: float,
@@ -99,7 +99,7 @@ def _note(
     row[8] = weight
 
 
-@kernel
+@part
 def _lie_along(
     p: Array, q: Array, a: float, b: float, c: float, d: float, e: float,
     deepest: float, diameter: float, stiffness: float, out: Array,
@@ -154,7 +154,7 @@ def _lie_along(
     return bare
 
 
-@kernel
+@part
 def _hinge(
     p: Array, q: Array, diameter: float, stiffness: float, of_first: bool, other: float, sign: float,
     bare: int, out: Array,

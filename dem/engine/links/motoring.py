@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import kernel, part
 from dem.engine.links.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
 from dem.engine.links.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
@@ -121,7 +121,7 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interva
             motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]
 
 
-@kernel
+@part
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
     """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
@@ -137,7 +137,7 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
     return 0.0 if halted else rate
 
 
-@kernel
+@part
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
     """Generalised forces of contacts on the angles [N m]: all points move as an angle turns, as the centre of mass
     does not."""
@@ -151,7 +151,7 @@ def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]
     )
 
 
-@kernel
+@part
 def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float, dt: float) -> tuple[float, float]:
     """Torques of slipping motors [N m], with what they do to the rates in the step taken into account.
 
@@ -185,7 +185,7 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
     return t1, t2
 
 
-@kernel
+@part
 def middle_of_step(
     shape: Shape, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
 ) -> tuple[float, float, float]:

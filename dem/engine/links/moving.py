@@ -12,14 +12,14 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 from dem.engine.links.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.planar import rates, spin_of
 from dem.engine.links.poses import SLIP, along_normal
 from dem.engine.links.shape import Shape
 
 
-@kernel
+@part
 def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
     """Change momenta by the forces in `load` and `lever`, by weight and by motors.
 
@@ -62,7 +62,7 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
         motors.elapsed[0] += dt
 
 
-@kernel
+@part
 def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
     """Move and turn everything by a step.
 
@@ -91,7 +91,7 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
         turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3] = e * norm, f * norm, g * norm, k * norm
 
 
-@kernel
+@part
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
     """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
     axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]

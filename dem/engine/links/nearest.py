@@ -5,12 +5,12 @@ Source: Ericson, Real-Time Collision Detection (2005), section 5.1.9.
 
 from __future__ import annotations
 
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 
 PARALLEL = 1e-12  # sin² of the angle below which a solution for crossing lines has no digits left
 
 
-@kernel
+@part
 def nearest_on_segments(a: float, b: float, c: float, d: float, e: float) -> tuple[float, float]:
     """Parameters (s, t) in [0, 1] of the nearest points p + s u and q + t v of two segments.
 

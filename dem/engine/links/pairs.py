@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 from dem.engine.links.law import resist
 from dem.engine.links.meeting import BARE, POINTS, meet
 from dem.engine.links.nearest import nearest_on_segments
 from dem.engine.links.shape import Shape
 
 
-@kernel
+@part
 def push(
     shape: Shape, bodies: Bodies, i: int, kind: int, hinged: Any,
     x: float, y: float, z: float, fx: float, fy: float, fz: float,
@@ -52,7 +52,7 @@ def push(
         bodies.lever[i, k] += sign * (axes[i, 0, 2] * mx + axes[i, 1, 2] * my + axes[i, 2, 2] * mz)
 
 
-@kernel
+@part
 def put_down(
     ledger: Array, rows: tuple[int, int], owners: tuple[int, int],
     x: float, y: float, z: float, fx: float, fy: float, fz: float, known: float,
@@ -78,7 +78,7 @@ def put_down(
     row[4], row[5], row[6], row[7], row[8], row[9], row[10] = x, y, z, fx, fy, fz, known
 
 
-@kernel
+@part
 def push_apart(
     shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array
 ) -> float:
@@ -173,7 +173,7 @@ def push_apart(
     return lost
 
 
-@kernel
+@part
 def _forget(pairs: Pairs, pair: int, points: int) -> float:
     """Contacts at some points of a pair have ended.
 

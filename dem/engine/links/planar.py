@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import kernel, part
 from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
     _lay_out(shape, c1, s1, c2, s2, row)
 
 
-@kernel
+@part
 def _lay_out(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
     arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
     share = mb / shape.mass
@@ -69,7 +69,7 @@ def _lay_out(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Arra
     row[21] = -share * mb * (u1x * u2x + u1y * u2y)
 
 
-@kernel
+@part
 def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tuple[float, float, float]:
     """ω = I⁻¹(L - h z) [rad/s], all in the middle link's axes.
 
@@ -85,14 +85,14 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
     return (yy * lx - xy * ly) / determinant, (xx * ly - xy * lx) / determinant, (lz - internal) / row[16]
 
 
-@kernel
+@part
 def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
     """p = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
     wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
     return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
 
 
-@kernel
+@part
 def mobility(row: Array) -> tuple[float, float, float]:
     """(A - b bᵀ/I_zz)⁻¹: 11, 22, 12 [1/(kg m²)]: how impulses of the motors change the rates of a free smarticle."""
     a, b, c = row[20] - row[18] ** 2 / row[16], row[20] - row[19] ** 2 / row[16], row[21] - row[18] * row[19] / row[16]
@@ -100,7 +100,7 @@ def mobility(row: Array) -> tuple[float, float, float]:
     return b / determinant, a / determinant, -c / determinant
 
 
-@kernel
+@part
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
     """α̇ [rad/s] that belongs to p [kg m²/s], the inverse of `momenta`."""
     m1, m2, m12 = mobility(row)
@@ -108,7 +108,7 @@ def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float
     return m1 * q1 + m12 * q2, m12 * q1 + m2 * q2
 
 
-@kernel
+@part
 def lagrange_force(
     shape: Shape, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
 ) -> float:

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import kernel, part
 from dem.engine.links.moving import drift, kick
 from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
 from dem.engine.links.pairs import push_apart
@@ -15,10 +15,10 @@ from dem.engine.links.shape import Shape
 from dem.engine.links.walls import push_up
 
 LOST, WORK = 0, 1  # places in `totals`
-DISPLACED, NEAR_SKIN, WIDE_SKIN, PIECE = range(4)  # places in `lengths`
+NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, PIECE = range(7)  # places in `skins`
 
 
-@kernel
+@part
 def shaken_to(ground: Ground, time: float) -> None:
     """Put what is shaken where it is at a time [s]; `place` and `speed` are written."""
     if ground.wave[1] > 0.0:
@@ -29,8 +29,8 @@ def shaken_to(ground: Ground, time: float) -> None:
                 ground.speed[part] = ground.wave[0] * ground.wave[1] * math.cos(phase)
 
 
-@kernel
-def look_for_neighbours(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, lengths: Array) -> int:
+@part
+def look_for_neighbours(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins: Array) -> int:
     """Bring the lists up to date where links have moved too far; GOOD, or FULL.
 
     Args:
@@ -38,19 +38,21 @@ def look_for_neighbours(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells
         bodies: the smarticles, posed.
         pairs: written.
         cells: scratch.
-        lengths: (4,) -, skins of the tight and the wide list, longest piece of a link [m].
+        skins: (7,) of the tight and of the wide list: thinnest and thickest skin [m], time that skins are to be good
+            for [s]; then the longest piece of a link [m].
     """
-    near, wide = lengths[NEAR_SKIN], lengths[WIDE_SKIN]
-    if 2 * moved(bodies, pairs.near_marks, pairs.near_centres) < near:
+    if not moved(bodies, pairs.near_marks, pairs.near_centres):
         return GOOD
-    if 2 * moved(bodies, pairs.wide_marks, pairs.wide_centres) + near > wide:
-        if build(shape, bodies, pairs, cells, wide, lengths[PIECE]) == FULL:
+    # The tight list is good for less than its thickest skin, which the wide one leaves room for.
+    if moved(bodies, pairs.wide_marks, pairs.wide_centres):
+        inner, least, most = skins[NEAR_MOST], skins[WIDE_LEAST], skins[WIDE_MOST]
+        if build(shape, bodies, pairs, cells, inner, least, most, skins[WIDE_TIME], skins[PIECE]) == FULL:
             return FULL
-    tighten(shape, bodies, pairs, near)
+    tighten(shape, bodies, pairs, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
     return GOOD
 
 
-@kernel
+@part
 def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) -> float:
     """Energy that the forces in the ledger dissipated in the step [J]; velocities after the kick are now known.
 
@@ -85,7 +87,7 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
 
 @kernel
 def advance(
-    steps: int, made: int, begin: float, dt: float, gravity: float, planar: bool, lengths: Array, shape: Shape,
+    steps: int, made: int, begin: float, dt: float, gravity: float, planar: bool, skins: Array, shape: Shape,
     law: Law, wall_law: Law, bodies: Bodies, pairs: Pairs, cells: Cells, ends: Ends, ground: Ground, motors: Any,
     ledger: Any, out: Array, row: Array, totals: Array,
 ) -> int:  # fmt: skip
@@ -98,7 +100,7 @@ def advance(
         dt: time step [s].
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
-        lengths: see `look_for_neighbours`.
+        skins: see `look_for_neighbours`.
         shape: what all smarticles have in common.
         law: of their contacts.
         wall_law: of their contacts with fixtures.
@@ -119,7 +121,7 @@ def advance(
     for step in range(steps):
         shaken_to(ground, begin + (made + step) * dt)
         pose(shape, bodies, motors)
-        if look_for_neighbours(shape, bodies, pairs, cells, lengths) == FULL:
+        if look_for_neighbours(shape, bodies, pairs, cells, skins) == FULL:
             return step
         bodies.load[:] = 0.0
         ground.force[:] = 0.0

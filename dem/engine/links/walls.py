@@ -10,13 +10,13 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Bodies, Ends, Ground, Law
-from dem.engine.links.compiler import kernel
+from dem.engine.links.compiler import part
 from dem.engine.links.law import resist
 from dem.engine.links.pairs import push, put_down
 from dem.engine.links.shape import Shape
 
 
-@kernel
+@part
 def press(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, surface: int, part: int, depth: float,
@@ -78,7 +78,7 @@ def press(
     bodies.deepest[i] = max(bodies.deepest[i], depth)
 
 
-@kernel
+@part
 def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
     """Forget contacts of an end of a link that have ended.
 
@@ -103,7 +103,7 @@ def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
     return energy
 
 
-@kernel
+@part
 def push_up(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float
 ) -> float:
@@ -144,7 +144,7 @@ def push_up(
     return lost
 
 
-@kernel
+@part
 def _wall(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, x: float, y: float, z: float, lift: float, lifted: bool,
@@ -187,7 +187,7 @@ def _wall(
             )  # fmt: skip
 
 
-@kernel
+@part
 def _edge(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, surface: int, x: float, y: float, z: float, ex: float, ey: float, out: float, up: float,

@@ -37,7 +37,8 @@ from dem.physics.stability import ContactLaw
 Array = NDArray[np.float64]
 
 # Skins and the longest piece of a link, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
-NEAR_SKIN, WIDE_SKIN, PIECE = 0.15, 0.9, 2.0
+NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.4), 1.0
+NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built
 GROWTH = 1.5  # of a list that is full
 
@@ -81,12 +82,12 @@ class World:
         self.each = len(self.shape.kinds) * len(self.shape.offsets)
         self.bodies: Bodies = no_bodies(self.each)
         self.pairs: Pairs = pairs_for(0, 0, 256)
-        self.cells: Cells = cells_for(0, 0, 256, 64)
+        self.cells: Cells = cells_for(0, 0, 0, 256, 64)
         self.ends = Ends(np.zeros((0, 2, SURFACES, 4)), np.zeros((0, 2), np.uint8))
         self.ledger: Array | None = np.zeros((256, 11)) if self.account else None
         self.out, self.row = np.zeros((ROWS, COLUMNS)), np.zeros(PLANE)
         diameter = 2 * self.shape.radius
-        self.lengths = np.array([0.0, NEAR_SKIN * diameter, WIDE_SKIN * diameter, PIECE * diameter])
+        self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, PIECE])
 
     @property
     def count(self) -> int:
@@ -108,6 +109,7 @@ class World:
         if self.made:
             self.begin, self.made = self.time, 0
         self.time_step = time_step
+        self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses) -> None:
         """Add smarticles of the particle's own shape, at rest."""
@@ -141,7 +143,7 @@ class World:
     def forget_places(self) -> None:
         """Have neighbours looked for anew at the next step."""
         for marks in (self.pairs.wide_marks, self.pairs.near_marks):
-            marks[:] = FAR
+            marks[:, :6], marks[:, 6] = FAR, 0.0
 
     def make_room(self, capacity: int = 0) -> None:
         """Make the lists as long as so many smarticles need, or for `capacity` pairs at least."""
@@ -152,10 +154,10 @@ class World:
             first, second, slip, used, near = grown
             self.pairs = self.pairs._replace(first=first, second=second, slip=slip, used=used, near=near)
         longest = [self.shape.tip, 2 * self.shape.end, self.shape.tip]
-        piece = self.lengths[3]
+        piece = self.skins[-1]
         pieces = sum(math.ceil(longest[kind] / piece + 1e-9) for kind in self.shape.kinds) * len(self.shape.offsets)
         if len(self.cells.rows) != links + 1 or len(self.cells.first) != capacity:
-            self.cells = cells_for(links, pieces * self.count, capacity, 4 * pieces * self.count + 64)
+            self.cells = cells_for(links, self.count, pieces * self.count, capacity, 4 * pieces * self.count + 64)
         if self.ledger is not None:
             rows = 3 * capacity // 2 + 6 * links
             if len(self.ledger) < rows:
@@ -173,7 +175,7 @@ class World:
 
     def _call(self, steps: int) -> int:
         made: int = advance(
-            steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.lengths, self.shape,
+            steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
             self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
             self.ledger, self.out, self.row, self.totals,
         )  # fmt: skip
