@@ -66,7 +66,7 @@ class Pairs(NamedTuple):
         used: (P,) which of the points touched in the last step, as bits.
         near: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list.
         counts: (4,) pairs, near pairs, times the list was built, times the tight one was.
-        wide_marks: (N S, 7) ends of all links when the list was built [m], and the squares of their skins [m²].
+        wide_marks: (N S, 7) ends of all links when the list was built and their skins [m].
         near_marks: (N S, 7) the same for the tight list.
         wide_centres: (N, 3) centres of mass when the list was built [m].
         near_centres: (N, 3) the same for the tight list [m].
@@ -176,6 +176,60 @@ class Ground(NamedTuple):
     wave: Array
     force: Array
     sums: Array
+
+
+class Hooks(NamedTuple):
+    """Two hooks of two bars each, lying along x and y; their heights are in `Ground.place`.
+
+    Args:
+        halves: (2, 2, 3) half edges of the bars of the lower and the upper hook [m].
+        slip: (N S, 2, 2, SLOTS, 4) stretch of the tangential springs of links at the bars [m], and their energy [J].
+        used: (N S, 2, 2) which of the points touched in the last step, as bits.
+    """
+
+    halves: Array
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Rims(NamedTuple):
+    """Round edges of the wall that links can bend around: between tiers, and below a wall that is lifted.
+
+    Args:
+        heights: (rims,) above the wall's place [m].
+        radii: (rims,) [m].
+        slip: (N S, rims, 4) stretch of the tangential springs of links at the rims [m], and their energy [J].
+        used: (N S, rims) whether they touched in the last step.
+    """
+
+    heights: Array
+    radii: Array
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Cords(NamedTuple):
+    """Strings tied to links, k of them.
+
+    Args:
+        owner: (k, 2) smarticle and link.
+        along: (k,) place of the knot along the link's axis from the link's centre [m].
+        anchor: (k, 3) where the other ends are [m].
+        start: (k, 3) where they were when the strings were tied [m].
+        speed: (k,) of the other ends, along x [m/s].
+        law: (3,) length when slack [m], stiffness [N/m], damping [N s/m].
+        sums: (k, 3) forces on the links, summed over all steps [N].
+        knot: (k, 3) where the strings are tied [m].
+    """
+
+    owner: NDArray[np.int64]
+    along: Array
+    anchor: Array
+    start: Array
+    speed: Array
+    law: Array
+    sums: Array
+    knot: Array
 
 
 class Motoring(NamedTuple):

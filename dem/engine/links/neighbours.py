@@ -25,7 +25,7 @@ def moved(bodies: Bodies, marks: Array, centres: Array) -> bool:
 
     Args:
         bodies: the smarticles.
-        marks: (N S, 7) starts and ends of all links then, and the squares of their skins [m, m²].
+        marks: (N S, 7) starts and ends of all links then, and their skins [m].
         centres: (N, 3) centres of mass then [m].
     """
     position, segments = bodies.position, bodies.segments
@@ -42,7 +42,7 @@ def moved(bodies: Bodies, marks: Array, centres: Array) -> bool:
         start = (ax - marks[p, 0]) ** 2 + (ay - marks[p, 1]) ** 2 + (az - marks[p, 2]) ** 2
         ax, ay, az = ax + segments[p, 3], ay + segments[p, 4], az + segments[p, 5]
         end = (ax - marks[p, 3]) ** 2 + (ay - marks[p, 4]) ** 2 + (az - marks[p, 5]) ** 2
-        over |= max(start, end) > marks[p, 6]
+        over |= max(start, end) > marks[p, 6] * marks[p, 6]
     return over
 
 
@@ -83,7 +83,7 @@ def mark(shape: Shape, bodies: Bodies, marks: Array, centres: Array, least: floa
             vy = velocity[i, 1] - y + wz * rx - wx * rz
             vz = velocity[i, 2] - z + wx * ry - wy * rx
             fastest = max(fastest, vx * vx + vy * vy + vz * vz)
-        marks[p, 6] = min(most, least + time * math.sqrt(fastest)) ** 2
+        marks[p, 6] = min(most, least + time * math.sqrt(fastest))
 
 
 @part
@@ -112,7 +112,7 @@ def tighten(shape: Shape, bodies: Bodies, pairs: Pairs, least: float, most: floa
     count = 0
     for k in range(pairs.counts[0]):
         p, q = first[k], second[k]
-        reach = diameter + math.sqrt(marks[p, 6]) + math.sqrt(marks[q, 6])
+        reach = diameter + marks[p, 6] + marks[q, 6]
         # Contacts stay in the list until the step in which they end has forgotten them.
         if _distance(bodies.segments, p, q) < reach * reach or pairs.used[k]:
             pairs.near[count] = k
@@ -243,7 +243,7 @@ def _search(shape: Shape, bodies: Bodies, cells: Cells, nx: int, ny: int, nz: in
     for p in range(count):
         # Links of the same smarticle come right after each other.
         after = (p // each + 1) * each - 1
-        mine = bare + math.sqrt(marks[p, 6])
+        mine = bare + marks[p, 6]
         for k in range(begins[p], begins[p + 1]):
             cell = places[k]
             a, b, c = cell // (ny * nz), (cell // nz) % ny, cell % nz
@@ -265,7 +265,7 @@ def _search(shape: Shape, bodies: Bodies, cells: Cells, nx: int, ny: int, nz: in
                             if seen[q] == p:
                                 continue
                             seen[q] = p
-                            reach = mine + math.sqrt(marks[q, 6])
+                            reach = mine + marks[q, 6]
                             if _distance(segments, p, q) < reach * reach:
                                 if total == capacity:
                                     return -1

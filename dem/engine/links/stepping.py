@@ -6,13 +6,16 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
+from dem.engine.links.bars import push_hooks
 from dem.engine.links.compiler import kernel, part
+from dem.engine.links.cords import pull
 from dem.engine.links.moving import drift, kick
 from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
 from dem.engine.links.pairs import push_apart
 from dem.engine.links.poses import find_motion, find_spin, pose
+from dem.engine.links.rims import push_rims
 from dem.engine.links.shape import Shape
-from dem.engine.links.walls import push_up
+from dem.engine.links.walls import push_sideways, push_up
 
 LOST, WORK = 0, 1  # places in `totals`
 NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, PIECE = range(7)  # places in `skins`
@@ -89,7 +92,7 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
 def advance(
     steps: int, made: int, begin: float, dt: float, gravity: float, planar: bool, skins: Array, shape: Shape,
     law: Law, wall_law: Law, bodies: Bodies, pairs: Pairs, cells: Cells, ends: Ends, ground: Ground, motors: Any,
-    ledger: Any, out: Array, row: Array, totals: Array,
+    hooks: Any, rims: Any, channel: Any, cords: Any, ledger: Any, out: Array, row: Array, totals: Array,
 ) -> int:  # fmt: skip
     """Make steps.
 
@@ -110,6 +113,10 @@ def advance(
         ends: what contacts with fixtures remember.
         ground: the fixtures.
         motors: None while welded.
+        hooks: None where there are none.
+        rims: None where the wall has no edges that links can reach.
+        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
+        cords: None where no string is tied.
         ledger: of forces that dissipate; None where nobody asks.
         out: scratch of `dem.engine.links.meeting.meet`.
         row: (PLANE,) scratch.
@@ -128,7 +135,16 @@ def advance(
         if motors is not None:
             bodies.lever[:] = 0.0
         lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
-        lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)
+        if channel is None:
+            lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)
+        else:
+            lost += push_sideways(shape, wall_law, bodies, ends, ground, channel[0], motors, ledger, dt)
+        if rims is not None:
+            lost += push_rims(shape, wall_law, bodies, ground, rims, motors, ledger, dt)
+        if hooks is not None:
+            lost += push_hooks(shape, wall_law, bodies, ground, hooks, motors, ledger, dt, out)
+        if cords is not None:
+            totals[WORK] += pull(shape, bodies, cords, motors, dt)
         for part in range(6):
             for d in range(3):
                 ground.sums[part, d] += ground.force[part, d]

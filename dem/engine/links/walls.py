@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from dem.engine.links.arrays import Bodies, Ends, Ground, Law
+from dem.engine.links.arrays import CHANNEL, FLOOR, SURFACES, WALL, Array, Bodies, Ends, Ground, Law
 from dem.engine.links.compiler import part
 from dem.engine.links.law import resist
 from dem.engine.links.pairs import push, put_down
@@ -17,28 +17,27 @@ from dem.engine.links.shape import Shape
 
 
 @part
-def press(
-    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
-    p: int, end: int, surface: int, part: int, depth: float,
+def rub(
+    shape: Shape, law: Law, bodies: Bodies, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    p: int, part_of: int, load: float, weight: float, slip: Array,
     x: float, y: float, z: float, nx: float, ny: float, nz: float,
 ) -> None:  # fmt: skip
-    """Let a fixture push an end of a link.
+    """Let a fixture push a link at a point.
 
     Args:
         shape: what all smarticles have in common.
         law: of contacts with fixtures.
-        bodies: the smarticles; `load`, `lever` and `deepest` are written.
-        ends: what contacts remember; brought up to date.
+        bodies: the smarticles; `load` and `lever` are written.
         ground: the fixtures; `force` is written.
         hinged: None while welded.
         ledger: of forces that dissipate; None where nobody asks.
         dt: time step [s].
         p: the link.
-        end: 0 its start, 1 its end.
-        surface: which one, for memory.
-        part: of the fixtures.
-        depth: of the contact [m].
-        x: end of the link's axis [m].
+        part_of: the fixture, a row of `Ground.force`.
+        load: of the normal spring [N].
+        weight: share of a whole contact [1].
+        slip: (4,) what the contact remembers; brought up to date.
+        x: point of contact [m].
         y: the same.
         z: the same.
         nx: normal, from the fixture to the link [1].
@@ -50,31 +49,63 @@ def press(
     row = i
     if hinged is not None:
         row = 3 * i + kind
-    arm = shape.radius - 0.5 * depth
-    x, y, z = x - arm * nx, y - arm * ny, z - arm * nz
     motion, position = bodies.motion, bodies.position
     rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
     ax, ay, az = motion[row, 3], motion[row, 4], motion[row, 5]
     vx = motion[row, 0] + ay * rz - az * ry
     vy = motion[row, 1] + az * rx - ax * rz
     vz = motion[row, 2] + ax * ry - ay * rx
-    if part < 4:
-        vz -= ground.speed[part]
-    slip = ends.slip[p, end, surface]
-    stored, load = slip[3], law.stiffness * depth
+    speed = ground.speed[part_of] if part_of < CHANNEL else 0.0
+    stored = slip[3]
     twist = 0.5 * dt * (ax * nx + ay * ny + az * nz)
-    fx, fy, fz = resist(law, load, 1.0, nx, ny, nz, vx, vy, vz, twist, dt, slip)
+    fx, fy, fz = resist(law, load, weight, nx, ny, nz, vx, vy, vz - speed, twist, dt, slip)
     if ledger is not None:
-        known = 0.5 * dt * (fx * vx + fy * vy + fz * vz) + slip[3] - stored
-        if part < 4:
-            known -= 0.5 * dt * fz * ground.speed[part]
+        # The fixture keeps its speed: of the mean of before and after, twice its half.
+        known = 0.5 * dt * (fx * vx + fy * vy + fz * (vz - 2 * speed)) + slip[3] - stored
         put_down(ledger, (row, -1), (i, -1), x, y, z, fx, fy, fz, known)
     fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
     push(shape, bodies, i, kind, hinged, x, y, z, fx, fy, fz)
-    ground.force[part, 0] -= fx
-    ground.force[part, 1] -= fy
-    ground.force[part, 2] -= fz
+    ground.force[part_of, 0] -= fx
+    ground.force[part_of, 1] -= fy
+    ground.force[part_of, 2] -= fz
+
+
+@part
+def press(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    p: int, end: int, surface: int, part_of: int, depth: float,
+    x: float, y: float, z: float, nx: float, ny: float, nz: float,
+) -> None:  # fmt: skip
+    """Let a fixture push an end of a link, where the sphere about it is `depth` [m] deep in a surface.
+
+    Args:
+        shape: as in `rub`.
+        law: as in `rub`.
+        bodies: as in `rub`; `deepest` is written as well.
+        ends: what contacts remember; brought up to date.
+        ground: as in `rub`.
+        hinged: as in `rub`.
+        ledger: as in `rub`.
+        dt: as in `rub`.
+        p: the link.
+        end: 0 its start, 1 its end.
+        surface: which one, for memory.
+        part_of: the fixture.
+        depth: of the contact [m].
+        x: end of the link's axis [m].
+        y: the same.
+        z: the same.
+        nx: normal, from the fixture to the link [1].
+        ny: the same.
+        nz: the same.
+    """
+    arm = shape.radius - 0.5 * depth
+    rub(
+        shape, law, bodies, ground, hinged, ledger, dt, p, part_of, law.stiffness * depth, 1.0,
+        ends.slip[p, end, surface], x - arm * nx, y - arm * ny, z - arm * nz, nx, ny, nz,
+    )  # fmt: skip
     ends.used[p, end] |= 1 << surface
+    i = p // (shape.kinds.shape[0] * shape.offsets.shape[0])
     bodies.deepest[i] = max(bodies.deepest[i], depth)
 
 
@@ -94,7 +125,7 @@ def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
     energy = 0.0
     over = ends.used[p, end] & ~now
     if over:
-        for surface in range(3):
+        for surface in range(SURFACES):
             if over & (1 << surface):
                 energy += ends.slip[p, end, surface, 3]
                 for d in range(4):
@@ -134,7 +165,7 @@ def push_up(
             if low:
                 depth = radius - (z - floor)
                 press(
-                    shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 0, 0, depth, x, y, z, 0.0, 0.0, 1.0
+                    shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 0, FLOOR, depth, x, y, z, 0.0, 0.0, 1.0
                 )
             if squared > least:
                 _wall(shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, x, y, z, lift, lifted)
@@ -171,13 +202,13 @@ def _wall(
         ex, ey = -ex, -ey
     if depth > 0.0:
         press(
-            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 1, 1, depth, x, y, z, -ex, -ey, 0.0
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 1, WALL, depth, x, y, z, -ex, -ey, 0.0
         )  # fmt: skip
     if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
         above = height - ground.bottoms[tier + 1]
         if r >= ground.radii[tier + 1]:
             press(
-                shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 2, 1, radius + above,
+                shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 2, WALL, radius + above,
                 x, y, z, 0.0, 0.0, -1.0,
             )  # fmt: skip
         else:
@@ -196,6 +227,38 @@ def _edge(
     distance = math.sqrt(out * out + up * up)
     if distance < shape.radius and distance > 0.0:
         press(
-            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, surface, 1, shape.radius - distance, x, y, z,
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, surface, WALL, shape.radius - distance, x, y, z,
             ex * out / distance, ey * out / distance, up / distance,
         )  # fmt: skip
+
+
+@part
+def push_sideways(
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, half: float, hinged: Any, ledger: Any, dt: float
+) -> float:
+    """Add the forces of the walls y = ±`half` [m] of a channel; other arguments as in `press`.
+
+    Returns:
+        Energy of tangential springs whose contacts have ended [J].
+    """
+    segments, radius = bodies.segments, shape.radius
+    links, lost = shape.kinds.shape[0], 0.0
+    for p in range(segments.shape[0]):
+        for end in range(0 if shape.kinds[p % links] == 1 else 1, 2):
+            x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
+            if end == 1:
+                x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]
+            before = ends.used[p, end]
+            ends.used[p, end] = 0
+            for side in range(2):
+                normal = 1.0 if side == 0 else -1.0
+                depth = radius - half - normal * y
+                if depth > 0.0:
+                    press(
+                        shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, side, CHANNEL + side, depth,
+                        x, y, z, 0.0, normal, 0.0,
+                    )  # fmt: skip
+            now = ends.used[p, end]
+            ends.used[p, end] = before
+            lost += end_contacts(ends, p, end, now)
+    return lost

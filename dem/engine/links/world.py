@@ -37,8 +37,8 @@ from dem.physics.stability import ContactLaw
 Array = NDArray[np.float64]
 
 # Skins and the longest piece of a link, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
-NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.4), 1.0
-NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
+NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.8), 1.0
+NEAR_STEPS, WIDE_STEPS = 6, 80  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built
 GROWTH = 1.5  # of a list that is full
 
