@@ -93,7 +93,7 @@ def compute(folder: Path) -> None:
     Raises:
         RunError: YADE is not installed, or a disk is full.
     """
-    write_json(folder / "versions.json", versions(yade_version()))
+    write_json(folder / "versions.json", versions(("yade", yade_version())))
     _write(folder / "verification.csv", [row for case in CASES for row in _timed(case.name, rows_of_case, case)])
     _write(folder / "trajectories.csv", [row for one in LADDERS for row in _timed(one.name, rows_of_ladder, one)])
     impacts = _timed("flat impacts over the number of spheres", flat_impacts)

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import YadeKind
 from dem.errors import RunError
-from dem.physics.stability import time_step
+from dem.plan.steps import time_step
 from dem.record.progress import Progress
+from dem.run.build import build_recorder
 from dem.run.recorder import Recorder
-from dem.run.run import build_engine, build_recorder
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
@@ -24,16 +26,16 @@ def load(data: dict[str, Any]) -> Scene:
     return parse_scene(data, source="case")
 
 
-def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
-    """Engine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
+def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, YadeEngine, Recorder]:
+    """YadeEngine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
     scene = load(data)
     Path(out).mkdir(parents=True, exist_ok=True)
-    engine = build_engine(scene, time_step(scene) if dt is None else dt)
+    engine = YadeKind().build(scene, time_step(scene) if dt is None else dt)
     progress = Progress(Path(out), scene.count, show=False)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 
-def look(engine: Engine, recorder: Recorder) -> str | None:
+def look(engine: YadeEngine, recorder: Recorder) -> str | None:
     """What the recorder's next look says, contacts included; None: nothing."""
     recorder.watch_every = 1
     try:
@@ -43,13 +45,13 @@ def look(engine: Engine, recorder: Recorder) -> str | None:
     return None
 
 
-def energy(engine: Engine) -> float:
+def energy(engine: YadeEngine) -> float:
     """Kinetic, potential, and that of the springs of all contacts [J]."""
     state = engine.state()
     return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.account.elastic()[0]
 
 
-def fastest(engine: Engine) -> float:
+def fastest(engine: YadeEngine) -> float:
     """Speed of the fastest link [m/s]."""
     return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
 

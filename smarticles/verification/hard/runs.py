@@ -11,14 +11,16 @@ from unittest.mock import patch
 import h5py
 import numpy as np
 
+import dem.run.build
 import dem.run.run
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.engine.yade.strain import Strain
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import InputError, RunError
+from dem.physics.overlaps import Overlaps
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 from smarticles.verification.hard.check import Check, below, near
 
 
@@ -38,10 +40,10 @@ class Noting(Watchdog):
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
-    def check_depths(self, strain: Strain, **options: Any) -> None:
+    def check_depths(self, overlaps: Overlaps, **options: Any) -> None:
         """See `Watchdog`."""
-        self._note("depth", strain.deepest / self.depth)
-        super().check_depths(strain, **options)
+        self._note("depth", overlaps.deepest / self.depth)
+        super().check_depths(overlaps, **options)
 
     def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
         """See `Watchdog`."""
@@ -101,7 +103,7 @@ class Watched:
         height = float(self.series["com_height_m"][-1])
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any look [d]", dem.run.run.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            below("deepest contact at any look [d]", dem.run.build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
             near(
                 "height of the centre of mass at the end [m]",
                 height,
@@ -113,7 +115,7 @@ class Watched:
         if rest is not None:
             checks.append(below("speed at the end [m/s]", float(self.series["max_speed_m_per_s"][-1]), rest))
         if "gap" in self.nearest:
-            gap = dem.run.run.GAP_LIMIT * self.nearest["gap"]
+            gap = dem.run.build.GAP_LIMIT * self.nearest["gap"]
             checks.append(below("largest joint gap [d]", gap, 0.02))
         return checks
 
@@ -129,7 +131,7 @@ def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
     scene, spent = None, [0.0]
     looked = Recorder.watch
 
-    def watch(recorder: Recorder, engine: Engine, state: State | None = None) -> None:
+    def watch(recorder: Recorder, engine: YadeEngine, state: State | None = None) -> None:
         begun = time.process_time()
         try:
             looked(recorder, engine, state)
@@ -142,7 +144,7 @@ def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
     try:
         scene = parse_scene(data, source="case")
         with (
-            patch.object(dem.run.run, "Watchdog", Noting if note else Watchdog),
+            patch.object(dem.run.build, "Watchdog", Noting if note else Watchdog),
             patch.object(Recorder, "watch", watch),
         ):
             dem.run.run.run_scene(scene, out, command="stability", progress=False)
