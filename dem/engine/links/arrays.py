@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.planar import PLANE
-
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
+PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
 SURFACES = 3  # that an end of a link can touch at once: floor, wall, ceiling; or two walls of a channel
-SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.meeting`
+SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
 
 
 class Bodies(NamedTuple):
@@ -29,7 +28,7 @@ class Bodies(NamedTuple):
         momentum: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s].
         alpha: (N, 2) angles of the barbs [rad].
         rate: (N, 2) their rates [rad/s]; 0 while welded.
-        plane: (N, PLANE) plane geometry, see `dem.engine.links.planar.lay_out`.
+        plane: (N, PLANE) plane geometry, see `dem.engine.links.motion.planar.lay_out`.
         spin: (N, 3) angular velocities of the middle links, laboratory frame [rad/s].
         axes: (N, 3, 3) rotation matrices, middle link to laboratory [1].
         segments: (N S, 6) start of each link's axis, at the hinge, and vector to its end [m]; S links and strands.

@@ -49,7 +49,7 @@ def kernel(function: F) -> F:
 def stamp() -> str:
     """Hash of everything that compiled code depends on: these sources, the options, Numba, NumPy."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     digest.update(repr((sorted(OPTIONS.items()), numba.__version__, np.__version__)).encode())
     return digest.hexdigest()[:16]

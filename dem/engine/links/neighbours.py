@@ -13,7 +13,7 @@ import math
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
 from dem.engine.links.compiler import part
-from dem.engine.links.nearest import nearest_on_segments
+from dem.engine.links.contact.nearest import nearest_on_segments
 from dem.engine.links.shape import Shape
 
 GOOD, REBUILD, FULL = 0, 1, 2

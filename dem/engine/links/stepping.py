@@ -6,16 +6,16 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
-from dem.engine.links.bars import push_hooks
+from dem.engine.links.contact.bars import push_hooks
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.cords import pull
-from dem.engine.links.moving import drift, kick
+from dem.engine.links.contact.cords import pull
+from dem.engine.links.motion.moving import drift, kick
 from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
-from dem.engine.links.pairs import push_apart
-from dem.engine.links.poses import find_motion, find_spin, pose
-from dem.engine.links.rims import push_rims
+from dem.engine.links.contact.pairs import push_apart
+from dem.engine.links.motion.poses import find_motion, find_spin, pose
+from dem.engine.links.contact.rims import push_rims
 from dem.engine.links.shape import Shape
-from dem.engine.links.walls import push_sideways, push_up
+from dem.engine.links.contact.walls import push_sideways, push_up
 
 LOST, WORK = 0, 1  # places in `totals`
 NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, PIECE = range(7)  # places in `skins`
@@ -65,7 +65,7 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
         shape: what all smarticles have in common.
         bodies: the smarticles; `spin` and `motion` are written.
         motors: None while welded.
-        ledger: see `dem.engine.links.pairs.put_down`; emptied.
+        ledger: see `dem.engine.links.contact.pairs.put_down`; emptied.
         dt: time step [s].
     """
     for i in range(bodies.position.shape[0]):
@@ -118,7 +118,7 @@ def advance(
         channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
         cords: None where no string is tied.
         ledger: of forces that dissipate; None where nobody asks.
-        out: scratch of `dem.engine.links.meeting.meet`.
+        out: scratch of `dem.engine.links.contact.meeting.meet`.
         row: (PLANE,) scratch.
         totals: (2,) energy dissipated, work of the fixtures [J]; added to.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,26 +14,32 @@ from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.links.arrays import (
+    PLANE,
+    SLOTS,
     SURFACES,
     Bodies,
     Cells,
+    Cords,
     Ends,
     Ground,
+    Hooks,
     Law,
     Motoring,
     Pairs,
+    Rims,
     cells_for,
     joined,
     no_bodies,
     pairs_for,
 )
-from dem.engine.links.meeting import COLUMNS, ROWS
-from dem.engine.links.planar import PLANE, lay_out
-from dem.engine.links.poses import pose
+from dem.engine.links.contact.meeting import COLUMNS, ROWS
+from dem.engine.links.contact.queries import look_at_fixtures, look_at_pairs
+from dem.engine.links.motion.planar import lay_out
+from dem.engine.links.motion.poses import pose
 from dem.engine.links.shape import shape_of
 from dem.engine.links.stepping import advance
 from dem.errors import refuse
-from dem.physics.stability import ContactLaw
+from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
 
@@ -41,6 +48,25 @@ NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.8), 1.0
 NEAR_STEPS, WIDE_STEPS = 6, 80  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built
 GROWTH = 1.5  # of a list that is full
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """All contacts at one instant.
+
+    Args:
+        pairs: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once.
+        touches: (N,) points of contact of each smarticle.
+        depths: (N,) deepest contact of each [m].
+        held: (N, 6) whether each touches each part of the fixtures, see `Ground`.
+        elastic_energy: in all springs [J].
+    """
+
+    pairs: NDArray[np.int64]
+    touches: NDArray[np.int64]
+    depths: Array
+    held: NDArray[np.bool_]
+    elastic_energy: float
 
 
 @dataclass
@@ -71,6 +97,10 @@ class World:
     made: int = 0
     """Steps of the present length so far."""
     totals: Array = field(default_factory=lambda: np.zeros(2))
+    hooks: Hooks | None = None
+    rims: Rims | None = None
+    channel: Array | None = None
+    cords: Cords | None = None
 
     def __post_init__(self) -> None:
         law = self.contact
@@ -137,8 +167,37 @@ class World:
             first=old.first, second=old.second, slip=old.slip, used=old.used, near=old.near, counts=old.counts
         )
         self.forget_places()
-        self.ends = Ends(*(_longer(array, links) for array in self.ends))
+        self._make_room_at_fixtures()
         self.make_room()
+
+    def _make_room_at_fixtures(self) -> None:
+        links = self.count * self.each
+        self.ends = Ends(*(longer(array, links) for array in self.ends))
+        if self.hooks is not None:
+            self.hooks = self.hooks._replace(slip=longer(self.hooks.slip, links), used=longer(self.hooks.used, links))
+        if self.rims is not None:
+            self.rims = self.rims._replace(slip=longer(self.rims.slip, links), used=longer(self.rims.used, links))
+
+    def add_hooks(self, halves: Array) -> None:
+        """Add the two hooks, with (2, 2, 3) half edges of their bars [m]."""
+        self.hooks = Hooks(halves, np.zeros((0, 2, 2, SLOTS, 4)), np.zeros((0, 2, 2), np.uint8))
+        self._make_room_at_fixtures()
+
+    def add_rim(self, height: float, radius: float) -> None:
+        """Add an edge of the wall at a height above its place [m], of a radius [m]."""
+        links = self.count * self.each
+        old = self.rims or Rims(np.zeros(0), np.zeros(0), np.zeros((links, 0, 4)), np.zeros((links, 0), np.uint8))
+        self.rims = Rims(
+            np.append(old.heights, height),
+            np.append(old.radii, radius),
+            np.concatenate([old.slip, np.zeros((links, 1, 4))], axis=1),
+            np.concatenate([old.used, np.zeros((links, 1), np.uint8)], axis=1),
+        )
+
+    def set_articulated(self, articulated: bool) -> None:
+        """Have velocities for each link, or for whole smarticles."""
+        self.articulated = articulated
+        self.bodies = self.bodies._replace(motion=np.zeros(((3 if articulated else 1) * self.count, 6)))
 
     def forget_places(self) -> None:
         """Have neighbours looked for anew at the next step."""
@@ -150,7 +209,7 @@ class World:
         links = self.count * self.each
         capacity = max(capacity, 12 * links + 256, len(self.pairs.first))
         if capacity > len(self.pairs.first):
-            grown = (_longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near"))
+            grown = (longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near"))
             first, second, slip, used, near = grown
             self.pairs = self.pairs._replace(first=first, second=second, slip=slip, used=used, near=near)
         longest = [self.shape.tip, 2 * self.shape.end, self.shape.tip]
@@ -177,7 +236,7 @@ class World:
         made: int = advance(
             steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
             self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
-            self.ledger, self.out, self.row, self.totals,
+            self.hooks, self.rims, self.channel, self.cords, self.ledger, self.out, self.row, self.totals,
         )  # fmt: skip
         return made
 
@@ -216,6 +275,84 @@ class World:
         return State(boxes, bodies.position[:, None] + arms, frames, velocities, motion[..., 3:].copy())
 
 
+    def look(self) -> Contacts:
+        """All contacts at this instant; nothing of the simulation is changed.
+
+        The wide list tells who is near whom. It has room for what the last step has moved, but does not know of
+        smarticles that were added since.
+        """
+        bodies, n = self.posed(), self.count
+        touches, depths, held = np.zeros(n, np.int64), np.zeros(n), np.zeros((n, 6), np.bool_)
+        met = np.zeros((self.pairs.counts[0], 2), np.int32)
+        stiffness = self.laws[0].stiffness
+        count, energy = look_at_pairs(self.shape, bodies, self.pairs, stiffness, met, touches, depths, self.out)
+        energy += look_at_fixtures(
+            self.shape, bodies, self.ground, self.channel, self.hooks, self.rims, self.laws[1].stiffness,
+            touches, held, depths, self.out,
+        )  # fmt: skip
+        sheared = [self.pairs.slip[: self.pairs.counts[0]], self.ends.slip]
+        sheared += [more.slip for more in (self.hooks, self.rims) if more is not None]
+        energy += sum(float(slip[..., 3].sum()) for slip in sheared)
+        return Contacts(met[:count].astype(np.int64), touches, depths, held, energy)
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All arrays that `restore` needs."""
+        found: dict[str, NDArray[Any]] = {"totals": self.totals, "fast": self.skins}
+        pairs, near = int(self.pairs.counts[0]), int(self.pairs.counts[1])
+        for group, values in self._groups().items():
+            for name, array in values._asdict().items():
+                if isinstance(array, np.ndarray):
+                    found[f"{group}.{name}"] = array
+        for name in ("first", "second", "slip", "used"):
+            found[f"pairs.{name}"] = getattr(self.pairs, name)[:pairs]
+        found["pairs.near"] = self.pairs.near[:near]
+        return found
+
+    def _groups(self) -> dict[str, Any]:
+        groups = {
+            "bodies": self.bodies,
+            "pairs": self.pairs,
+            "ends": self.ends,
+            "ground": self.ground,
+            "hooks": self.hooks,
+            "rims": self.rims,
+            "cords": self.cords,
+        }
+        return {name: group for name, group in groups.items() if group is not None}
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs besides the arrays."""
+        return {
+            "steps": self.steps,
+            "time_step": self.time_step,
+            "begin": self.begin,
+            "made": self.made,
+            "articulated": self.articulated,
+        }
+
+    def restore(self, arrays: dict[str, NDArray[Any]], memory: Mapping[str, Any]) -> None:
+        """Go on from where `arrays` and `memory` were taken."""
+
+        def group(kind: Any, name: str) -> Any:
+            return kind(**{field: arrays[f"{name}.{field}"] for field in kind._fields})
+
+        self.steps, self.time_step, self.begin, self.made, self.articulated = (
+            memory[name] for name in ("steps", "time_step", "begin", "made", "articulated")
+        )
+        self.totals, self.skins = arrays["totals"], arrays["fast"]
+        self.bodies, self.pairs, self.ends = group(Bodies, "bodies"), group(Pairs, "pairs"), group(Ends, "ends")
+        fixed = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
+        self.ground = self.ground._replace(**fixed)
+        self.hooks = group(Hooks, "hooks") if "hooks.slip" in arrays else None
+        self.rims = group(Rims, "rims") if "rims.slip" in arrays else None
+        self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
+        self.make_room()
+
+
 def quaternion_of(matrix: Array) -> Array:
     """(4,) unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
     m = matrix
@@ -233,7 +370,7 @@ def quaternion_of(matrix: Array) -> Array:
     return unit
 
 
-def _longer(array: NDArray[Any], length: int) -> NDArray[Any]:
+def longer(array: NDArray[Any], length: int) -> NDArray[Any]:
     """The array with zeros appended up to a length."""
     more = np.zeros((length - len(array), *array.shape[1:]), array.dtype)
     return np.concatenate([array, more])

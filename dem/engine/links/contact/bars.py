@@ -13,7 +13,7 @@ from typing import Any
 from dem.engine.links.arrays import LOWER, Array, Bodies, Ground, Hooks, Law
 from dem.engine.links.compiler import part
 from dem.engine.links.shape import Shape
-from dem.engine.links.walls import rub
+from dem.engine.links.contact.walls import rub
 
 TURNS = 60  # of a search that ends when it has the answer to the last digit, mostly after three
 FINE = 1e-15
@@ -70,7 +70,7 @@ def nearest_to_box(x: float, y: float, z: float, link: Array, half: Array) -> fl
 
 @part
 def meet_bar(x: float, y: float, z: float, link: Array, half: Array, radius: float, stiffness: float, out: Array) -> int:
-    """Points of contact of a link with a bar, and the springs there, as `dem.engine.links.meeting.meet` has them.
+    """Points of contact of a link with a bar, and the springs there, as `dem.engine.links.contact.meeting.meet` has them.
 
     Args:
         x: start of the link's axis, from the middle of the bar [m].

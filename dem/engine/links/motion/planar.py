@@ -24,12 +24,6 @@ from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
 
-# A row of a smarticle's plane geometry, see `lay_out`.
-COM, BARB1, BARB2, U1, U2, D1, D2 = 0, 2, 4, 6, 8, 10, 12
-IXX, IYY, IZZ, IXY, B1, B2, A11, A12 = 14, 15, 16, 17, 18, 19, 20, 21
-PLANE = 22
-
-
 @kernel
 def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
     """Work out the plane geometry of one smarticle.

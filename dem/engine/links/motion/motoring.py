@@ -19,8 +19,8 @@ import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
-from dem.engine.links.poses import SLIP, along_normal, turn_axes
+from dem.engine.links.motion.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
+from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
 HALT, STALL = range(2)
@@ -86,6 +86,23 @@ def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
             if motors.law < SLIP:
                 motors.momentum[i, k] = p[k]
     motors.elapsed[0] = 0.0
+
+
+@kernel
+def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
+    """Work of all motors up to now [J]; poses are brought up, nothing else is written."""
+    total = 0.0
+    for i in range(bodies.position.shape[0]):
+        row = bodies.plane[i]
+        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], row)
+        turn_axes(bodies, i)
+        p = momenta(row, along_normal(bodies, i), bodies.rate[i, 0], bodies.rate[i, 1])
+        for k in range(2):
+            total += motors.work[i, k]
+            if motors.law < SLIP and motors.elapsed[0] > 0.0:
+                impulse = p[k] - motors.momentum[i, k] - motors.impulse[i, k]
+                total += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / motors.elapsed[0]
+    return total
 
 
 @kernel

@@ -11,8 +11,8 @@ from typing import Any
 
 from dem.engine.links.arrays import CHANNEL, FLOOR, SURFACES, WALL, Array, Bodies, Ends, Ground, Law
 from dem.engine.links.compiler import part
-from dem.engine.links.law import resist
-from dem.engine.links.pairs import push, put_down
+from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.pairs import push, put_down
 from dem.engine.links.shape import Shape
 
 

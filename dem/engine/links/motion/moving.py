@@ -13,9 +13,9 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import part
-from dem.engine.links.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
-from dem.engine.links.planar import rates, spin_of
-from dem.engine.links.poses import SLIP, along_normal
+from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
+from dem.engine.links.motion.planar import rates, spin_of
+from dem.engine.links.motion.poses import SLIP, along_normal
 from dem.engine.links.shape import Shape
 
 
@@ -25,7 +25,7 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `velocity` and `momentum` are written.
+        bodies: the smarticles; `velocity`, `momentum` and `deepest` are written.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
@@ -40,6 +40,12 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
         momentum[i, 0] += across * dt * load[i, 3]
         momentum[i, 1] += across * dt * load[i, 4]
         momentum[i, 2] += dt * load[i, 5]
+        # Who moves by more than a radius in a step may pass through a link unseen: counted as that deep a contact.
+        squared = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
+        turning = bodies.spin[i, 0] ** 2 + bodies.spin[i, 1] ** 2 + bodies.spin[i, 2] ** 2
+        stride = dt * (math.sqrt(squared) + shape.reach * math.sqrt(turning))
+        if stride > shape.radius:
+            bodies.deepest[i] = max(bodies.deepest[i], stride)
         if motors is not None:
             q1, q2 = contact_torques(shape, bodies, i)
             if motors.law < SLIP:

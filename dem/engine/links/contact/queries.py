@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from dem.engine.links.arrays import LOWER, WALL, Array, Bodies, Ground, Indices, Pairs
-from dem.engine.links.bars import meet_bar
+from dem.engine.links.contact.bars import meet_bar
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.meeting import ENERGY, POINTS, meet
-from dem.engine.links.rims import nearest_to_circle
+from dem.engine.links.contact.meeting import ENERGY, POINTS, meet
+from dem.engine.links.contact.rims import nearest_to_circle
 from dem.engine.links.shape import Shape
 
 
@@ -132,7 +132,7 @@ def depth_at(
 ) -> tuple[int, float]:
     """How deep an end of a link is in one of the surfaces that it can touch.
 
-    The same geometry as in `dem.engine.links.walls`, which adds forces.
+    The same geometry as in `dem.engine.links.contact.walls`, which adds forces.
 
     Returns:
         The part, and the depth [m]; not positive where they are apart.

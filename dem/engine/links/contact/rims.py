@@ -8,7 +8,7 @@ from typing import Any
 from dem.engine.links.arrays import WALL, Array, Bodies, Ground, Law, Rims
 from dem.engine.links.compiler import part
 from dem.engine.links.shape import Shape
-from dem.engine.links.walls import rub
+from dem.engine.links.contact.walls import rub
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SAMPLES, TURNS = 8, 32  # places along a link that are tried, and narrowings about the best: to 2e-7 of its length
@@ -56,7 +56,7 @@ def nearest_to_circle(link: Array, radius: float, height: float) -> float:
 def push_rims(
     shape: Shape, law: Law, bodies: Bodies, ground: Ground, rims: Rims, hinged: Any, ledger: Any, dt: float
 ) -> float:
-    """Add the forces of the rims on links between their ends; the ends meet them as `dem.engine.links.walls` says.
+    """Add the forces of the rims on links between their ends; the ends meet them as `dem.engine.links.contact.walls` says.
 
     Args:
         shape: what all smarticles have in common.

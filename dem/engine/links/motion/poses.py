@@ -6,7 +6,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Bodies
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.planar import lay_out, rates, spin_of
+from dem.engine.links.motion.planar import lay_out, rates, spin_of
 from dem.engine.links.shape import Shape
 
 

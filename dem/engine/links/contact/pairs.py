@@ -6,9 +6,9 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
 from dem.engine.links.compiler import part
-from dem.engine.links.law import resist
-from dem.engine.links.meeting import BARE, POINTS, meet
-from dem.engine.links.nearest import nearest_on_segments
+from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.meeting import BARE, POINTS, meet
+from dem.engine.links.contact.nearest import nearest_on_segments
 from dem.engine.links.shape import Shape
 
 

@@ -26,7 +26,7 @@ import math
 
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import part
-from dem.engine.links.nearest import nearest_on_segments
+from dem.engine.links.contact.nearest import nearest_on_segments
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
 POINTS, BARE = 3, 6

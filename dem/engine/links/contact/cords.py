@@ -7,7 +7,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Bodies, Cords
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.pairs import push
+from dem.engine.links.contact.pairs import push
 from dem.engine.links.shape import Shape
 
 
