@@ -1,13 +1,12 @@
 """Synthetic strain tests of a chain in a plane: the pulled string's force is a given function of the strain."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic import SyntheticRun, write_run
+from synthetic import SyntheticRun, write_manifest, write_run
 from synthetic.series import write_series
 
 LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
@@ -18,22 +17,21 @@ def write_strained_run(directory: Path, force: Callable[[NDArray[np.float64]], N
     """A whole run of one phase that strains a chain; `force` [N] of strains [-]."""
     run = SyntheticRun(count=2, phases=("strain",))
     write_run(directory, run)
-    manifest = json.loads((directory / "run.json").read_text())
-    (directory / "run.json").write_text(json.dumps(manifest | {"planar": True, "channel_width_m": 0.08}))
+    write_manifest(directory, run, planar=True, channel_width=0.08)
     times = np.arange(1, round(run.durations["strain"] / INTERVAL) + 1) * INTERVAL
     strains = SPEED * (times - times[0]) / LENGTH
     pulled = np.zeros((len(times), 3))
     pulled[:, 0] = force(strains)
     columns = {
-        "time_s": (times, "s"),
-        "phase": (np.zeros(len(times), dtype=np.int64), "1"),
-        "string_pulled_force_N": (pulled, "N"),
-        "string_fixed_force_N": (-pulled, "N"),
-        "channel_lower_force_N": (np.zeros_like(pulled), "N"),
-        "channel_upper_force_N": (np.zeros_like(pulled), "N"),
-        "pulled_m": (SPEED * times, "m"),
-        "chain_length_m": (LENGTH * (1 + strains), "m"),
-        "chain_width_m": (WIDTH * (1 + 0.1 * strains), "m"),
+        "time_s": times,
+        "phase": np.zeros(len(times), dtype=np.int64),
+        "string_pulled_force_N": pulled,
+        "string_fixed_force_N": -pulled,
+        "channel_lower_force_N": np.zeros_like(pulled),
+        "channel_upper_force_N": np.zeros_like(pulled),
+        "pulled_m": SPEED * times,
+        "chain_length_m": LENGTH * (1 + strains),
+        "chain_width_m": WIDTH * (1 + 0.1 * strains),
     }
     write_series(directory, columns, seed=run.seed)
     return directory

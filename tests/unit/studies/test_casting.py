@@ -9,7 +9,7 @@ from synthetic.released import stack, write_released
 
 from dem.errors import InputError
 from dem.record.manifest import read_run
-from postprocess.scene_file import read_tiers
+from postprocess.measures.mould import read_tiers
 from studies.base.procedures import PROCEDURE
 from studies.casting import figures as casting_figures
 from studies.casting.measure import (

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from synthetic import SyntheticRun, write_manifest
+from synthetic import SyntheticRun, write_ending, write_manifest
 from synthetic.series import write_series
 
 from dem.errors import InputError
@@ -31,27 +31,23 @@ WIDTH = 0.0520  # m, of the chain, in channels that are wider by 1/0.52 or 1/0.6
 def write_pull(directory: Path, *, variant: str, count: int, ratio: float, seed: int, stiffness: float) -> Path:
     """A chain whose force rises by `stiffness` [N] times the strain, to 0.4, and is gone."""
     directory.mkdir()
-    write_manifest(directory, SyntheticRun(name=variant, count=count, seed=seed, phases=("strain",)))
-    manifest = json.loads((directory / "run.json").read_text())
-    manifest |= {"planar": True, "channel_width_m": WIDTH / ratio}
-    (directory / "run.json").write_text(json.dumps(manifest))
-    timed = [{"index": 0, "type": "strain", "start_s": 0.0, "end_s": 5.0, "wall_s": 1.0, "cpu_s": 1.0}]
-    done = {"status": "done", "time_s": 5.0, "steps": 1000, "wall_s": 1.0, "phases": timed}
-    (directory / "done.json").write_text(json.dumps(done))
+    run = SyntheticRun(name=variant, count=count, seed=seed, phases=("strain",))
+    write_manifest(directory, run, planar=True, channel_width=WIDTH / ratio)
+    write_ending(directory, run.phases, [(0.0, 5.0)], status="done", wall=1.0)
     scene = {"schema_version": 1, "phases": [{"type": "strain", "speed_m_per_s": 0.02}]}
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
     strains = np.linspace(0, 0.5, 2501)
     forces = np.where(strains <= 0.4, stiffness * strains, 0.0)
     along = np.stack([forces, 0 * forces, 0 * forces], axis=1)
     columns = {
-        "time_s": (strains * 10, "s"),
-        "phase": (np.zeros(len(strains), dtype=np.int64), "1"),
-        "string_pulled_force_N": (along, "N"),
-        "string_fixed_force_N": (-along, "N"),
-        "channel_lower_force_N": (0 * along, "N"),
-        "channel_upper_force_N": (0 * along, "N"),
-        "chain_length_m": (0.2 * (1 + strains), "m"),
-        "chain_width_m": (np.full(len(strains), WIDTH), "m"),
+        "time_s": strains * 10,
+        "phase": np.zeros(len(strains), dtype=np.int64),
+        "string_pulled_force_N": along,
+        "string_fixed_force_N": -along,
+        "channel_lower_force_N": 0 * along,
+        "channel_upper_force_N": 0 * along,
+        "chain_length_m": 0.2 * (1 + strains),
+        "chain_width_m": np.full(len(strains), WIDTH),
     }
     write_series(directory, columns, seed=seed)
     return directory

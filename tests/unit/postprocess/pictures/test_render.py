@@ -14,9 +14,9 @@ from dem.record.frames import read_frames
 from dem.record.manifest import read_run
 from postprocess.pictures import film
 from postprocess.pictures.camera import VIEWS, Look, extent, fitted_camera
+from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
 from postprocess.pictures.render import render_film, render_run
-from postprocess.pictures.stage import link_boxes
 from postprocess.pictures.surroundings import read_surroundings
 from postprocess.report import figures
 
