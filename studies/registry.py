@@ -36,7 +36,7 @@ def shipped(name: str) -> Shipped:
         InputError: There is none of this name.
     """
     if name not in STUDIES:
-        from templates.sweep.texts import nearest  # noqa: PLC0415  (of no use to who knows the name)
+        from dem.errors import nearest  # noqa: PLC0415
 
         msg = f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}"
         raise InputError(msg)

@@ -18,14 +18,13 @@ import numpy as np
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.advice import warnings_of
-from dem.plan.steps import time_steps
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_text
 from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
 from dem.record.names import DONE, FAILED, SCENE
 from dem.record.progress import ProgressWriter
 from dem.record.rundir import claimed, log_of, recorded_scene_hash
-from dem.run.build import build_engine, build_recorder
+from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import dump_scene, scene_hash
 from dem.scene.scene import Scene
@@ -48,7 +47,9 @@ class RunOutcome:
     wall_s: float
 
 
-def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False) -> RunOutcome | None:
+def run_scene(
+    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+) -> RunOutcome | None:
     """Run a scene into a run directory.
 
     Args:
@@ -57,6 +58,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         command: the command line, for the manifest.
         progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
+        builders: what makes its parts; by default what a run has.
 
     Returns:
         The outcome; None where the run was done already and there was nothing to resume.
@@ -67,8 +69,8 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
-    steps, kind = time_steps(scene), engine_kind(scene.engine)
-    made_by = (kind.name, kind.version())
+    builders, kind = builders or Builders(), engine_kind(scene.engine)
+    steps, made_by = builders.steps(scene), (kind.name, kind.version())
     with claimed(out, resume=resume):
         if resume and (out / DONE).exists():
             return None
@@ -81,7 +83,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, steps=steps, made_by=made_by, progress=progress, resume=resume)
+            return _run(scene, out, log, builders, steps=steps, made_by=made_by, progress=progress, resume=resume)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -98,6 +100,7 @@ def _run(
     scene: Scene,
     out: Path,
     log: logging.Logger,
+    builders: Builders,
     *,
     steps: Sequence[float],
     made_by: tuple[str, str],
@@ -107,11 +110,11 @@ def _run(
     bar = ProgressWriter(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
-        engine = build_engine(scene, min(steps))
+        engine = builders.engine(scene, min(steps))
         simulation = Simulation(
             scene=scene,
             engine=engine,
-            recorder=build_recorder(scene, out, bar),
+            recorder=builders.recorder(scene, out, bar),
             folder=out,
             log=log,
             made_by=made_by,

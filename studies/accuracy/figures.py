@@ -41,7 +41,7 @@ def draw(path: Path, *, table: pd.DataFrame, footer: Sequence[str]) -> list[Path
 
     Args:
         path: Without suffix.
-        table: See `accuracy_runs.work_precision`.
+        table: See `measure.work_precision`.
         footer: Origin, one statement each.
 
     Returns:

@@ -61,8 +61,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: Means over seeds, see `release_runs.means`.
-        runs: Rows of `casting_runs.casting_row`.
+        points: Means over seeds, see `base.release.means`.
+        runs: Rows of `measure.casting_row`.
         manifests: The runs.
         footer: Origin, one statement each.
 

@@ -35,7 +35,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        runs: Rows of `casting_runs.casting_row`.
+        runs: Rows of `measure.casting_row`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _pour_fills,

@@ -47,9 +47,9 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `chain_runs.points`.
-        runs: See `chain_runs.chain_row`.
-        changes: See `chain_findings.sensitivity`.
+        points: See `measure.points`.
+        runs: See `measure.chain_row`.
+        changes: See `findings.sensitivity`.
         manifests: The runs.
         footer: Origin, one statement each.
 

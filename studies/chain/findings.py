@@ -41,7 +41,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        runs: See `chain_runs.chain_row`.
+        runs: See `measure.chain_row`.
     """
     base = runs[runs[VARIANT] == BASELINE]
     inside, wide = base[base[CONFINEMENT].between(*RANGE)], f"h/H {RANGE[0]:g} to {RANGE[1]:g}"
@@ -146,7 +146,7 @@ def sensitivity(runs: pd.DataFrame) -> pd.DataFrame:
     """What each variant changes against the baseline with the same chain and walls, trial by trial.
 
     Args:
-        runs: See `chain_runs.chain_row`.
+        runs: See `measure.chain_row`.
 
     Returns:
         One row per variant and quantity; changes are in per cent of the baseline's trial with the same servos.

@@ -46,9 +46,9 @@ def draw(
 
     Args:
         output: Folder.
-        rows: See `collapse_runs.collapse_rows`.
-        levels: See `collapse_law.levels`.
-        activations: See `collapse_law.activations`.
+        rows: See `measure.collapse_rows`.
+        levels: See `law.levels`.
+        activations: See `law.activations`.
         manifests: The runs.
         footer: Origin, one statement each.
 

@@ -39,7 +39,7 @@ def findings(rows: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, by the height `REMAINING`.
 
     Args:
-        rows: Of runs and definitions, see `collapse_runs.collapse_rows`.
+        rows: Of runs and definitions, see `measure.collapse_rows`.
     """
     table = activations(rows)
     return (_later_when_gentler(rows), _law(rows), _greatest_between(table), _as_gravish(table))

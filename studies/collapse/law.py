@@ -31,7 +31,7 @@ def levels(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per definition, aspect ratio and Γ: mean of ln(fτ) over seeds, with its error.
 
     Args:
-        rows: Of runs and definitions, see `collapse_runs.collapse_rows`.
+        rows: Of runs and definitions, see `measure.collapse_rows`.
 
     Returns:
         The table. Where a run gave a bound, the mean with it is a bound too, and has no error.

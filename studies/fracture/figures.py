@@ -81,8 +81,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `procedures_runs.points`.
-        runs: See `fracture_runs.fracture_row`.
+        points: See `base.procedures.points`.
+        runs: See `measure.fracture_row`.
         manifests: The runs, in any order.
         footer: Origin, one statement each.
 

@@ -43,7 +43,7 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        table: One row per run, see `fracture_runs.fracture_row`.
+        table: One row per run, see `measure.fracture_row`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _shape_change_strongest,

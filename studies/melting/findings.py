@@ -35,7 +35,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged by the runs whose wall goes at once; the last ones by those where it is lifted as well.
 
     Args:
-        runs: Rows of `melting_runs.measure_melting`.
+        runs: Rows of `measure.measure_melting`.
     """
     at_once = runs[runs[LIFT] == 0]
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (

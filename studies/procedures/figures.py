@@ -74,8 +74,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `procedures_runs.points`.
-        runs: See `procedures_runs.procedure_row`.
+        points: See `base.procedures.points`.
+        runs: See `measure.procedure_row`.
         manifests: The runs, in the order of the table.
         footer: Origin, one statement each.
 

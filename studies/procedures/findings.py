@@ -46,7 +46,7 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        table: See `procedures_runs.samples`.
+        table: See `measure.samples`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _rises,

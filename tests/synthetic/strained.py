@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from synthetic import SyntheticRun, write_manifest, write_run
@@ -13,11 +15,28 @@ LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
 WIDTH = 0.062
 
 
-def write_strained_run(directory: Path, force: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Path:
-    """A whole run of one phase that strains a chain; `force` [N] of strains [-]."""
-    run = SyntheticRun(count=2, phases=("strain",))
+def write_strained_run(
+    directory: Path,
+    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    channel: float = 0.08,
+    **changes: Any,
+) -> Path:
+    """A whole run of one phase that strains a chain.
+
+    Args:
+        directory: The run directory.
+        force: On the pulled string [N], of strains [-].
+        channel: Distance of the walls [m].
+        changes: Of the `SyntheticRun`.
+    """
+    run = SyntheticRun(phases=("strain",), **{"count": 2, **changes})
     write_run(directory, run)
-    write_manifest(directory, run, planar=True, channel_width=0.08)
+    write_manifest(directory, run, planar=True, channel_width=channel)
+    path = directory / "scene.yaml"
+    scene = yaml.safe_load(path.read_text())
+    scene["phases"][0]["speed_m_per_s"] = SPEED
+    path.write_text(yaml.safe_dump(scene))
     times = np.arange(1, round(run.durations["strain"] / INTERVAL) + 1) * INTERVAL
     strains = SPEED * (times - times[0]) / LENGTH
     pulled = np.zeros((len(times), 3))

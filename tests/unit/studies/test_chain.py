@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
-from synthetic import SyntheticRun, write_ending, write_manifest
-from synthetic.series import write_series
+from synthetic.strained import WIDTH, write_strained_run
 
 from dem.errors import InputError
 from postprocess.measures.strain import FRACTURE, PEAK, STIFFNESS
@@ -25,32 +23,12 @@ from studies.chain.measure import CONFINEMENT, COUNT, VARIANT
 from studies.chain.study import Chain
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}
-WIDTH = 0.0520  # m, of the chain, in channels that are wider by 1/0.52 or 1/0.65
 
 
-def write_pull(directory: Path, *, variant: str, count: int, ratio: float, seed: int, stiffness: float) -> Path:
+def write_pull(directory: Path, *, variant: str, ratio: float, stiffness: float, **run: Any) -> Path:
     """A chain whose force rises by `stiffness` [N] times the strain, to 0.4, and is gone."""
-    directory.mkdir()
-    run = SyntheticRun(name=variant, count=count, seed=seed, phases=("strain",))
-    write_manifest(directory, run, planar=True, channel_width=WIDTH / ratio)
-    write_ending(directory, run.phases, [(0.0, 5.0)], status="done", wall=1.0)
-    scene = {"schema_version": 1, "phases": [{"type": "strain", "speed_m_per_s": 0.02}]}
-    (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
-    strains = np.linspace(0, 0.5, 2501)
-    forces = np.where(strains <= 0.4, stiffness * strains, 0.0)
-    along = np.stack([forces, 0 * forces, 0 * forces], axis=1)
-    columns = {
-        "time_s": strains * 10,
-        "phase": np.zeros(len(strains), dtype=np.int64),
-        "string_pulled_force_N": along,
-        "string_fixed_force_N": -along,
-        "channel_lower_force_N": 0 * along,
-        "channel_upper_force_N": 0 * along,
-        "chain_length_m": 0.2 * (1 + strains),
-        "chain_width_m": np.full(len(strains), WIDTH),
-    }
-    write_series(directory, columns, seed=seed)
-    return directory
+    made: dict[str, Any] = {"channel": WIDTH / ratio, "name": variant, "frames_per_phase": 1, **run}
+    return write_strained_run(directory, lambda strains: np.where(strains <= 0.4, stiffness * strains, 0.0), **made)
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +85,7 @@ def test_means_over_trials_are_those_put_in(runs: list[Path], tmp_path: Path, dr
         "strain at fracture": "0.400 ± 0.000",
         "strain at the yield drop": "-",
         "stiffness [N]": "3.00 ± 0.03",
-        "widening": "0.000 ± 0.000",
+        "widening": "0.040 ± 0.000",  # a tenth of the strain
         "wall force [N]": "0.00 ± 0.00",
     }
     assert len(drawn) == 1

@@ -300,7 +300,6 @@ def test_scene_that_does_not_fit_its_run(tmp_path, text, cause):
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        ({"fidelity": "standard"}, "different fidelity must not be averaged"),
         ({"count": 9}, "different count must not be averaged"),
         ({"shake_time": 20.0}, "different duration must not be averaged: .* external for 5 s, .* external for 20 s"),
         ({"seed": 1}, "point = external l/w 0.7 with seed 1 is given twice"),

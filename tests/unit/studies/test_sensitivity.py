@@ -148,11 +148,6 @@ def test_baseline_without_a_finished_run_leaves_no_changes(study, tmp_path):
 @pytest.mark.parametrize(
     ("name", "made", "message"),
     [
-        (
-            "x_seed1",
-            {"fidelity": "standard"},
-            "different fidelity must not be averaged: .* is draft, .*x_seed1 is standard",
-        ),
         ("x_seed1", {"aspect_ratio": 0.5}, "different l/w must not be averaged: .* is 0.7, .*x_seed1 is 0.5"),
         ("x_seed1", {"count": 9}, "different count must not be averaged: .* is 12 smarticles, .* is 9 smarticles"),
         ("a/draft_seed1", {}, r"variant = draft with seed 1 is given twice, .*draft_seed1 and .*a/draft_seed1"),
@@ -178,8 +173,3 @@ def test_run_of_another_name_is_listed_as_unusable(study, tmp_path, name, cause)
     (missing,) = report.missing
     assert missing.status == "unusable"
     assert cause in missing.cause
-
-
-def test_no_finished_run_is_an_error(study, tmp_path):
-    with pytest.raises(InputError, match="study sensitivity: none of 1 runs is done"):
-        Sensitivity("sensitivity").analyse(study[1][-1:], tmp_path / "out", **ORIGIN)

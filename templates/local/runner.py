@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import IO, Literal, Protocol
 
 from templates.local.estimate import PhaseClock, time_left
+from templates.sweep.files import read_json
 from templates.sweep.folder import Entry, Folder
-from templates.sweep.texts import read_json
 
 Ending = Literal["done", "kept", "failed", "interrupted"]
 
@@ -53,7 +53,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Progress:
+class Standing:
     """Where a run that is being computed stands; None is unknown.
 
     Args:
@@ -92,7 +92,7 @@ class Snapshot:
     total: int
     ended: int
     failed: int
-    running: tuple[Progress, ...]
+    running: tuple[Standing, ...]
     left_s: float
 
 
@@ -298,7 +298,7 @@ class _Runner:
             if not self.active:
                 return
 
-    def _progress(self, run: _Active) -> Progress:
+    def _progress(self, run: _Active) -> Standing:
         said = read_json(self.folder.run(run.entry) / "progress.json") or {}
 
         def number(key: str) -> float | None:
@@ -307,7 +307,7 @@ class _Runner:
 
         phase, wall_s = said.get("phase"), run.wall_s
         time_s, end_s = number("time_s"), number("end_s")
-        return Progress(
+        return Standing(
             name=run.entry.name,
             wall_s=wall_s,
             expected_s=run.entry.expected_s,

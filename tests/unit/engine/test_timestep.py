@@ -53,7 +53,7 @@ def test_less_damping_rebounds_faster() -> None:
 
 def test_elastic_contact_has_no_damping(make_scene: MakeScene) -> None:
     assert damping_ratio(1.0) == 0
-    law = contact_law(make_scene({"contact.restitution": 1}))
+    law = contact_law_of(make_scene({"contact.restitution": 1}))
     assert (law.normal_damping, law.wall_damping) == (0, 0)
 
 

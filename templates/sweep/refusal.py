@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from templates.sweep.texts import nearest
+from dem.errors import nearest
 
 Models = Mapping[tuple[str, ...], type[BaseModel]]
 """Place in the file -> its model; `*` stands for any name."""
@@ -29,7 +29,7 @@ def explain(error: ValidationError, path: Path, models: Models, advice: str) -> 
     place = tuple(str(step) for step in first["loc"])
     key = ".".join(place) or "the file"
     if first["type"] == "extra_forbidden":
-        return f"{path}: {key}: unknown key; {nearest(place[-1], _keys(_model_of(place[:-1], models)))}"
+        return f"{path}: {key}: unknown key; {nearest(place[-1], sorted(_keys(_model_of(place[:-1], models))))}"
     if first["type"] == "missing":
         return f"{path}: {key}: missing; add it ({advice})"
     text = re.sub(r"^Value error, ", "", first["msg"])

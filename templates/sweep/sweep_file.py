@@ -25,11 +25,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.yaml_text import parse_yaml
-from templates.sweep.explain import Models, explain
+from templates.sweep.files import IDENTIFIER, parse_table, read_text
+from templates.sweep.refusal import Models, explain
 from templates.sweep.render import Value
-from templates.sweep.texts import IDENTIFIER, nearest, parse_table, read_text
 
 SEED = "seed"
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
@@ -200,7 +200,7 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
     """
     for name in constants:
         if name not in sweep.content.constants:
-            msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sweep.content.constants)}"
+            msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sorted(sweep.content.constants))}"
             raise InputError(msg)
     content = sweep.content.model_copy(update={"constants": {**sweep.content.constants, **constants}})
     return replace(sweep, content=content)
@@ -221,7 +221,7 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
             raise InputError(msg) from error
     for column, wanted in table.only.items():
         if column not in rows[0]:
-            msg = f"{path}: points.table.only.{column}: no such column; {nearest(column, rows[0])}"
+            msg = f"{path}: points.table.only.{column}: no such column; {nearest(column, sorted(rows[0]))}"
             raise InputError(msg)
         present = [row[column] for row in rows]
         for value in wanted:

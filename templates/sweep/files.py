@@ -1,13 +1,11 @@
-"""Text files in: CSV read strictly, JSON if it is there; words that are meant."""
+"""Text files in: CSV read strictly, JSON if it is there."""
 
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import json
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -66,15 +64,6 @@ def _cell(text: str) -> int | float | str:
         except ValueError:
             continue
     return text
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """`did you mean …` where a known word is close, else the list of known words."""
-    words = sorted(known)
-    close = difflib.get_close_matches(word, words, n=1)
-    if close:
-        return f"did you mean {close[0]!r}?"
-    return f"known: {', '.join(words) or 'none'}"
 
 
 def read_json(path: Path) -> dict[str, Any] | None:

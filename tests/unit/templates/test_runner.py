@@ -15,7 +15,7 @@ import pytest
 from sweep_cases import MakeFolder
 
 from dem.errors import InputError
-from templates.local.local import (
+from templates.local.runner import (
     Outcome,
     RunCommand,
     Snapshot,

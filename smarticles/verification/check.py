@@ -1,8 +1,41 @@
-"""One thing that a case checks: what was measured, and the limit that it must keep."""
+"""What a case says: checks, each good or not."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """One quantity, measured and in theory: a check whose answer is on paper.
+
+    Args:
+        quantity: what it is.
+        unit: of it.
+        theory: the answer on paper [unit].
+        measured: what the engine gave [unit].
+        tolerance: largest error that passes, relative to the scale [1].
+        reason: of the tolerance.
+        scale: what the error is relative to [unit]; 0: the theory itself.
+    """
+
+    quantity: str
+    unit: str
+    theory: float
+    measured: float
+    tolerance: float
+    reason: str
+    scale: float = 0.0
+
+    @property
+    def error(self) -> float:
+        """(measured − theory) / scale [1]."""
+        return (self.measured - self.theory) / (self.scale or abs(self.theory))
+
+    @property
+    def good(self) -> bool:
+        """Whether the error is within the tolerance; a NaN is not."""
+        return abs(self.error) <= self.tolerance
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+"""The links engine: what is asked of it before there is a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numba
+
+from dem.body.particle import Particle, SphereChain, mean_width
+from dem.engine.demand import Demand
+from dem.engine.effect import Adds, EffectName
+from dem.engine.links.adds import ADDS, ORDER
+from dem.engine.links.compiler import stamp
+from dem.engine.links.engine import LinksEngine
+from dem.engine.links.stable_step import links_stable_time_step
+from dem.physics.contact import ContactLaw, contact_law
+from dem.physics.motor import MotorLaw
+
+# Spheres that stand for the swept segments where poses are drawn, and in pictures: so close that two of the chains
+# overlap by a thirtieth of a diameter at most before the segments do.
+PITCH = 0.35
+# Wall seconds per link, strand and step in a dense pile, one core, measured on a shaken pile of 270.
+COST_PER_LINK_STEP = 2.0e-7
+ARTICULATED_SHARE = 1.3
+
+
+class LinksKind:
+    """See `dem.engine.kinds.EngineKind`."""
+
+    name = "links"
+    damps_once_per_look = False
+
+    def version(self) -> str:
+        """See the interface: the sources' own hash, and the compiler."""
+        return f"{stamp()} (Numba {numba.__version__})"
+
+    def threads(self) -> int:
+        """See the interface."""
+        return 1
+
+    def adds(self, effect: EffectName) -> Adds:
+        """See the interface."""
+        return ADDS.get(effect, Adds())
+
+    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
+        """See the interface."""
+        return tuple(sorted(engines, key=ORDER.index))
+
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
+        """See the interface."""
+        return links_stable_time_step(
+            links_particle(scene),
+            contact_law_of(scene),
+            articulated=articulated,
+            free=articulated and scene.motor.law in ("slip", "servo"),
+            strings=scene.pulled_by,
+        )
+
+    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+        """See the interface."""
+        links = (3 if scene.smarticle.boxes.barb_length > 0 else 1) * scene.fidelity.rows**2
+        return COST_PER_LINK_STEP * links * scene.count * (ARTICULATED_SHARE if actuated else 1.0)
+
+    def build(self, scene: Demand, time_step: float) -> LinksEngine:
+        """See the interface."""
+        motor = scene.motor
+        return LinksEngine(
+            particle=links_particle(scene),
+            cylinder=scene.cylinder,
+            law=contact_law_of(scene),
+            gravity=scene.gravity_m_per_s2,
+            time_step=time_step,
+            shaken=scene.calls_for(EffectName.CONTAINER_MOTION),
+            motor_law=MotorLaw(
+                torque_limit=scene.torque_limit,
+                speed_limit=motor.speed_limit_rad_per_s,
+                stiffness=motor.stiffness_N_m_per_rad,
+                law=motor.law,
+                damping=motor.damping_N_m_s_per_rad,
+            )
+            if scene.actuates
+            else None,
+            account=scene.recording.dissipation_interval_s is not None,
+            hooks=None if scene.hooks is None else scene.hooks.crosses,
+            channel=scene.channel,
+            strengths=scene.motor_strengths,
+        )
+
+
+def links_particle(scene: Demand) -> Particle:
+    """One smarticle: the limit of ever finer chains, one strand of the mean width or several of t2.
+
+    A smooth round bar touches others at its own diameter, which chains of spheres do not: they need a thicker one.
+    """
+    smarticle, fidelity = scene.smarticle, scene.fidelity
+    thick, thin = smarticle.thickness_normal_m, smarticle.thickness_in_plane_m
+    diameter = fidelity.diameter_m or (mean_width(thick, thin) if fidelity.rows == 1 else thin)
+    return Particle(smarticle.boxes, SphereChain(rows=fidelity.rows, diameter=diameter, pitch=PITCH * diameter))
+
+
+def contact_law_of(scene: Demand) -> ContactLaw:
+    """The contact law of a scene, of one link with another."""
+    return contact_law(links_particle(scene), scene.contact, scene.fidelity.stiffness_N_per_m)
