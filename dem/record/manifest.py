@@ -264,7 +264,7 @@ def read_run(directory: Path | str) -> RunManifest:
         ARCHITECTURE.md, "The run directory".
 
     Example:
-        >>> read_run("runs/pile").status  # doctest: +SKIP
+        >>> read_run("runs/pile").status
         'done'
     """
     directory = Path(directory)

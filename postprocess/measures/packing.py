@@ -104,10 +104,11 @@ def packing_fraction(
         that one of its scripts applies. "voronoi": see `postprocess.geometry.voronoi`.
 
     Example:
-        >>> result = packing_fraction(  # doctest: +SKIP
-        ...     frame.vertices, radius=0.0234, solid_volume=1.783e-8, floor_z=frame.floor_z
-        ... )
-        >>> result.value, result.definition  # doctest: +SKIP
+        >>> from postprocess import read_frames
+        >>> frame = read_frames("runs/pile")[-1]
+        >>> result = packing_fraction(frame.vertices, radius=0.0234, solid_volume=1.783e-8, floor_z=frame.floor_z)
+        >>> round(result.value, 3), result.definition
+        (0.132, 'second-highest-com')
     """
     vertices = checked_vertices(vertices)
     if definition not in DEFINITIONS:

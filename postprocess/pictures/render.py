@@ -57,7 +57,8 @@ def render_run(
         RunError: This machine lacks the libraries to draw without a display.
 
     Example:
-        >>> render_run("runs/pile", color_by="height", view="oblique")  # doctest: +SKIP
+        >>> render_run("runs/pile", color_by="height", view="oblique").name
+        'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",), overwrite=overwrite)
     run = read_run(directory)

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import SyntheticRun, write_manifest
 
-from dem.errors import InputError
-from dem.record.manifest import RunManifest, read_run
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.bisection import least_reaching
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
@@ -20,7 +15,6 @@ from postprocess.statistics.findings import CRITERION, without_criterion
 from postprocess.statistics.pairs import compared, mean_difference, pairs, told_less
 from postprocess.statistics.points import averaged, marked, ordered, seeds_of, told_means, told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.runs import refuse_mixed_counts, refuse_mixture
 
 FORCE = "force [N]"
 
@@ -99,26 +93,6 @@ def test_one_must_be_clearly_beyond_each_of_the_others() -> None:
     assert compared({"a": far}, -1)[1] == "not found"
     ours, (_, verdict) = told_less({"a": far, "b": near}, ", "), compared({"a": far, "b": near}, 1)
     assert (", less b" in ours, verdict) == (True, "not resolved")
-
-
-def run(directory: Path, **what: object) -> RunManifest:
-    directory.mkdir()
-    write_manifest(directory, dataclasses.replace(SyntheticRun(), **what))  # type: ignore[arg-type]
-    return read_run(directory)
-
-
-def test_only_runs_of_one_group_must_be_alike(tmp_path: Path) -> None:
-    made = [
-        run(tmp_path / "a", aspect_ratio=0.4, count=12, seed=1),
-        run(tmp_path / "b", aspect_ratio=0.7, count=9, seed=1),
-        run(tmp_path / "c", aspect_ratio=0.7 + 1e-9, count=9, seed=2),
-    ]
-    refuse_mixed_counts("melting", made)
-    with pytest.raises(InputError, match=r"count must not be averaged: .*a is 12 smarticles, .*b is 9"):
-        refuse_mixture("melting", made, "count", lambda one: f"{one.count} smarticles")
-    other = run(tmp_path / "d", aspect_ratio=0.7, count=10, seed=3)
-    with pytest.raises(InputError, match=r"b is 9 smarticles at l/w 0.7, .*d is 10 smarticles at l/w 0.7; analyse"):
-        refuse_mixed_counts("melting", [*made, other])
 
 
 def test_figures_do_not_say_how_verdicts_come_about() -> None:

@@ -9,14 +9,12 @@ import postprocess
 from dem.errors import InputError
 from postprocess import (
     link_crossings,
-    mean_with_error,
     measure_run,
     packing_change,
     packing_fraction,
     read_frames,
     read_run,
     summarise_run,
-    write_table,
 )
 from postprocess.measures.packing import COSTLY_DEFINITIONS
 
@@ -46,46 +44,6 @@ def test_no_packing_fraction_where_no_one_cylinder_is_filled(make_run):
     assert table[PHI].isna().all()
     # A run that keeps its wall has no columns for a pile without one.
     assert not table.columns.str.contains("cluster|spread|sloughed|tilt").any()
-
-
-def test_mean_of_independent_samples():
-    samples = np.random.default_rng(1).normal(3.0, 2.0, 4000)
-    mean = mean_with_error(samples)
-    assert mean.value == samples.mean()
-    assert mean.standard_error == pytest.approx(2 / 4000**0.5, rel=0.15)
-    assert mean.count == 4000
-
-
-def test_error_allows_for_correlation():
-    # AR(1) with a = 0.8: correlation time (1 + a) / (1 - a) = 9 samples.
-    noise = np.random.default_rng(2).standard_normal(20000)
-    samples = np.zeros(20000)
-    for k in range(1, 20000):
-        samples[k] = 0.8 * samples[k - 1] + noise[k]
-    mean = mean_with_error(samples)
-    assert mean.effective_count == pytest.approx(20000 / 9, rel=0.2)
-    naive = samples.std(ddof=1) / 20000**0.5
-    assert mean.standard_error == pytest.approx(3 * naive, rel=0.1)
-
-
-def test_mean_of_few_samples():
-    assert mean_with_error([1.0, np.nan]).count == 1
-    assert np.isnan(mean_with_error([1.0]).standard_error)
-    assert np.isnan(mean_with_error([]).value)
-    assert mean_with_error([2.0, 2.0, 2.0]).standard_error == 0
-
-
-@pytest.mark.parametrize(
-    ("samples", "value"),
-    [([1.0, np.inf, 2.0], np.inf), ([np.inf], np.inf), ([-np.inf, 1.0, np.nan], -np.inf), ([np.inf, -np.inf], np.nan)],
-)
-def test_infinite_samples_have_an_infinite_mean_without_an_error(samples, value):
-    """Warnings are errors here: none may come of it."""
-    mean = mean_with_error(samples)
-    assert mean.value == pytest.approx(value, nan_ok=True)
-    assert np.isnan(mean.standard_error)
-    assert np.isnan(mean.effective_count)
-    assert mean.count == np.count_nonzero(~np.isnan(samples))
 
 
 def test_one_row_per_frame_with_every_measure(make_run):
@@ -235,45 +193,6 @@ def test_truncated_frame_stops_the_table(make_run):
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(InputError, match="frame_000001"):
         measure_run(directory)
-
-
-def test_table_comes_back_as_written(tmp_path, make_run):
-    table = measure_run(make_run(), definitions=CHEAP)
-    path = write_table(table, tmp_path / "table.csv")
-    pd.testing.assert_frame_equal(pd.read_csv(path), table, check_exact=True)
-    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
-
-
-def test_table_is_not_overwritten_unless_asked(tmp_path):
-    path = tmp_path / "table.csv"
-    write_table(pd.DataFrame({"a": [1]}), path)
-    with pytest.raises(InputError, match=r"table\.csv: it exists"):
-        write_table(pd.DataFrame({"a": [2]}), path)
-    assert path.read_text() == "a\n1\n"
-    write_table(pd.DataFrame({"a": [2]}), path, overwrite=True)
-    assert path.read_text() == "a\n2\n"
-
-
-class Unwritable:
-    def to_csv(self, file, **_):
-        file.write("half a ta")
-        message = "disk full"
-        raise OSError(message)
-
-
-def test_failed_write_leaves_the_old_table(tmp_path):
-    path = tmp_path / "table.csv"
-    path.write_text("old")
-    with pytest.raises(OSError, match="disk full"):
-        write_table(Unwritable(), path, overwrite=True)
-    assert path.read_text() == "old"
-    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
-
-
-@pytest.mark.parametrize("name", ["table.txt", "none/table.csv"])
-def test_table_that_cannot_be_placed(tmp_path, name):
-    with pytest.raises(InputError, match="cannot write table"):
-        write_table(pd.DataFrame({"a": [1]}), tmp_path / name)
 
 
 def test_summary_of_chosen_phases_is_that_of_all_of_them(run):
