@@ -32,9 +32,9 @@ bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard onset
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard figure
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard cases
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification onset
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification figure
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification cases
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
 	$(PYTEST) -m "not validation"

@@ -1,1 +1,49 @@
-"""The console command `smarticles`."""
+"""Smarticles: what a user imports. Nothing is loaded before it is used.
+
+    import smarticles
+
+    scene = smarticles.load_scene("scene.yaml", ["count=50"])
+    smarticles.run(scene, "runs/a")
+    done = smarticles.read("runs/a")
+    smarticles.measures.link_crossings(done.frames[-1].vertices)
+    smarticles.sweep("friction.yaml", "friction")
+
+The command line is `smarticles.main`. Types of these names are in `__init__.pyi`.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "InputError": "dem.errors",
+    "RunDirectory": "smarticles.public",
+    "RunError": "dem.errors",
+    "Scene": "dem.scene.scene",
+    "load_scene": "dem.scene.scene",
+    "read": "smarticles.public",
+    "run": "smarticles.public",
+    "sweep": "smarticles.public",
+}
+"""Public name: module that has it."""
+
+__all__ = [*_HOMES, "__version__", "measures"]  # noqa: PLE0604  (a list of strings, as a test says)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(import_module(_HOMES[name]), name)
+    elif name == "measures":
+        value = import_module("postprocess")
+    elif name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415  (slow to import)
+
+        value = version("smarticles")
+    else:
+        msg = f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}"
+        raise AttributeError(msg)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

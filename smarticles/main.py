@@ -13,14 +13,25 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from dem.errors import InputError, RunError
-from smarticles.commands import accuracy as commands_accuracy
-from smarticles.commands import results as commands_result
-from smarticles.commands import scenes as commands_run
-from smarticles.commands import study as commands_study
-from smarticles.commands import sweeps as commands_sweep
-from smarticles.commands import verify as commands_verify
+from smarticles.commands import (
+    accuracy,
+    doctor,
+    measure,
+    plan,
+    render,
+    resume,
+    run,
+    schema,
+    status,
+    study,
+    sweep,
+    verify,
+)
 from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
+
+COMMANDS = (run, plan, schema, doctor, measure, render, sweep, status, resume, study, accuracy, verify)
+"""In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
 
 FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
 
@@ -53,7 +64,7 @@ def build_parser() -> tuple[Parser, Commands]:
     parser.add_argument("--version", action="version", version=f"smarticles {release}")
     add_debug(parser)
     commands = Commands(parser)
-    for module in (commands_run, commands_result, commands_sweep, commands_study, commands_accuracy, commands_verify):
+    for module in COMMANDS:
         module.add(commands)
     return parser, commands
 

@@ -7,6 +7,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from dem.errors import InputError
@@ -91,6 +92,28 @@ def add_debug(parser: Parser, default: Any = False) -> None:
 def add_json(parser: Parser) -> None:
     """Add --json."""
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+
+
+def add_scene(parser: Parser) -> None:
+    """Add the scene and --set."""
+    parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
+    )
+
+
+def add_slots(parser: Parser) -> None:
+    """Add --jobs."""
+    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
+
+
+def add_overwrite(parser: Parser) -> None:
+    """Add --overwrite."""
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
 
 
 def positive_number(text: str) -> float:

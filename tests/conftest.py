@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 
 # The same cases on every machine, and no failure because a shared machine was slow.
 settings.register_profile("suite", derandomize=True, deadline=None, max_examples=25)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dem.errors import RunError
+from dem.record.names import partial
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
@@ -22,7 +23,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     Raises:
         RunError: the disk is full or the folder cannot be written; what was at `path` before is untouched.
     """
-    temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
+    temporary = path.with_name(partial(path.name))
     try:
         path.parent.mkdir(exist_ok=True)
         write(temporary)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dem.body.particle import LINKS, Particle
 from dem.body.state import State
-from dem.physics.motor import Motors
+from dem.record import names
 from dem.record.files import write_text, write_whole
 
 Array = NDArray[np.float64]
@@ -33,7 +33,9 @@ def frame_mesh(
     floor: float,
     phase: int,
     hinged: bool = False,
-    motors: Motors | None = None,
+    torques: NDArray[np.float64] | None = None,
+    work: NDArray[np.float64] | None = None,
+    halted: NDArray[np.bool_] | None = None,
 ) -> meshio.Mesh:
     """One frame as a mesh of lines.
 
@@ -44,7 +46,9 @@ def frame_mesh(
         floor: height of the container's floor [m].
         phase: index of the phase.
         hinged: whether the scene has hinges and motors at all.
-        motors: those of all smarticles while they are at work; None while welded.
+        torques: (N, 2) of the motors on the barbs [N m]; None while welded.
+        work: (N, 2) of the motors since the start [J]; None while welded.
+        halted: (N, 2) whether a motor is halted; None while welded.
     """
     n = state.count
     first = VERTICES * np.arange(n)[:, None] + np.arange(LINKS)
@@ -64,9 +68,9 @@ def frame_mesh(
         none = np.full((n, 2), np.nan)
         data |= {
             "angle_rad": _per_link(state.angles),
-            "motor_torque_N_m": _per_link(none if motors is None else motors.torques),
-            "motor_work_J": _per_link(none if motors is None else motors.work),
-            "halted": np.nan_to_num(_per_link(none if motors is None else motors.halted)).astype(np.int64),
+            "motor_torque_N_m": _per_link(none if torques is None else torques),
+            "motor_work_J": _per_link(none if work is None else work),
+            "halted": np.nan_to_num(_per_link(none if halted is None else halted)).astype(np.int64),
         }
     return meshio.Mesh(
         state.vertices.reshape(-1, 3),
@@ -111,7 +115,7 @@ class FrameWriter:
     """
 
     folder: Path
-    noun: str = "frame"
+    noun: str = names.FRAME
     times: list[float] = field(default_factory=list)
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
@@ -120,26 +124,23 @@ class FrameWriter:
         Raises:
             RunError: it cannot be written.
         """
-        name = self._name(len(self.times))
+        name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
-        write_text(self.folder / f"{self.noun}s.pvd", self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection())
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames only, of the given times [s]; later files are removed."""
         self.times = list(times)
-        kept = {self.folder / self._name(k) for k in range(len(self.times))}
-        for path in set((self.folder / f"{self.noun}s").glob("*.vtu")) - kept:
+        kept = {self.folder / names.member(self.noun, k) for k in range(len(self.times))}
+        for path in set((self.folder / names.folder(self.noun)).glob("*.vtu")) - kept:
             path.unlink()
-        write_text(self.folder / f"{self.noun}s.pvd", self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection())
 
     def _collection(self) -> str:
         rows = [
-            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(self._name(k))}/>'
+            f'    <DataSet timestep="{time:.9g}" group="" part="0" file={quoteattr(names.member(self.noun, k))}/>'
             for k, time in enumerate(self.times)
         ]
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
-
-    def _name(self, number: int) -> str:
-        return f"{self.noun}s/{self.noun}_{number:06d}.vtu"

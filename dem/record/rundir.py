@@ -13,8 +13,7 @@ from typing import Any
 
 from dem.errors import InputError, RunError
 from dem.record.files import write_json
-
-DONE, FAILED, MANIFEST, SCENE, LOCK = "done.json", "failed.json", "run.json", "scene.yaml", ".lock"
+from dem.record.names import DONE, FAILED, LOCK, LOG, MANIFEST, is_partial
 
 
 @contextmanager
@@ -32,7 +31,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not _is_partial(path.name))
+        held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))
     except OSError as error:
         msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
         raise InputError(msg) from None
@@ -67,11 +66,6 @@ def in_use(out: Path) -> bool:
     except OSError:
         return False  # nobody ever did, or it is not ours to look at
     return False
-
-
-def _is_partial(name: str) -> bool:
-    """Whether a file is one that a killed process had not finished writing, see `dem.record.files`."""
-    return name.startswith(".") and ".partial." in name
 
 
 def recorded_scene_hash(out: Path) -> str:
@@ -120,7 +114,7 @@ def log_of(out: Path) -> Iterator[logging.Logger]:
     log = logging.getLogger(f"smarticles.{out.resolve()}")
     log.setLevel(logging.INFO)
     log.propagate = False
-    handler = logging.FileHandler(out / "log.txt", encoding="utf-8")
+    handler = logging.FileHandler(out / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     log.addHandler(handler)
     try:

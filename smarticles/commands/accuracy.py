@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.commands.scenes import add_scene
 from smarticles.commands.study import compute_and_analyse
-from smarticles.commands.sweeps import add_slots, expected_wall_s, folder_of
 from smarticles.layout import columns
-from smarticles.parsing import Commands, positive_number
+from smarticles.parsing import Commands, add_scene, add_slots, positive_number
+from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
     from studies.accuracy.ladder import Ladder
@@ -131,7 +130,7 @@ def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Accuracy:
 
 
 def _expanded(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Expanded:
-    from dem.scene.scene import load_scene  # noqa: PLC0415
+    from dem.scene.reading import load_scene  # noqa: PLC0415
     from studies.accuracy.ladder import affordable, build_ladder, ladder_sweep, parse_knobs  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
-from smarticles.commands.sweeps import add_slots, compute, make_folder, refuse_failures
 from smarticles.layout import columns, told_results
-from smarticles.parsing import Commands
+from smarticles.parsing import Commands, add_slots
+from smarticles.sweeps import compute, make_folder, refuse_failures
 from studies import registry
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def compute_and_analyse(
         InputError: no run is finished and none is to be started.
         RunError: a run failed.
     """
-    outcomes = [] if arguments.analyse else compute(folder, arguments)
+    outcomes = [] if arguments.analyse else compute(folder, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished:
         msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
@@ -117,7 +117,7 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     Raises:
         InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
     """
-    from dem.setting.parts import FIDELITIES  # noqa: PLC0415
+    from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
 

@@ -15,8 +15,9 @@ from types import MappingProxyType
 import yaml
 
 from dem.errors import InputError
-from dem.scene.scene import Scene, parse_scene
-from dem.setting.parts import FIDELITIES, Fidelity
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE, Rung
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep import SEED, Sweep, SweepFile

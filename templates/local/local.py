@@ -245,7 +245,7 @@ class _Runner:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                env=_environment(),
+                env=environment(),
                 pass_fds=self.inherited,
                 # Ctrl-C at the terminal reaches this process only, which then asks each run once.
                 start_new_session=True,
@@ -334,7 +334,8 @@ class _Runner:
         )
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
+    """Variables of a process that runs one scene: one thread, and the code that this process uses."""
     environment = {**os.environ, **ONE_THREAD}
     # Runs start in another directory.
     paths = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100

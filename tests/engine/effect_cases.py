@@ -14,12 +14,13 @@ import h5py
 import meshio
 import numpy as np
 
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import time_step
-from dem.plan.effects import Adds, decide
+from dem.engine.effect import Adds
+from dem.engine.yade.engine import YadeEngine
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
+from dem.plan.steps import time_step
+from dem.run.build import build_engine
 from dem.run.recorder import Recorder
-from dem.run.run import build_engine
 
 # What every run directory holds, whatever the scene calls for.
 OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
@@ -32,7 +33,7 @@ def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     found: dict[str, set[Any]] = defaultdict(set)
     record = Recorder.record
 
-    def look(recorder: Recorder, engine: Engine, phase: int) -> None:
+    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
         record(recorder, engine, phase)
         _look(engine, found)
 
@@ -58,7 +59,7 @@ def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     }
 
 
-def _look(engine: Engine, found: dict[str, set[Any]]) -> None:
+def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
     omega = engine._omega
     found["engines"].add(tuple(type(one).__name__ for one in omega.engines))
     _, collider, loop, *_ = omega.engines
@@ -88,7 +89,7 @@ def calls_per_step(data: dict[str, Any], *, steps: int, moving: bool = False) ->
     engine = build_engine(scene, time_step(scene))
     cases.add(engine, (0, 0, 0.05))
     if moving:
-        engine.shake(amplitude=1e-4, frequency=30)
+        engine.fixtures.shake(amplitude=1e-4, frequency=30)
     engine.advance(3)
     counted: Counter[str] = Counter()
 
@@ -114,7 +115,7 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
         cases.pour(engine, scene, scene.count, radius=0.7 * scene.container.radius_m)
         engine.advance(200)
         if remove and lift is None:
-            engine.remove_wall()
+            engine.fixtures.remove_wall()
         elif remove:
             engine.fixtures.lift_wall(lift)
         engine.advance(steps)
@@ -141,5 +142,5 @@ def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     before, path = engine.account.elastic(), Path(out) / "engine.yade"
     engine.load(path, engine.save(path))
     after = engine.account.elastic()
-    engine.remove_wall()
+    engine.fixtures.remove_wall()
     return {"before": before, "after": after, "dissipated": engine.account.dissipated}

@@ -10,27 +10,27 @@ import numpy as np
 from cases import load, pour
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
-from dem.phases.stages import begin
-from dem.physics.stability import contact_law, time_step
+from dem.plan.steps import time_step
 from dem.record.progress import Progress
-from dem.record.series import SeriesWriter
-from dem.run.run import build_recorder
+from dem.run.build import build_recorder
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from smarticles.verification.bench import FLAT, add, advance_watched
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
 
-def build(scene: Scene, *, radius: float | None = None) -> Engine:
+def build(scene: Scene, *, radius: float | None = None) -> YadeEngine:
     cylinder = scene.cylinder
     if radius is not None:
         cylinder = type(cylinder)(radius=radius, height=cylinder.height, facets=cylinder.facets)
-    return Engine(
+    return YadeEngine(
         particle=scene.particle,
         cylinder=cylinder,
-        law=contact_law(scene),
+        law=contact_law_of(scene),
         gravity=scene.gravity_m_per_s2,
         time_step=time_step(scene),
         shaken=any(phase.type == "shake" for phase in scene.phases),
@@ -38,19 +38,19 @@ def build(scene: Scene, *, radius: float | None = None) -> Engine:
     )
 
 
-def damped(engine: Engine, damping: float) -> None:
+def damped(engine: YadeEngine, damping: float) -> None:
     """Cundall's damping, to bring things to rest; it is no part of the model."""
     engine._omega.engines[-1].damping = damping
 
 
-def mean_hook_forces(engine: Engine, steps: int) -> np.ndarray:
+def mean_hook_forces(engine: YadeEngine, steps: int) -> np.ndarray:
     """(2, 3) mean over steps, lower and upper hook."""
     before = engine.fixtures.hook_sums
     engine.advance(steps)
     return (engine.fixtures.hook_sums - before) / steps
 
 
-def elastic(engine: Engine) -> float:
+def elastic(engine: YadeEngine) -> float:
     """Energy in the springs of all contacts [J]."""
     total = 0.0
     for contact in engine._omega.interactions:
@@ -61,7 +61,7 @@ def elastic(engine: Engine) -> float:
     return total
 
 
-def energies(engine: Engine) -> dict[str, float]:
+def energies(engine: YadeEngine) -> dict[str, float]:
     state = engine.state()
     return {
         "kinetic": state.kinetic_energy,
@@ -115,12 +115,12 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     middle = standing.apply(engine.particle.centres[engine.particle.links == 1])[:, 0].mean()
     beside = upper.length / 2 + engine.particle.radius + 1e-4
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
-    before = engine.strain(limit)
+    before = engine.overlaps(limit)
     engine.fixtures.raise_upper(0.05)
     strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
-        strain = engine.strain(limit)
+        strain = engine.overlaps(limit)
     try:
         watchdog.check_depths(strain, time=engine.time)
         said = ""
@@ -165,7 +165,7 @@ def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, An
     }
 
 
-def _pour(engine: Engine, scene: Scene, count: int, settle: float) -> None:
+def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
     """A small pile, damped to rest."""
     hooks = [cross.obstacles(2 * scene.particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
     pour(engine, scene, count, np.concatenate([np.empty((0, 3)), *hooks]), engine.cylinder.inner_radius)
@@ -210,7 +210,7 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
         return sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
 
     contacts, before, state = with_wall(), energies(engine), engine.state()
-    engine.remove_wall()
+    engine.fixtures.remove_wall()
     after, same = energies(engine), engine.state()
     stale = with_wall()
     totals = [sum(after.values())]
@@ -288,7 +288,7 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(SeriesWriter(Path(), 1.0, {}, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, hooks=scene.hooks is not None).described),
     }
 
 
@@ -300,7 +300,7 @@ def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dic
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = begin(scene, 1)
+    stage = scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

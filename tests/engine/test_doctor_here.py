@@ -2,19 +2,19 @@
 
 import pytest
 
-from smarticles import doctor
+from smarticles import installation
 
 pytestmark = pytest.mark.engine
 
 
 def test_yade_computes() -> None:
-    check = doctor.check_yade()
+    check = installation.check_yade()
     assert check.ok, check.found
     assert check.found.endswith("a sphere falls")
 
 
 def test_pictures_are_drawn_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    check = doctor.check_pyvista()
+    check = installation.check_pyvista()
     assert check.ok, check.found
     assert "draws off-screen" in check.found

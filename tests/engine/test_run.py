@@ -21,7 +21,7 @@ import pytest
 import yaml
 from run_files import frame_files, series
 
-from dem.scene.scene import load_scene, scene_hash
+from dem.scene.reading import load_scene, scene_hash
 
 pytestmark = pytest.mark.engine
 
@@ -29,7 +29,7 @@ Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 ROOT = Path(__file__).resolve().parents[2]
 RUN = (
-    "import sys; from pathlib import Path; from dem.run.run import run_scene; from dem.scene.scene import load_scene\n"
+    "import sys; from pathlib import Path; from dem.run.run import run_scene; from dem.scene.reading import load_scene\n"
     "run_scene(load_scene(Path(sys.argv[1])), Path(sys.argv[2]), command='test', progress=False)"
 )
 TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dem.engine.effect import Adds
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.hinges import HINGE_MATERIAL, HingeLaw
+from dem.engine.yade.container import WALL_MATERIAL
+from dem.engine.yade.hinge_law import HingeLaw
+from dem.engine.yade.hinges import HINGE_MATERIAL
 from dem.engine.yade.library import Yade
-from dem.physics.stability import ContactLaw
-from dem.plan.effects import Adds
-from dem.setting.container import WALL_MATERIAL
+from dem.physics.contact import ContactLaw
 
 # In every step: contacts give forces, what is driven gets its velocity, then everything moves.
 ORDER = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "HarmonicMotionEngine", "NewtonIntegrator")
@@ -64,7 +65,7 @@ def add_engines(
 
     Args:
         yade: the simulation.
-        adds: what is to be made, see `dem.plan.effects`.
+        adds: what is to be made, see `dem.engine.yade.adds`.
         law: contact law.
         hinges: stiffness of the hinges, where there are any.
         gravity: g, downwards [m/s²].

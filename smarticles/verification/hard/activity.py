@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from smarticles.verification.bench import add
-from smarticles.verification.hard.check import Check, above, below, near, says
+from smarticles.verification.bench import add, look, lying, scene_of, watched
+from smarticles.verification.check import Check, above, below, near, says
 from smarticles.verification.hard.extremes import narrowest
-from smarticles.verification.hard.hand import load, look, lying, watched
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, turn
 
@@ -68,7 +67,7 @@ def no_room(out: Path, *, count: int, seconds: float) -> list[Check]:
 def jammed(out: Path, *, count: int, seconds: float) -> list[Check]:
     """l/w = 0.4 in a container of radius 0.7 w, into which a straight one, 0.9 w to either side, does not fit."""
     data = scene(shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4})
-    data["container"] = {"radius_m": 0.7 * load(data).smarticle.middle_length_m}
+    data["container"] = {"radius_m": 0.7 * scene_of(data).smarticle.middle_length_m}
     run = whole(data, out)
     return [*run.sound(), *_jammed(run)]
 
@@ -114,17 +113,17 @@ def oscillation(out: Path, *, seconds: float, count: int = 3) -> list[Check]:
         height = 3 * particle.reach * (k + 0.5) / 2 + lying(described)
         add(engine, (0, 0, height), Rotation.from_euler("zx", [1.1 * k, 0.2 * k]))
     engine.advance(round(0.15 / engine.time_step))
-    engine.articulate()
+    engine.motors.articulate()
     interval, centre = described.fidelity.control_interval_s, np.radians(described.smarticle.angles_deg)
     rows, said = [], None
     for n in range(1, round(seconds / interval) + 1):
         angle = math.radians(5) * math.sin(2 * math.pi * 8 * n * interval)
-        engine.actuate(np.tile(centre + angle, (count, 1)), interval)
+        engine.motors.actuate(np.tile(centre + angle, (count, 1)), interval)
         engine.advance(round(interval / engine.time_step))
         if n % 20 == 0:
             state = engine.state()
             height = state.potential_energy(engine.gravity, 0.0)
-            rows.append((n * interval, state.kinetic_energy, height, engine.joint_gaps().max()))
+            rows.append((n * interval, state.kinetic_energy, height, engine.motors.gaps().max()))
         if n % 500 == 0 and (said := look(engine, recorder)):
             break
     time, kinetic, height, gap = np.array(rows).T

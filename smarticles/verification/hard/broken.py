@@ -5,20 +5,17 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
-import dem.run.run
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.container import WALL_MATERIAL
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.physics.stability import stable_step
-from dem.record.rundir import FAILED
+from dem.plan.steps import stable_step
+from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
-from dem.setting.container import WALL_MATERIAL
-from smarticles.verification.bench import add, push
-from smarticles.verification.hard.check import Check, below, says
-from smarticles.verification.hard.hand import fastest, look, lying, watched
+from smarticles.verification.bench import add, fastest, look, lying, push, watched
+from smarticles.verification.check import Check, below, says
 from smarticles.verification.hard.runs import whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
 
@@ -45,7 +42,7 @@ def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]
         add(engine, (0, 0, lying(described) + 1e-5 + 3 * k * described.particle.radius))
     engine.advance(10)
     if articulated:
-        engine.articulate()
+        engine.motors.articulate()
     before = look(engine, recorder)
     _put(engine, what)
     try:
@@ -59,7 +56,7 @@ def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]
     return [Check("the look before says", before or "nothing", "nothing", before is None), says(said, expected)]
 
 
-def _put(engine: Engine, what: str) -> None:
+def _put(engine: YadeEngine, what: str) -> None:
     """Spoil the second smarticle, or its last link."""
     links = len(engine._assembly.bodies) // 3
     body = engine._omega.bodies[engine._assembly.bodies[2 * links - 1]].state
@@ -82,7 +79,7 @@ def _put(engine: Engine, what: str) -> None:
         body.pos = vector(*places[what])
 
 
-def _resting(out: Path, count: int) -> tuple[Engine, Recorder]:
+def _resting(out: Path, count: int) -> tuple[YadeEngine, Recorder]:
     """Smarticles in a low stack that has come to rest, and a recorder that has seen it."""
     described, engine, recorder = watched(scene(count=count), out)
     for k in range(count):
@@ -133,8 +130,7 @@ def soft(out: Path, *, stiffness: float) -> list[Check]:
 def wrong_step(out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
     """A time step above the stable one, slipped past the check: the run fails, and names its last checkpoint."""
     data = scene(swing(seconds), count=count, recording={"checkpoint_interval_s": 0.02})
-    with patch.object(dem.run.run, "time_steps", lambda scene: (_too_long(scene, factor),) * len(scene.phases)):
-        run = whole(data, out)
+    run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
     return [
         Check(
             "kind of error",
@@ -155,15 +151,12 @@ def _too_long(described: Scene, factor: float) -> float:
 def late(out: Path) -> list[Check]:
     """A run that goes wrong after a while: the error has the time of the checkpoint before, and the file too."""
     data = scene({"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
-    advance = Engine.advance
 
-    def spoilt(engine: Engine, steps: int) -> None:
-        advance(engine, steps)
+    def spoil(engine: YadeEngine) -> None:
         if engine.time > 0.55:
             push(engine, 2, velocity=(0, 0, 100))
 
-    with patch.object(Engine, "advance", spoilt):
-        run = whole(data, out)
+    run = whole(data, out, spoil=spoil)
     text = (out / FAILED).read_text(encoding="utf-8") if (out / FAILED).exists() else None
     return [
         says(run.text, "1 smarticle(s) (2): a speed above", "(last good checkpoint: t = 0.5000 s)"),

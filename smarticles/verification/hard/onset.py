@@ -1,9 +1,9 @@
 """Where steps above the stable one begin to chatter and to blow up.
 
 A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
-four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes from
-nowhere, or YADE ends in numbers that are none. Every scene is run with several seeds, which move where and how high
-smarticles begin. A scene and seed that is in the table already is skipped.
+four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
+from nowhere, or YADE ends in numbers that are none. Every scene is run with several seeds, which move where and how
+high smarticles begin. A scene and seed that is in the table already is skipped.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.physics.stability import stable_step
+from dem.plan.steps import stable_step
 from dem.run.run import _git_revision
 from dem.scene.scene import Scene
-from smarticles.verification.hard.hand import load, lying, watched
+from smarticles.verification.bench import lying, scene_of, watched
 from smarticles.verification.hard.scenes import scene, shape_change
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
@@ -72,7 +72,7 @@ class Setting:
         phases = [shape_change(1.5)] if self.articulated else []
         data = scene(*phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
         if self.keys == "at the wall":
-            data["container"] = {"radius_m": 1.05 * load(data).particle.reach}
+            data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
         if self.keys == "on hooks":
             data["hooks"] = {}
         return data
@@ -129,12 +129,12 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
 def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     """Let smarticles go at a factor of the stable step, and look at them; one row of the table."""
     data = setting.data
-    stable = stable_step(load(data))
+    stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
         described, engine, _ = watched(data, scratch, dt=factor * stable)
     engine.add(poses(setting, described, seed))
     if setting.articulated:
-        engine.articulate()
+        engine.motors.articulate()
     lift = setting.count * described.smarticle.boxes.mass * engine.gravity * described.sphere_diameter
     speeds, lowest, rise = [], math.inf, 0.0
     try:
@@ -157,19 +157,19 @@ def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     }
 
 
-def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
+def _looks(engine: YadeEngine, described: Scene) -> Iterator[tuple[float, float, float]]:
     """Let time pass; time [s], kinetic energy [J] and all energy but the motors' [J] about every millisecond."""
     dt = engine.time_step
     interval = dt * max(1, round(described.fidelity.control_interval_s / dt))
     held, looks = engine.state().angles, max(1, round(1e-3 / interval))
     while engine.time < SETTLE + WATCH:
         for _ in range(looks):
-            if engine.articulated:
-                engine.actuate(held, interval)
+            if engine.motors.articulated:
+                engine.motors.actuate(held, interval)
             engine.advance(round(interval / dt))
         state = engine.state()
         total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())
-        yield engine.time, state.kinetic_energy, total - engine.motor_work
+        yield engine.time, state.kinetic_energy, total - engine.motors.work
 
 
 def climb(name: str, seed: int) -> list[dict[str, Any]]:

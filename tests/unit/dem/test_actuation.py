@@ -14,10 +14,15 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from dem.phases.actuation import Actuate, Drive, InternalOscillation, ShapeChange, actuated, drive
-from dem.scene.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.phases.actuate import Actuate
+from dem.phases.drive import Drive, actuated, drive
+from dem.phases.internal_oscillation import InternalOscillation
+from dem.phases.shape_change import ShapeChange
+from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES
 from dem.setting.motion import Triangle
-from dem.setting.parts import FIDELITIES, Motor
+from dem.setting.motor import Motor
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

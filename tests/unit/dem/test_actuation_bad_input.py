@@ -12,7 +12,8 @@ import dem.scene.scene
 from dem.errors import InputError
 from dem.phases.actuation_checks import actuation_warnings, overshoot
 from dem.plan.outlook import plan
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 
 SceneData = Callable[..., dict[str, Any]]
 

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from dem.plan.advice import warnings_of
-from dem.plan.durations import run_duration
 from dem.plan.outlook import plan
 from dem.scene.scene import Scene
 
@@ -24,12 +23,12 @@ def test_a_plain_scene_has_no_warnings(make_scene: MakeScene) -> None:
 
 
 def test_length_of_a_run_is_estimated_where_a_pour_is_in_it(make_scene: MakeScene) -> None:
-    planned = plan(make_scene())
-    length, known = run_duration(make_scene())
+    planned, phases = plan(make_scene()), make_scene().phases
+    length = sum(phase.expected_duration(10) for phase in phases)
     # Two layers of 0.1 s, 0.2 s to settle, 0.1 s of rest, 0.2 s of shaking.
     assert length == pytest.approx(0.7)
     assert length == pytest.approx(sum(phase.estimate_s for phase in planned.phases))
-    assert not known
+    assert [phase.known_duration for phase in phases] == [None, 0.1, 0.2]
 
 
 @pytest.mark.parametrize(

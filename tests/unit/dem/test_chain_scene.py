@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 import yaml
 
+from dem.body.chain import parted
 from dem.body.state import State
 from dem.errors import InputError
 from dem.phases.actuation_checks import overshoot
-from dem.phases.chain import chain_of, parted
+from dem.phases.arrange import chain_of
 from dem.physics.motor import MotorLaw, Motors
-from dem.physics.stability import stable_step, time_step
 from dem.physics.strings import StringLaw
 from dem.plan.outlook import plan
-from dem.scene.scene import Scene, dump_scene, parse_scene
+from dem.plan.steps import stable_step, time_step
+from dem.scene.reading import dump_scene, parse_scene
+from dem.scene.scene import Scene
 
 
 def chain(**changes: Any) -> Scene:

@@ -11,7 +11,8 @@ from dem.errors import InputError
 from dem.plan import choice
 from dem.plan.choice import Error, Expectation, Measured, choose, pick, read_table
 from dem.plan.outlook import plan
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 
 HEADER = (
     "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,"

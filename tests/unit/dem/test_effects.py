@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from dem.engine.effect import Adds
 from dem.engine.yade.construction import ORDER
-from dem.plan.effects import EFFECTS, Adds, decide
+from dem.plan.effects import EFFECTS, decide
 from dem.plan.outlook import plan
 from dem.record.columns import (
     COLUMNS,

@@ -16,12 +16,14 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.placement import place_layer
 from dem.body.state import State
 from dem.errors import InputError, RunError
-from dem.phases.release import RemoveContainer
+from dem.phases.pull_hook import PullHook
+from dem.phases.remove_container import RemoveContainer
 from dem.plan.outlook import plan
 from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from dem.setting.hooks import Cross, PullHook
+from dem.setting.hooks import Cross
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

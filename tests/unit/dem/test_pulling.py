@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dem.phases.stages import CHECK_INTERVAL, HELD_FAST, Pulling
-from dem.setting.hooks import PullHook
+from dem.phases.phase import CHECK_INTERVAL
+from dem.phases.pull_hook import HELD_FAST, PullHook, Pulling
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004
 ARRIVAL = DISTANCE / SPEED

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from dem.errors import InputError
+from dem.scene.reading import parse_scene
 from dem.scene.refusal import unit_of
-from dem.scene.scene import parse_scene
 
 SceneData = Callable[..., dict[str, Any]]
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.library import import_yade
 from dem.errors import RunError
 from dem.run.run import run_scene
@@ -55,7 +55,7 @@ def test_yade_that_breaks_on_import_says_the_cause(tmp_path: Path, monkeypatch: 
 
 
 class Omega:
-    """What `Engine.advance` sees of YADE."""
+    """What `YadeEngine.advance` sees of YADE."""
 
     def __init__(self, stops_at: int | None = None) -> None:
         self.iter, self.time, self.asked = 0, 0.0, 0
@@ -66,8 +66,8 @@ class Omega:
         self.iter = self.iter + 1 if self._stops_at is None else min(self.iter + 1, self._stops_at)
 
 
-def make_engine(omega: Omega) -> Engine:
-    engine = Engine.__new__(Engine)
+def make_engine(omega: Omega) -> YadeEngine:
+    engine = YadeEngine.__new__(YadeEngine)
     # What `advance` needs, without YADE: Omega, and what counts the smarticles' seconds.
     vars(engine).update(
         _yade=SimpleNamespace(omega=omega),

@@ -12,8 +12,9 @@ import pytest
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from dem.physics.stability import time_step
-from dem.scene.scene import Scene, derive_seed, dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.plan.steps import time_step
+from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.scene import Scene, derive_seed
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

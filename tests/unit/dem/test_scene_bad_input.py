@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from dem.errors import InputError
-from dem.scene.scene import Scene, load_scene, parse_scene
+from dem.scene.reading import load_scene, parse_scene
+from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]

@@ -10,7 +10,7 @@ import pytest
 from test_chain_scene import chain
 
 from dem.errors import InputError
-from dem.physics.stability import MOST_PER_STEP, time_step, time_steps
+from dem.plan.steps import MOST_PER_STEP, time_step, time_steps
 from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]

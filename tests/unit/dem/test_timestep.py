@@ -12,17 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from dem.engine.yade.kind import contact_law_of
+from dem.engine.yade.stable_step import CONTACTS_AT_A_TIP, stable_time_step
 from dem.errors import InputError
-from dem.physics.stability import (
-    CONTACTS_AT_A_TIP,
-    contact_law,
-    damping_ratio,
-    restitution_of,
-    stable_time_step,
-    time_step,
-    time_steps,
-    typical_effective_mass,
-)
+from dem.physics.contact import damping_ratio, restitution_of, typical_effective_mass
+from dem.plan.steps import time_step, time_steps
 from dem.scene.scene import Scene
 
 MakeScene = Callable[..., Scene]
@@ -85,7 +79,7 @@ def test_law_carries_the_scenes_numbers(make_scene: MakeScene) -> None:
             "fidelity": {"stiffness_N_per_m": 800.0},
         }
     )
-    law, mass = contact_law(scene), typical_effective_mass(scene.particle)
+    law, mass = contact_law_of(scene), typical_effective_mass(scene.particle)
     assert (law.normal_stiffness, law.tangential_stiffness) == (800, 400)
     assert (law.friction, law.wall_friction, law.tangential_damping) == (0.3, 0.2, 0.25)
     # The same damping ratio in both: against the wall one typical mass moves, between smarticles half of it.
@@ -117,7 +111,7 @@ def limit_of_a_flat_pile(scene: Scene, layers: int, *, rolling: bool = False) ->
 
     They move up and down, or all roll about the axis about which they have the least inertia.
     """
-    particle, law = scene.particle, contact_law(scene)
+    particle, law = scene.particle, contact_law_of(scene)
     springs, neighbour, stiffness, share = len(particle.centres) / particle.boxes.mass, -1, law.normal_stiffness, 1.0
     if rolling:
         # Surfaces that face each other part where both roll in the same sense.
@@ -163,7 +157,7 @@ def test_stable_step_equals_the_limit_of_the_iterated_schemes(
     make_scene: MakeScene, changes: dict[str, object]
 ) -> None:
     scene = make_scene(changes)
-    particle, law = scene.particle, contact_law(scene)
+    particle, law = scene.particle, contact_law_of(scene)
     light, contacts = particle.smallest_effective_mass, CONTACTS_AT_A_TIP
     limits = [
         limit_by_iteration(contacts * law.normal_stiffness, contacts * damping, moved)
@@ -180,12 +174,12 @@ def test_stable_step_is_stable_for_piles_lying_flat(
     make_scene: MakeScene, changes: dict[str, object], layers: int
 ) -> None:
     scene = make_scene(changes)
-    assert stable_time_step(scene.particle, contact_law(scene)) <= limit_of_a_flat_pile(scene, layers) * (1 + 1e-3)
+    assert stable_time_step(scene.particle, contact_law_of(scene)) <= limit_of_a_flat_pile(scene, layers) * (1 + 1e-3)
 
 
 def test_softer_or_heavier_allows_larger_steps(make_scene: MakeScene) -> None:
     scene = make_scene({"contact.restitution": 1})
-    law = contact_law(scene)
+    law = contact_law_of(scene)
     softer = dataclasses.replace(law, normal_stiffness=law.normal_stiffness / 4)
     assert stable_time_step(scene.particle, softer) == pytest.approx(2 * stable_time_step(scene.particle, law))
 
@@ -199,7 +193,7 @@ def test_time_step_divides_the_recording_intervals(make_scene: MakeScene, fideli
     dt = time_step(scene)
     steps = series / dt
     assert steps == pytest.approx(round(steps), abs=1e-9)
-    wanted = scene.fidelity.time_step_fraction * stable_time_step(scene.particle, contact_law(scene))
+    wanted = scene.fidelity.time_step_fraction * stable_time_step(scene.particle, contact_law_of(scene))
     assert dt <= min(wanted, series) * (1 + 1e-9)
     if series > 10 * wanted:
         assert dt > 0.9 * wanted  # no smaller than needed
@@ -212,7 +206,7 @@ def test_given_time_step_is_taken_exactly_where_it_divides(make_scene: MakeScene
 
 def test_given_time_step_above_the_stable_one_is_refused_with_both(make_scene: MakeScene) -> None:
     scene = make_scene({"fidelity": {"time_step_s": 0.001}})
-    stable = stable_time_step(scene.particle, contact_law(scene))
+    stable = stable_time_step(scene.particle, contact_law_of(scene))
     with pytest.raises(InputError) as caught:
         time_step(scene)
     assert str(caught.value) == (

@@ -10,8 +10,8 @@ import pytest
 
 from dem.body.particle import Boxes
 from dem.body.state import State
-from dem.engine.yade.strain import Held, Strain
 from dem.errors import RunError
+from dem.physics.overlaps import Held, Overlaps
 from dem.run.watchdog import Watchdog
 from dem.setting.container import Cylinder
 
@@ -108,10 +108,10 @@ def test_broken_hinge_is_named_with_its_gap() -> None:
 def test_deep_contacts_are_named() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
     deep = np.zeros(4, dtype=bool)
-    dog.check_depths(Strain(5.9e-4, deep, 0.0), time=1.25)
+    dog.check_depths(Overlaps(5.9e-4, deep, 0.0), time=1.25)
     deep[[1, 3]] = True
     with pytest.raises(RunError) as caught:
-        dog.check_depths(Strain(7e-4, deep, 0.0), time=1.25)
+        dog.check_depths(Overlaps(7e-4, deep, 0.0), time=1.25)
     assert str(caught.value) == (
         "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
         "pass through each other or through the container; raise fidelity.stiffness_N_per_m, or load the pile less"
@@ -131,7 +131,7 @@ def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
     deep = np.array([False, True, False, True])
     with pytest.raises(RunError) as caught:
-        dog.check_depths(Strain(7e-4, deep, 0.0, (Held(3, between, 0.0051),)), time=1.25)
+        dog.check_depths(Overlaps(7e-4, deep, 0.0, (Held(3, between, 0.0051),)), time=1.25)
     assert str(caught.value) == (
         "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
         f"pass through each other or through the container; smarticle 3 is held by {between[0]} and {between[1]}, "

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 import studies
-from dem.phases.actuation import InternalOscillation, ShapeChange
-from dem.setting.hooks import PullHook
-from dem.setting.parts import Deposit, Relax, Shake
+from dem.phases.deposit import Deposit
+from dem.phases.internal_oscillation import InternalOscillation
+from dem.phases.pull_hook import PullHook
+from dem.phases.relax import Relax
+from dem.phases.shake import Shake
+from dem.phases.shape_change import ShapeChange
 from studies.base.shipped import differences
 from studies.registry import study_file
 from templates.sweep.expand import Point, expand

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.actuation import actuated
-from dem.scene.scene import Scene, load_scene, scene_hash
-from dem.setting.parts import FIDELITIES
+from dem.phases.drive import actuated
+from dem.scene.reading import load_scene, scene_hash
+from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES
 from studies.accuracy.ladder import (
     KNOBS,
     Ladder,

@@ -13,8 +13,12 @@ import pytest
 
 import studies
 from dem.errors import InputError
-from dem.phases.actuation import InternalOscillation, ShapeChange
-from dem.setting.parts import FIDELITIES, Deposit, Fidelity, Relax, Shake
+from dem.phases.deposit import Deposit
+from dem.phases.internal_oscillation import InternalOscillation
+from dem.phases.relax import Relax
+from dem.phases.shake import Shake
+from dem.phases.shape_change import ShapeChange
+from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.base.shipped import differences
 from studies.registry import STUDIES, study_file
 from templates.sweep.expand import Point, expand

@@ -1,0 +1,92 @@
+"""plan: what a run would do and cost."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+from smarticles.parsing import Commands, add_json, add_scene, positive_number
+from smarticles.scenes import read_scene
+
+if TYPE_CHECKING:
+    from dem.plan.choice import Choice
+    from dem.scene.scene import Scene
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    plan = commands.add(
+        "plan",
+        plan_scene,
+        summary="what a run would do and cost; simulates nothing",
+        text="""
+Shows the phases, what acts in each and why, time step, spheres and the expected wall time.
+
+With --max-error, --max-hours or both, the fidelity is chosen instead of the scene's own: the cheapest
+whose measured error of the packing fractions φ_0 and φ_f (or of what --of says) is within the one, or
+the finest within the other. What was measured stands in a table that `smarticles accuracy` writes.""",
+        examples="""\
+  smarticles plan scene.yaml
+  smarticles plan scene.yaml --set fidelity=reference
+  smarticles plan scene.yaml --json | jq .time_step_s
+  smarticles plan scene.yaml --max-error 0.03 --table accuracy/results/work_precision.csv
+  smarticles plan scene.yaml --max-hours 4
+""",
+    )
+    add_scene(plan)
+    plan.add_argument(
+        "--max-error",
+        type=positive_number,
+        metavar="E",
+        help="largest relative error against the reference fidelity, e.g. 0.03",
+    )
+    plan.add_argument(
+        "--of",
+        metavar="NAME,…",
+        help="what --max-error is of: phi_0, phi_f, crossings (⟨N⟩); default: phi_0,phi_f",
+    )
+    plan.add_argument("--max-hours", type=positive_number, metavar="H", help="wall time of the run on one core [h]")
+    plan.add_argument(
+        "--table", type=Path, metavar="FILE.csv", help="measured errors; default: those that ship, if any do"
+    )
+    add_json(plan)
+
+
+def plan_scene(arguments: argparse.Namespace) -> int:
+    """`smarticles plan`."""
+    from dem.plan.outlook import plan  # noqa: PLC0415
+
+    scene = read_scene(arguments.scene, arguments.set)
+    choice = _chosen(scene, arguments)
+    planned = plan(scene) if choice is None else choice.planned
+    if arguments.json:
+        content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return 0
+    if choice is not None:
+        print(f"{choice.to_text()}\n")
+    print(planned.to_text())
+    return 0
+
+
+def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
+    """The fidelity that --max-error and --max-hours ask for; None without them."""
+    from dem.plan.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
+
+    if arguments.max_error is None and arguments.max_hours is None:
+        for option, value in (("--table", arguments.table), ("--of", arguments.of)):
+            if value is not None:
+                msg = f"{option} {value}: is for --max-error or --max-hours; give one of them"
+                raise InputError(msg)
+        return None
+    of = PACKING if arguments.of is None else tuple(word.strip() for word in arguments.of.split(","))
+    for word in of:
+        if word not in QUANTITIES:
+            msg = f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}"
+            raise InputError(msg)
+    return choose(
+        scene, read_table(arguments.table, of=of), max_error=arguments.max_error, max_hours=arguments.max_hours
+    )

@@ -1,0 +1,139 @@
+"""sweep: many scenes from one template."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dem.errors import InputError
+from smarticles import queueing
+from smarticles.layout import columns
+from smarticles.parsing import Commands, add_slots, positive_int
+from smarticles.sweeps import complete_and_tell, expected_wall_s, make_folder
+
+if TYPE_CHECKING:
+    from templates.slurm.submission import Draft
+    from templates.sweep.expand import Point
+
+_FILE_HELP = """
+A sweep file makes many scenes from one template:
+
+  schema_version: 1
+  name: friction
+  template: scene.yaml.j2             # a scene with {{ variables }}, beside this file
+  run_name: "mu{{ friction }}_seed{{ seed }}"
+  constants: {count: 100}             # the same in every run
+  points:                             # any of these; several are crossed with each other
+    grid: {friction: [0.2, 0.4]}      # every combination
+    zip: {a: [1, 2], b: [3, 4]}       # first with first, second with second
+    list: [{c: 1}, {c: 2}]            # written out
+    table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file
+  derived: {half: "(count / 2) | round | int"}
+  repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+
+The same command again takes up where it stopped, see `smarticles resume --help`."""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    sweep = commands.add(
+        "sweep",
+        run_sweep,
+        summary="make run directories from a template, and start the runs if asked to",
+        text=_FILE_HELP + "\n" + queueing.HELP,
+        examples="""\
+  smarticles sweep friction.yaml --dry-run
+  smarticles sweep friction.yaml --out friction               write the scenes, start nothing
+  smarticles sweep friction.yaml --out friction --submit local
+  smarticles sweep friction.yaml --out friction --submit slurm --cluster example-large --time 12:00:00
+  smarticles sweep friction.yaml --out friction --submit slurm --cluster my-cluster.toml --dry-run
+""",
+    )
+    sweep.add_argument("sweep", type=Path, metavar="SWEEP.yaml", help="sweep file")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="directory of the sweep")
+    sweep.add_argument(
+        "--submit",
+        choices=("none", "local", "slurm"),
+        default="none",
+        help="none: only write (default); local: run on this machine, one run per core; slurm: as a job on a cluster",
+    )
+    sweep.add_argument("--dry-run", action="store_true", help="list the runs and show the job script, write nothing")
+    sweep.add_argument(
+        "--max-points", type=positive_int, metavar="N", help="refuse a sweep of more runs; default: 10000"
+    )
+    add_slots(sweep)
+    queueing.add_options(sweep)
+
+
+def run_sweep(arguments: argparse.Namespace) -> int:
+    """`smarticles sweep`."""
+    from templates.slurm.slurm import require_sbatch  # noqa: PLC0415
+    from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
+    from templates.sweep.sweep import load_sweep  # noqa: PLC0415
+
+    sweep = load_sweep(arguments.sweep)
+    points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
+    queue = queueing.wants_queue(arguments)
+    if arguments.dry_run:
+        print(_listing(points))
+        if queue:
+            print(queueing.show(_draft(sweep.content.name, points, arguments)))
+        return 0
+    if queue:
+        if arguments.submit == "slurm":
+            require_sbatch()
+        # Renders all and throws it away: what is refused is refused before anything is written.
+        _draft(sweep.content.name, points, arguments)
+    folder = make_folder(arguments.sweep, _place(arguments), arguments.command_line, max_points=arguments.max_points)
+    if queue:
+        return queueing.enqueue(folder, arguments)
+    if arguments.submit == "none":
+        print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
+        return 0
+    return complete_and_tell(folder, arguments)
+
+
+def _place(arguments: argparse.Namespace) -> Path:
+    out: Path | None = arguments.out
+    if out is None:
+        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
+        raise InputError(msg)
+    return out
+
+
+def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
+    """What would be submitted: all runs of a new sweep, what is missing of one that is there."""
+    from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
+    from templates.sweep.folder import MANIFEST, Entry, open_folder  # noqa: PLC0415
+
+    out = _place(arguments)
+    entries = [
+        Entry(
+            name=point.name,
+            scene_sha256=point.scene_sha256,
+            expected_s=expected_wall_s(point.scene),
+            values=point.values,
+        )
+        for point in points
+    ]
+    if (out / MANIFEST).exists():
+        missing = to_submit(open_folder(out), tasks_of_runs(submissions(out)))
+        # Nothing to submit: the limits are looked at for all runs.
+        entries = missing or entries
+    return queueing.draft_of(out, name, entries, arguments)
+
+
+def _listing(points: Sequence[Point]) -> str:
+    from templates.local.display import duration  # noqa: PLC0415
+
+    expected = [expected_wall_s(point.scene) for point in points]
+    names = list(points[0].values)
+    header = ["run", *names, "expected wall s"]
+    rows = [
+        [point.name, *(point.values[name] for name in names), round(wall)]
+        for point, wall in zip(points, expected, strict=True)
+    ]
+    total = f"{len(points)} runs, about {duration(sum(expected))} of one core"
+    return f"{columns(header, rows)}\n{total}"

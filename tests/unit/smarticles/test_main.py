@@ -1,0 +1,209 @@
+"""The command line: help, refusals, and what becomes of errors."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles
+
+from dem.errors import InputError, RunError
+from smarticles.main import build_parser, guarded
+from smarticles.stopping import orderly_stop
+
+COMMANDS = {
+    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
+    "verify",
+}  # fmt: skip
+
+
+def test_the_commands_are_those_that_work() -> None:
+    assert set(build_parser()[1].parsers) == COMMANDS
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_help_teaches(command: str, smarticles: Smarticles) -> None:
+    said = smarticles(command, "--help")
+    assert said.status == 0
+    assert said.err == ""
+    examples = said.out.partition("examples:\n")[2].splitlines()
+    assert examples
+    assert all(line.startswith(f"  smarticles {command}") for line in examples)
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_examples_of_the_help_are_accepted(command: str) -> None:
+    parser, commands = build_parser()
+    for line in (commands.parsers[command].epilog or "").splitlines()[1:]:
+        words = line.split("  |")[0].split(" | ")[0].split(" > ")[0].strip().split("   ")[0].split()
+        parsed, unknown = parser.parse_known_args(words[1:])
+        assert parsed.command == command
+        assert unknown == []
+
+
+def test_help_lists_the_commands_and_the_exit_status(smarticles: Smarticles) -> None:
+    said = smarticles("--help")
+    assert said.status == 0
+    assert all(f"\n    {command} " in said.out for command in COMMANDS)
+    assert "exit status: 0 done; 1 the run failed; 2 bad input or usage" in said.out
+
+
+def test_version(smarticles: Smarticles) -> None:
+    said = smarticles("--version")
+    assert said.status == 0
+    assert said.out.startswith("smarticles ")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "no command given; known: run, plan, "),
+        (["stduy"], "COMMAND: 'stduy' is not known; did you mean 'study'?"),
+        (["xyzzy"], "COMMAND: 'xyzzy' is not known; known: run, plan, "),
+        (["--colour"], "unknown option --colour; known: "),
+        (["run"], "the following arguments are required: SCENE.yaml, --out"),
+        (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "unknown option --sett; did you mean '--set'?"),
+        (["run", "s.yaml", "--out", "d", "more"], "one argument too many: 'more'"),
+        (["run", "s.yaml", "--ou", "d"], "the following arguments are required: --out"),
+        (["study", "gravitsh", "--out", "d"], "NAME: 'gravitsh' is not known; did you mean 'gravish'?"),
+        (["sweep", "s.yaml", "--submit", "slrum"], "--submit: 'slrum' is not known; did you mean 'slurm'?"),
+        (["resume", "d", "--jobs", "0"], "argument --jobs: must be a whole number from 1: got '0'"),
+        (["resume", "d", "--jobs", "two"], "argument --jobs: must be a whole number from 1: got 'two'"),
+        (["render", "d", "--time", "end"], "argument --time: invalid float value: 'end'"),
+    ],
+)
+def test_bad_usage_is_status_2_and_one_line(words: list[str], message: str, smarticles: Smarticles) -> None:
+    said = smarticles(*words)
+    assert said.status == 2
+    assert said.out == ""
+    (line,) = said.err.splitlines()
+    assert line.startswith(f"smarticles: error: {message}")
+    assert line.endswith("--help`")
+
+
+class TestGuarded:
+    """One place maps errors to status and message."""
+
+    @staticmethod
+    def raising(error: BaseException) -> int:
+        def action() -> int:
+            raise error
+
+        return guarded(action)
+
+    @pytest.mark.parametrize(
+        ("error", "status", "line"),
+        [
+            (InputError("count: -1"), 2, "error: count: -1"),
+            (RunError("left through\n the wall"), 1, "error: left through the wall"),
+            (KeyboardInterrupt(), 130, "stopped; what was written is whole"),
+            (KeyboardInterrupt("go on with: x"), 130, "stopped; go on with: x"),
+            (
+                OSError(28, "No space left on device", "/d/x.csv"),
+                1,
+                "error: /d/x.csv: No space left on device; free space, or check the path and its permissions",
+            ),
+            (
+                ModuleNotFoundError("No module named 'pandas'", name="pandas"),
+                1,
+                "error: the Python package 'pandas' is not installed; run `make setup`, then `smarticles doctor`",
+            ),
+            (
+                ZeroDivisionError("division by zero"),
+                1,
+                "error: internal error, ZeroDivisionError: division by zero; "
+                "please report it with the output of the same command with --debug",
+            ),
+        ],
+    )
+    def test_status_and_message(
+        self, error: BaseException, status: int, line: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert self.raising(error) == status
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err == f"smarticles: {line}\n"
+
+    def test_debug_shows_the_traceback_after_the_message(self, capsys: pytest.CaptureFixture[str]) -> None:
+        def action() -> int:
+            msg = "count: -1"
+            raise InputError(msg)
+
+        assert guarded(action, debug=True) == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert lines[0] == "smarticles: error: count: -1"
+        assert lines[1].startswith("Traceback")
+
+    def test_success_passes_through(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert guarded(lambda: 0) == 0
+        assert guarded(lambda: 1) == 1
+        assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("words", [["--debug", "plan", "absent.yaml"], ["plan", "absent.yaml", "--debug"]])
+def test_debug_may_stand_before_and_after_the_command(words: list[str], smarticles: Smarticles) -> None:
+    said = smarticles(*words)
+    assert said.status == 2
+    assert "Traceback" in said.err
+    assert said.err.startswith("smarticles: error: absent.yaml: ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signals_stop_in_an_orderly_way(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+
+    def action() -> int:
+        os.kill(os.getpid(), number)
+        threading.Event().wait(10)
+        return 0
+
+    assert guarded(action) == 130
+    assert signal.getsignal(number) is before
+
+
+def test_ignored_signals_stay_ignored_here_but_not_in_children() -> None:
+    ask = "import signal; print(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN)"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with orderly_stop():
+            os.kill(os.getpid(), signal.SIGHUP)
+            child = subprocess.run([sys.executable, "-I", "-S", "-c", ask], capture_output=True, check=True, text=True)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert child.stdout == "False\n"
+
+
+def command(*words: str) -> list[str]:
+    return [sys.executable, "-m", "smarticles", *words]
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    process = subprocess.Popen(command("schema"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    with process.stderr as stream:
+        assert stream.read() == b""
+    assert process.wait() == 141
+
+
+def test_nothing_heavy_is_imported_to_show_help() -> None:
+    script = (
+        "import sys; from smarticles.main import main; main(['--help']); "
+        "print([name for name in ('yade', 'pyvista', 'pandas', 'numpy', 'pydantic', 'rich') "
+        "if name in sys.modules], file=sys.stderr)"
+    )
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True, text=True)
+    assert answer.stderr == "[]\n"
+
+
+def test_python_m_smarticles_is_the_command(tmp_path: Path) -> None:
+    answer = subprocess.run(command("plan", str(tmp_path / "absent.yaml")), capture_output=True, check=False, text=True)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith(f"smarticles: error: {tmp_path}/absent.yaml: ")
