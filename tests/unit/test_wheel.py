@@ -13,10 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from studies.registry import study_file
 from synthetic import SyntheticRun, write_run
 
 from smarticles.sweeps import make_folder
+from studies.registry import study_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"dem", "postprocess", "smarticles", "studies", "templates"}
