@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from dem.scene.scene import dump_scene, parse_scene
+from dem.scene.reading import dump_scene, parse_scene
 
 
 def run_child(folder: Path, name: str, data: dict[str, Any], *, threads: int = 1) -> resource.struct_rusage:

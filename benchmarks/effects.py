@@ -24,8 +24,8 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.child import run_child
-from dem.physics.stability import time_step
-from dem.scene.scene import parse_scene
+from dem.plan.steps import time_step
+from dem.scene.reading import parse_scene
 
 DEPOSIT: Mapping[str, Any] = {"type": "deposit"}
 HOLD: Mapping[str, Any] = {"type": "actuate", "barbs": {"type": "hold"}}

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from dem.body.placement import place_layer
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import time_step
-from dem.run.run import build_engine
-from dem.scene.scene import Scene, parse_scene
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import YadeKind
+from dem.plan.steps import time_step
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 
 REPEATS = 50
 STEPS = 2000
@@ -49,10 +50,10 @@ def plain_scene(count: int) -> Scene:
     return parse_scene(data, source="benchmarks")
 
 
-def engine_with(count: int) -> Engine:
+def engine_with(count: int) -> YadeEngine:
     """Smarticles that have come to rest on the floor."""
     scene = plain_scene(count)
-    engine = build_engine(scene, time_step(scene))
+    engine = YadeKind().build(scene, time_step(scene))
     engine.add(
         place_layer(
             scene.particle,

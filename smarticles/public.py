@@ -11,7 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 from dem.errors import InputError, RunError
-from dem.scene.scene import Scene, dump_scene
+from dem.scene.reading import dump_scene
+from dem.scene.scene import Scene
 from postprocess import FrameSequence, RunManifest, Series, read_frames, read_run, read_series
 from smarticles.main import BAD_INPUT
 from smarticles.sweeps import complete, make_folder

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
     """A scene whose time steps are known to be good as well; errors name the file."""
-    from dem.physics.stability import time_steps  # noqa: PLC0415
-    from dem.scene.scene import load_scene  # noqa: PLC0415
+    from dem.plan.steps import time_steps  # noqa: PLC0415
+    from dem.scene.reading import load_scene  # noqa: PLC0415
 
     scene = load_scene(scene_file, settings)
     try:

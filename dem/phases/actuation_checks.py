@@ -6,18 +6,15 @@ A scene without actuated phases passes unseen.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.particle import HINGE_CLEARANCE
-from dem.phases.actuation import BARBS, Actuate, InternalOscillation, active_count, actuated, drive
+from dem.phases.drive import BARBS, actuated, drive
+from dem.phases.phase import SceneView
 from dem.setting.motion import SimpleMotion, Sine, Triangle
 from dem.setting.part import HINGE_RANGE
-
-if TYPE_CHECKING:
-    from dem.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -27,38 +24,35 @@ BARB_LINKS = (0, 2)
 MOST_OVERSHOOT = 0.5
 
 
-def check_actuation(scene: Scene) -> None:
-    """Check the actuated phases against the smarticle, the motors and the recording.
+def check_actuated(scene: SceneView, index: int) -> None:
+    """Check an actuated phase against the smarticle, the motors and the recording.
 
     Raises:
         ValueError: one line with key, value and the way out.
     """
-    indices = [index for index, phase in enumerate(scene.phases) if actuated(phase)]
-    if not indices:
-        return
-    _check_barbs(scene, indices[0])
-    _check_control(scene)
-    for index in indices:
-        _check_active(scene, index)
-        highest = _check_motions(scene, index)
-        _check_crossing(scene, index, highest)
-        _check_first_spheres(scene, index, max(highest))
+    if not any(actuated(before) for before in scene.phases[:index]):
+        _check_barbs(scene, index)
+        _check_control(scene)
+    _check_active(scene, index)
+    highest = _check_motions(scene, index)
+    _check_crossing(scene, index, highest)
+    _check_first_spheres(scene, index, max(highest))
 
 
-def overshoot(scene: Scene) -> float:
+def overshoot(scene: SceneView) -> float:
     """Torque over τ_max that one look of a motor can add before it notices and halts [1]; 0 where it is capped."""
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
     return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
 
 
-def actuation_warnings(scene: Scene) -> tuple[str, ...]:
+def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
     """What a scene that actuates had better change, one line each with key, value and the way out.
 
     A motor that is quick and stiff for its torque limit goes beyond it. That is no reason to refuse a scene: it goes
     no farther than by this much, then halts, and motors that are hardly able to do anything are a case worth running.
     """
-    share = overshoot(scene) if scene.actuates else 0.0
+    share = overshoot(scene)
     if share <= MOST_OVERSHOOT:
         return ()
     motor, series, less = scene.motor, scene.recording.series_interval_s, MOST_OVERSHOOT / share
@@ -72,12 +66,12 @@ def actuation_warnings(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def _check_barbs(scene: Scene, index: int) -> None:
+def _check_barbs(scene: SceneView, index: int) -> None:
     """Each barb must have a sphere of its own that is clear of the hinge's."""
     ratio, width = scene.smarticle.aspect_ratio, scene.smarticle.middle_length_m
     if ratio == 0:
         msg = (
-            f"smarticle.aspect_ratio: 0 means no barbs, which phases.{index} ({scene.phases[index].type}) is to move; "
+            f"smarticle.aspect_ratio: 0 means no barbs, which phases.{index} ({scene.phases[index].kind}) is to move; "
             "use a larger aspect_ratio or leave the phase out"
         )
         raise ValueError(msg)
@@ -89,20 +83,20 @@ def _check_barbs(scene: Scene, index: int) -> None:
         least = (1.5 + HINGE_CLEARANCE) * diameter
         msg = (
             f"smarticle.aspect_ratio: {ratio:g} means barbs of {ratio * width:.4g} m, too short for a sphere of their "
-            f"own of {diameter:.4g} m beside the hinge's, which phases.{index} ({scene.phases[index].type}) needs; use "
+            f"own of {diameter:.4g} m beside the hinge's, which phases.{index} ({scene.phases[index].kind}) needs; use "
             f"at least {_up(least / width)} or a smaller fidelity.diameter_m"
         )
         raise ValueError(msg)
 
 
-def _first_station(scene: Scene) -> float:
+def _first_station(scene: SceneView) -> float:
     """Distance [m] of the barbs' first spheres from the hinge, along the barb."""
     particle = scene.particle
     barb = particle.centres[particle.links == BARB_LINKS[0]] - particle.boxes.vertices[1]
     return float(np.hypot(barb[:, 0], barb[:, 1]).min())
 
 
-def _check_control(scene: Scene) -> None:
+def _check_control(scene: SceneView) -> None:
     interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
     looks = series / interval
     way_out = f"use e.g. {_whole_fraction(series, max(1, math.ceil(looks * (1 - TOLERANCE))))} s"
@@ -129,17 +123,19 @@ def _whole_fraction(whole: float, parts: int) -> str:
     return repr(whole / parts)
 
 
-def _check_active(scene: Scene, index: int) -> None:
+def _check_active(scene: SceneView, index: int) -> None:
     phase = scene.phases[index]
-    if isinstance(phase, Actuate | InternalOscillation) and not active_count(phase, scene.count):
+    assert actuated(phase)
+    gait = phase.gait(scene.smarticle, scene.motor)
+    if not gait.active_count(scene.count):
         msg = (
-            f"phases.{index}.active_fraction: {phase.active_fraction:g} of {scene.count} smarticles is none; "
+            f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
             f"use e.g. {_up(1 / scene.count)}"
         )
         raise ValueError(msg)
 
 
-def _check_motions(scene: Scene, index: int) -> tuple[float, float]:
+def _check_motions(scene: SceneView, index: int) -> tuple[float, float]:
     """Check range and speed of the motions in a phase.
 
     Returns:
@@ -147,22 +143,22 @@ def _check_motions(scene: Scene, index: int) -> tuple[float, float]:
     """
     phase = scene.phases[index]
     assert actuated(phase)
-    spelled, driven = phase.spelled_out(scene.smarticle, scene.motor), drive(scene, index)
+    gait, driven = phase.gait(scene.smarticle, scene.motor), drive(scene, index)
     # With random offsets the motion goes through up to one more period than the phase is long.
-    until = driven.duration + ((spelled.period or 0.0) if spelled.offsets == "random" else 0.0)
+    until = driven.duration + ((gait.period or 0.0) if gait.offsets == "random" else 0.0)
     highest = np.degrees(driven.start.max(axis=0))
     for barb in range(BARBS):
         start = driven.start[driven.active, barb]
-        for leg in spelled.motions[barb].legs(start, start, until):
-            key = ".".join(filter(None, (spelled.keys[barb], leg.key)))
+        for leg in gait.motions[barb].legs(start, start, until):
+            key = ".".join(filter(None, (gait.keys[barb], leg.key)))
             low, high = (np.degrees(angles) for angles in leg.extremes())
             if isinstance(leg.motion, Sine | Triangle):
                 # All other angles are checked where they are read: only a swing can lead out of the range.
-                own = phase.own_key(f"{key}.amplitude_deg")
-                present = phase.theta_deg if isinstance(phase, InternalOscillation) else leg.motion.amplitude_deg
+                own, present = phase.own(f"{key}.amplitude_deg")
+                assert present is not None  # a swing has an amplitude
                 _check_range(f"phases.{index}.{own}", present, leg.motion, (float(low.min()), float(high.max())))
             highest[barb] = max(highest[barb], high.max())
-            own = phase.own_key(f"{key}.{leg.motion.pace[0]}")
+            own, _ = phase.own(f"{key}.{leg.motion.pace[0]}")
             _check_speed(f"phases.{index}.{own}", leg.motion, leg.speed(), scene.motor.speed_limit_rad_per_s)
     return float(highest[0]), float(highest[1])
 
@@ -197,7 +193,7 @@ def _check_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -
     raise ValueError(msg)
 
 
-def _check_crossing(scene: Scene, index: int, highest: tuple[float, float]) -> None:
+def _check_crossing(scene: SceneView, index: int, highest: tuple[float, float]) -> None:
     # The highest angles of both barbs need not be asked for at the same time: a motor that halts is late, so that they
     # may meet all the same.
     if scene.smarticle.tip_clearance(highest) < 0:
@@ -208,7 +204,7 @@ def _check_crossing(scene: Scene, index: int, highest: tuple[float, float]) -> N
         raise ValueError(msg)
 
 
-def _check_first_spheres(scene: Scene, index: int, angle: float) -> None:
+def _check_first_spheres(scene: SceneView, index: int, angle: float) -> None:
     """The first sphere of a barb beyond 90° must not touch the spheres of the middle link.
 
     At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
@@ -232,7 +228,7 @@ def _check_first_spheres(scene: Scene, index: int, angle: float) -> None:
     raise ValueError(msg)
 
 
-def _wider_pitch(scene: Scene, angle: float) -> float:
+def _wider_pitch(scene: SceneView, angle: float) -> float:
     """A pitch [1] at which the first sphere of a barb clears the middle link at an angle [deg] beyond 90°."""
     s, c = _first_station(scene) / scene.sphere_diameter, -math.cos(math.radians(angle))
     apart = s * c + math.sqrt(max(0.0, (s * c) ** 2 + 1 - s**2))

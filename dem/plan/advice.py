@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dem.phases.actuation_checks import actuation_warnings
-from dem.plan.durations import run_duration
 from dem.scene.scene import Scene
-from dem.setting.hooks import hook_warnings
 
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
@@ -16,12 +13,15 @@ _LEFT_OUT = {
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """All warnings of a scene, for `plan` and for the beginning of a run: what, where, value with unit, way out."""
-    return (*actuation_warnings(scene), *recording_warnings(scene), *hook_warnings(scene))
+    of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
+    # What several phases say of one thing is said once.
+    return (*dict.fromkeys(of_phases), *recording_warnings(scene))
 
 
 def recording_warnings(scene: Scene) -> tuple[str, ...]:
     """Intervals of recording that are longer than the run."""
-    length, known = run_duration(scene)
+    known = all(phase.known_duration is not None for phase in scene.phases)
+    length = sum(phase.expected_duration(scene.count) for phase in scene.phases)
     run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
     found = []
     for key, left_out in _LEFT_OUT.items():

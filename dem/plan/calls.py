@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dem.phases.actuation import actuated
+from dem.engine.effect import EffectName
 from dem.phases.actuation_checks import overshoot
-from dem.phases.chain import Strain, chain_of
-from dem.phases.release import RemoveContainer
+from dem.phases.arrange import chain_of
 from dem.scene.scene import Scene
-from dem.setting.hooks import PullHook
-from dem.setting.parts import Shake, shake_amplitude
 
 Call = tuple[bool, str]
 
@@ -32,13 +29,7 @@ def plane(scene: Scene) -> Call:
 
 def strings(scene: Scene) -> Call:
     """Strings that pull a chain apart, by phases of type strain."""
-    pulls = [
-        f"phase {k} pulls at {1e3 * phase.speed_m_per_s:.3g} mm/s, tied at the {phase.tied_at}, "
-        f"{phase.string_stiffness_N_per_m:g} N/m each"
-        for k, phase in enumerate(scene.phases)
-        if isinstance(phase, Strain)
-    ]
-    return bool(pulls), ", ".join(pulls) or "no phase of type strain"
+    return _by_phases(scene, EffectName.STRINGS, "no phase of type strain")
 
 
 def gravity(scene: Scene) -> Call:
@@ -63,22 +54,15 @@ def restitution(scene: Scene) -> Call:
 
 
 def container_motion(scene: Scene) -> Call:
-    """The engine that shakes, by phases of type shake."""
-    removed = next((k for k, phase in enumerate(scene.phases) if isinstance(phase, RemoveContainer)), len(scene.phases))
-    shakes = [
-        f"phase {k}: Γ = {phase.peak_acceleration_g:g}, f = {phase.frequency_hz:g} Hz, "
-        f"A = {1e3 * shake_amplitude(phase, scene.gravity_m_per_s2):.3g} mm{', the floor alone' if k > removed else ''}"
-        for k, phase in enumerate(scene.phases)
-        if isinstance(phase, Shake)
-    ]
-    return bool(shakes), ", ".join(shakes) or "no phase of type shake"
+    """What shakes, by phases of type shake."""
+    return _by_phases(scene, EffectName.CONTAINER_MOTION, "no phase of type shake")
 
 
 def articulation(scene: Scene) -> Call:
     """Links and hinges, by phases that actuate."""
     if not scene.actuates:
         return False, "no phase actuates; each smarticle is one welded clump"
-    numbers = [str(k) for k, phase in enumerate(scene.phases) if actuated(phase)]
+    numbers = _told(scene, EffectName.ARTICULATION)
     return (
         True,
         f"phase{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: three links and two hinges per smarticle, pins "
@@ -109,12 +93,7 @@ def hooks(scene: Scene) -> Call:
     hooks = scene.hooks
     if hooks is None:
         return False, "no key hooks"
-    pulls = [
-        f"phase {k} raises the upper one by {1e3 * phase.distance_m:.3g} mm at {1e3 * phase.speed_m_per_s:.3g} mm/s"
-        + ("" if phase.force_limit_N is None else f", or until it takes {phase.force_limit_N:.3g} N")
-        for k, phase in enumerate(scene.phases)
-        if isinstance(phase, PullHook)
-    ]
+    pulls = _told(scene, EffectName.HOOKS)
     return (
         True,
         f"crosses at {1e3 * hooks.lower_height_m:.3g} and {1e3 * hooks.upper_height_m:.3g} mm, bars of "
@@ -124,13 +103,7 @@ def hooks(scene: Scene) -> Call:
 
 def wall_removal(scene: Scene) -> Call:
     """Phases of type remove-container."""
-    removals = [
-        f"phase {k}: "
-        + ("at once" if phase.speed_m_per_s is None else f"lifted at {1e3 * phase.speed_m_per_s:.3g} mm/s")
-        for k, phase in enumerate(scene.phases)
-        if isinstance(phase, RemoveContainer)
-    ]
-    return bool(removals), ", ".join(removals) or "no phase of type remove-container"
+    return _by_phases(scene, EffectName.WALL_REMOVAL, "no phase of type remove-container")
 
 
 def energies(scene: Scene) -> Call:
@@ -169,3 +142,14 @@ def checkpoints(scene: Scene) -> Call:
 
 def _every(interval: float | None, key: str, what: str) -> Call:
     return interval is not None, f"recording.{key} is null" if interval is None else f"{what} every {interval:g} s"
+
+
+def _told(scene: Scene, effect: EffectName) -> list[str]:
+    """What phases call for an effect for, in words."""
+    told = (phase.calls(scene, index) for index, phase in enumerate(scene.phases))
+    return [each[effect] for each in told if effect in each]
+
+
+def _by_phases(scene: Scene, effect: EffectName, otherwise: str) -> Call:
+    told = _told(scene, effect)
+    return bool(told), ", ".join(told) or otherwise

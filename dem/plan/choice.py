@@ -15,8 +15,9 @@ from typing import Any
 
 from dem.errors import InputError
 from dem.plan.outlook import Plan, plan
-from dem.scene.scene import Scene, parse_scene
-from dem.setting.parts import FIDELITIES
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES
 
 SHIPPED = Path(__file__).with_name("work_precision.csv")
 """The table that is used unless another one is given; there only if it was measured."""

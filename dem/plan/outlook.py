@@ -5,20 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
-from dem.engine.yade.construction import in_order
-from dem.phases.actuation import actuated
-from dem.physics.stability import stable_step, time_steps
+from dem.engine.effect import Adds
+from dem.engine.kinds import engine_kind
 from dem.plan.advice import warnings_of
-from dem.plan.durations import expected_duration, known_duration
-from dem.plan.effects import Adds, Decision, decide
+from dem.plan.effects import Decision, decide
+from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
-from dem.setting.parts import Deposit
 
-# Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
-# differ by a factor of two.
-COST_PER_SPHERE_STEP = 3.3e-7
-# A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
-ARTICULATED_SHARE = 1.7
 # A pour costs about half of the same time in the full pile, since the pile grows from nothing.
 POUR_SHARE = 0.5
 
@@ -109,16 +102,16 @@ def plan(scene: Scene) -> Plan:
     Raises:
         InputError: the scene's time step is above the stable one.
     """
+    kind = engine_kind(scene.engine)
     steps = time_steps(scene)
     particle = scene.particle
     spheres = len(particle.centres)
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
-        rate = COST_PER_SPHERE_STEP * spheres * scene.count / dt
-        estimate = expected_duration(phase, scene.count)
-        share = POUR_SHARE if isinstance(phase, Deposit) else ARTICULATED_SHARE if actuated(phase) else 1.0
-        wall = rate * estimate * share
-        phases.append(PlannedPhase(index, phase.type, known_duration(phase), estimate, wall, dt))
+        estimate = phase.expected_duration(scene.count)
+        share = POUR_SHARE if phase.pours else kind.actuated_share if phase.actuates else 1.0
+        wall = kind.seconds_per_step(scene) / dt * estimate * share
+        phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
     return Plan(
@@ -131,7 +124,7 @@ def plan(scene: Scene) -> Plan:
         container_height_m=scene.cylinder.height,
         phases=tuple(phases),
         effects=effects,
-        engines=in_order(Adds.together(effect.adds for effect in effects).engines),
+        engines=kind.in_order(Adds.together(effect.adds for effect in effects).engines),
         frames=round(simulated / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),

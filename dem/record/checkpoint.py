@@ -1,8 +1,11 @@
 """Checkpoints: everything that a run needs to go on, in one checksummed file; the one before is kept.
 
+What the engine saved is opaque here: bytes, and the name and version of the engine that can read them. Everything
+else is plain data.
+
 A run on one thread that goes on from a checkpoint gives the same bits as the run that was never stopped, because the
-running simulation reloads its own checkpoint whenever it writes one: YADE orders bodies and contacts anew when it
-loads, and sums of forces depend on their order.
+running simulation reloads its own checkpoint whenever it writes one: an engine may order bodies and contacts anew when
+it loads, and sums of forces depend on their order.
 """
 
 from __future__ import annotations
@@ -20,10 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError
+from dem.record.files import whole
+from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
-FORMAT = 4
-CURRENT, PREVIOUS = "checkpoint.zip", "checkpoint.previous.zip"
-_ENGINE, _STATE, _SERIES = "engine.yade", "state.json", "series.npz"
+_ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
+# In checkpoints of before engines had names there was one engine: its member, and the key of its version.
+_YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +36,15 @@ class Checkpoint:
     """What a run needs to go on.
 
     Args:
+        scene_sha256: of the scene that is run.
+        made_by: name and version of the engine.
         state: plain data: phase, stage, recorder, clock.
         series: columns of the series so far.
-        engine: YADE's own serialisation.
+        engine: what the engine saved.
     """
 
+    scene_sha256: str
+    made_by: tuple[str, str]
     state: Mapping[str, Any]
     series: Mapping[str, NDArray[Any]]
     engine: bytes
@@ -47,54 +56,63 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     Raises:
         RunError: it cannot be written; the checkpoints that were there stay.
     """
-    temporary = folder / ".checkpoint.partial.zip"
+    newest = folder / CHECKPOINT
+    name, version = checkpoint.made_by
+    head = {
+        "format": CHECKPOINT_FORMAT,
+        "made_by": {"engine": name, "version": version},
+        "scene_sha256": checkpoint.scene_sha256,
+    }
     columns = io.BytesIO()
     np.savez(columns, **checkpoint.series)  # type: ignore[arg-type] # the stubs take any keyword for allow_pickle
     try:
-        with temporary.open("wb") as file:
+        with whole(newest, before=folder / CHECKPOINT_BEFORE) as temporary, temporary.open("wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
-                archive.writestr(_STATE, json.dumps({"format": FORMAT, **checkpoint.state}))
+                archive.writestr(_STATE, json.dumps({**head, **checkpoint.state}))
                 archive.writestr(_SERIES, columns.getvalue())
                 archive.writestr(_ENGINE, checkpoint.engine)
             file.flush()
             os.fsync(file.fileno())
-        if (folder / CURRENT).exists():
-            os.replace(folder / CURRENT, folder / PREVIOUS)  # noqa: PTH105 - the atomic call by its name
-        os.replace(temporary, folder / CURRENT)  # noqa: PTH105
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         msg = (
-            f"{folder / CURRENT}: cannot be written ({error.strerror or error}); free space and go on with "
+            f"{newest}: cannot be written ({error.strerror or error}); free space and go on with "
             "`smarticles run … --resume`; the checkpoint before is whole"
         )
         raise RunError(msg) from error
 
 
-def read_checkpoint(folder: Path, *, scene_sha256: str, yade: str) -> tuple[Checkpoint, str | None]:
+def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
     """The newest checkpoint that is whole.
 
     Args:
         folder: the run directory.
         scene_sha256: of the scene that is to go on.
-        yade: version of the YADE that runs.
+        made_by: name and version of the engine that is to go on.
 
     Returns:
         The checkpoint, and a warning where the newest one was damaged and the one before is used.
 
     Raises:
-        InputError: no whole checkpoint, or one of another format, YADE or scene.
+        InputError: no whole checkpoint, or one of another format, engine or scene.
     """
     damaged: list[str] = []
-    for name in (CURRENT, PREVIOUS):
+    for name in (CHECKPOINT, CHECKPOINT_BEFORE):
         path = folder / name
         if not path.exists():
             continue
         try:
-            checkpoint = _read(path)
+            format_, checkpoint = _read(path)
         except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError) as error:
             damaged.append(f"{name} ({' '.join(str(error).split())})")
             continue
-        _check(path, checkpoint.state, scene_sha256=scene_sha256, yade=yade)
+        for what, found, wanted in (
+            ("checkpoint format", format_, CHECKPOINT_FORMAT),
+            ("engine", " ".join(checkpoint.made_by), " ".join(made_by)),
+            ("scene", checkpoint.scene_sha256, scene_sha256),
+        ):
+            if found != wanted:
+                msg = f"{path}: made with {what} {found}, here is {wanted}; resume with what made it, or start anew"
+                raise InputError(msg)
         warning = f"damaged: {', '.join(damaged)}; going on from {name}" if damaged else None
         return checkpoint, warning
     cause = f"damaged: {', '.join(damaged)}" if damaged else "no checkpoint was written"
@@ -104,24 +122,20 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, yade: str) -> tuple[Chec
 
 def has_checkpoint(folder: Path) -> bool:
     """Whether a run directory holds a checkpoint, whole or not."""
-    return (folder / CURRENT).exists() or (folder / PREVIOUS).exists()
+    return (folder / CHECKPOINT).exists() or (folder / CHECKPOINT_BEFORE).exists()
 
 
-def _read(path: Path) -> Checkpoint:
+def _read(path: Path) -> tuple[object, Checkpoint]:
+    """Its format, and all of it."""
     with zipfile.ZipFile(path) as archive:
         # Reading a member checks its CRC.
         state = json.loads(archive.read(_STATE))
         with np.load(io.BytesIO(archive.read(_SERIES))) as columns:
             series = {name: columns[name] for name in columns.files}
-        return Checkpoint(state=state, series=series, engine=archive.read(_ENGINE))
-
-
-def _check(path: Path, state: Mapping[str, Any], *, scene_sha256: str, yade: str) -> None:
-    for what, found, wanted in (
-        ("checkpoint format", state.get("format"), FORMAT),
-        ("YADE", state.get("yade"), yade),
-        ("scene", state.get("scene_sha256"), scene_sha256),
-    ):
-        if found != wanted:
-            msg = f"{path}: made with {what} {found}, here is {wanted}; resume with what made it, or start anew"
-            raise InputError(msg)
+        if "made_by" in state:
+            engine, made_by = archive.read(_ENGINE), (state["made_by"]["engine"], state["made_by"]["version"])
+        else:
+            engine, made_by = archive.read(_YADE_MEMBER), (_YADE, str(state.get(_YADE)))
+    scene = str(state.get("scene_sha256"))
+    checkpoint = Checkpoint(scene_sha256=scene, made_by=made_by, state=state, series=series, engine=engine)
+    return state.get("format"), checkpoint

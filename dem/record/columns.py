@@ -1,78 +1,137 @@
-"""The datasets of `series.h5` with unit and description, set by set as effects add them."""
+"""The datasets of `series.h5`: unit, label and description, set by set as effects add them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class Column(NamedTuple):
+    """One dataset.
+
+    Attributes:
+        unit: SI; "1" for a pure number.
+        label: What tables call it, without the unit.
+        description: What it is, in a few words.
+    """
+
+    unit: str
+    label: str
+    description: str
+
+
+Columns = Mapping[str, Column]
+"""Datasets by name, in the order of the file."""
+
 # In every scene.
-COLUMNS: dict[str, tuple[str, str]] = {
-    "time_s": ("s", "simulated time"),
-    "phase": ("1", "index of the phase in the scene"),
-    "count": ("1", "smarticles in the container"),
-    "container_z_m": ("m", "height of the container's floor"),
-    "container_velocity_m_per_s": ("m/s", "vertical velocity of the container"),
-    "container_force_N": (
+COLUMNS: Columns = {
+    "time_s": Column("s", "time", "simulated time"),
+    "phase": Column("1", "phase", "index of the phase in the scene"),
+    "count": Column("1", "count", "smarticles in the container"),
+    "container_z_m": Column("m", "container z", "height of the container's floor"),
+    "container_velocity_m_per_s": Column("m/s", "container velocity", "vertical velocity of the container"),
+    "container_force_N": Column(
         "N",
+        "container force",
         "force of the smarticles on the container (x, y, z), mean since the sample before, from the momentum balance",
     ),
-    "com_height_m": ("m", "mean height of the centres of mass above the floor"),
-    "kinetic_energy_J": ("J", "translational and rotational kinetic energy of the smarticles"),
-    "max_speed_m_per_s": ("m/s", "largest speed of a centre of mass"),
-    "unbalanced_force": ("1", "mean net force on a smarticle over its weight"),
-    "packing_fraction": (
+    "com_height_m": Column("m", "com height", "mean height of the centres of mass above the floor"),
+    "kinetic_energy_J": Column("J", "kinetic energy", "translational and rotational kinetic energy of the smarticles"),
+    "max_speed_m_per_s": Column("m/s", "max speed", "largest speed of a centre of mass"),
+    "unbalanced_force": Column("1", "unbalanced force", "mean net force on a smarticle over its weight"),
+    "packing_fraction": Column(
         "1",
+        "packing fraction",
         "N V_s / (pi r² z), z the second-highest centre of mass above the floor; NaN in a mould of tiers and once the "
         "container is taken away",
     ),
 }
-
 # Only in scenes that actuate.
-MOTOR_COLUMNS: dict[str, tuple[str, str]] = {
-    "commanded_angle_rad": ("rad", "mean angle that the motors hold, barb 1 and barb 2"),
-    "angle_rad": ("rad", "mean actual angle, barb 1 and barb 2"),
-    "schedule_error_rad": (
+MOTOR_COLUMNS: Columns = {
+    "commanded_angle_rad": Column("rad", "commanded angle", "mean angle that the motors hold, barb 1 and barb 2"),
+    "angle_rad": Column("rad", "angle", "mean actual angle, barb 1 and barb 2"),
+    "schedule_error_rad": Column(
         "rad",
+        "schedule error",
         "largest difference of the angle of the schedule and the commanded one; NaN while welded",
     ),
-    "tracking_error_rad": ("rad", "largest difference of commanded and actual angle; NaN while welded"),
-    "motor_torque_N_m": ("N m", "root mean square torque of the motors; NaN while welded"),
-    "halted_fraction": ("1", "share of motors that are halted by their torque; NaN while welded"),
-    "motor_work_J": ("J", "work of all motors on the links since the start, sum of ∫ τ dα"),
-    "joint_gap_m": ("m", "how far the hinge that gives way most has done so"),
+    "tracking_error_rad": Column(
+        "rad", "tracking error", "largest difference of commanded and actual angle; NaN while welded"
+    ),
+    "motor_torque_N_m": Column("N m", "motor torque", "root mean square torque of the motors; NaN while welded"),
+    "halted_fraction": Column(
+        "1", "halted fraction", "share of motors that are halted by their torque; NaN while welded"
+    ),
+    "motor_work_J": Column("J", "motor work", "work of all motors on the links since the start, sum of ∫ τ dα"),
+    "joint_gap_m": Column("m", "joint gap", "how far the hinge that gives way most has done so"),
 }
 # Only in scenes that ask for energy.
-ENERGY_COLUMNS: dict[str, tuple[str, str]] = {
-    "gravitational_energy_J": ("J", "of all smarticles above the floor's height at the start"),
-    "container_work_J": (
+ENERGY_COLUMNS: Columns = {
+    "gravitational_energy_J": Column(
+        "J", "gravitational energy", "of all smarticles above the floor's height at the start"
+    ),
+    "container_work_J": Column(
         "J",
+        "container work",
         "work of the moving container, hook or strings on the smarticles since the start, without their own weight",
     ),
 }
-
-# Only in scenes that sample dissipation.
-LEDGER_COLUMNS: dict[str, tuple[str, str]] = {
-    "added_energy_J": ("J", "gravitational energy that smarticles had when they were poured, above the same height"),
-    "contact_elastic_energy_J": ("J", "in the springs of all contacts"),
-    "hinge_elastic_energy_J": ("J", "in the pins and dampers of all hinges"),
-    "dissipated_energy_J": ("J", "by contacts, hinges and welding since the start, sampled"),
-    "energy_residual_J": ("J", "added energy and work less everything stored and dissipated: the account's error"),
+# Only in scenes that sample dissipation. Tables have always called these by the dataset's own name.
+LEDGER_COLUMNS: Columns = {
+    "added_energy_J": Column(
+        "J", "added_energy_J", "gravitational energy that smarticles had when they were poured, above the same height"
+    ),
+    "contact_elastic_energy_J": Column("J", "contact_elastic_energy_J", "in the springs of all contacts"),
+    "hinge_elastic_energy_J": Column("J", "hinge_elastic_energy_J", "in the pins and dampers of all hinges"),
+    "dissipated_energy_J": Column(
+        "J", "dissipated_energy_J", "by contacts, hinges and welding since the start, sampled"
+    ),
+    "energy_residual_J": Column(
+        "J", "energy_residual_J", "added energy and work less everything stored and dissipated: the account's error"
+    ),
 }
-
 # Only in scenes with hooks.
-HOOK_COLUMNS: dict[str, tuple[str, str]] = {
-    "hook_upper_force_N": ("N", "force of the smarticles on the upper hook (x, y, z), mean since the sample before"),
-    "hook_lower_force_N": ("N", "force of the smarticles on the lower hook (x, y, z), mean since the sample before"),
-    "hook_upper_z_m": ("m", "height of the upper hook's centre"),
+HOOK_COLUMNS: Columns = {
+    "hook_upper_force_N": Column(
+        "N", "upper hook force", "force of the smarticles on the upper hook (x, y, z), mean since the sample before"
+    ),
+    "hook_lower_force_N": Column(
+        "N", "lower hook force", "force of the smarticles on the lower hook (x, y, z), mean since the sample before"
+    ),
+    "hook_upper_z_m": Column("m", "upper hook z", "height of the upper hook's centre"),
 }
 # Only in scenes that take the container away.
-RELEASE_COLUMNS: dict[str, tuple[str, str]] = {
-    "outside_count": ("1", "smarticles whose centre of mass is farther from the axis than the container's radius"),
+RELEASE_COLUMNS: Columns = {
+    "outside_count": Column(
+        "1", "outside_count", "smarticles whose centre of mass is farther from the axis than the container's radius"
+    ),
 }
 # Only in scenes that strain a chain. Forces are means since the sample before, and NaN while no string is tied.
-STRAIN_COLUMNS: dict[str, tuple[str, str]] = {
-    "string_fixed_force_N": ("N", "force of the string that is held on the chain (x, y, z)"),
-    "string_pulled_force_N": ("N", "force of the string that is pulled on the chain (x, y, z)"),
-    "channel_lower_force_N": ("N", "force of the chain on the wall at lower y (x, y, z); 0 without walls"),
-    "channel_upper_force_N": ("N", "force of the chain on the wall at higher y (x, y, z); 0 without walls"),
-    "pulled_m": ("m", "how far the moved end of the string has gone"),
-    "chain_length_m": ("m", "distance along x of the two points where strings are tied"),
-    "chain_width_m": ("m", "extent of all links along y, with their thickness"),
+STRAIN_COLUMNS: Columns = {
+    "string_fixed_force_N": Column(
+        "N", "fixed string force", "force of the string that is held on the chain (x, y, z)"
+    ),
+    "string_pulled_force_N": Column(
+        "N", "pulled string force", "force of the string that is pulled on the chain (x, y, z)"
+    ),
+    "channel_lower_force_N": Column(
+        "N", "lower wall force", "force of the chain on the wall at lower y (x, y, z); 0 without walls"
+    ),
+    "channel_upper_force_N": Column(
+        "N", "upper wall force", "force of the chain on the wall at higher y (x, y, z); 0 without walls"
+    ),
+    "pulled_m": Column("m", "pulled", "how far the moved end of the string has gone"),
+    "chain_length_m": Column("m", "chain length", "distance along x of the two points where strings are tied"),
+    "chain_width_m": Column("m", "chain width", "extent of all links along y, with their thickness"),
 }
+
+EVERY: Columns = {
+    **COLUMNS,
+    **MOTOR_COLUMNS,
+    **ENERGY_COLUMNS,
+    **LEDGER_COLUMNS,
+    **HOOK_COLUMNS,
+    **RELEASE_COLUMNS,
+    **STRAIN_COLUMNS,
+}
+"""All that any scene may have."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from dem.errors import RunError
+from dem.record.files import write_text
+from dem.record.names import PROGRESS
 
 INTERVAL = 1.0  # s of wall time between updates
 
@@ -18,7 +21,7 @@ def _now() -> float:
 
 
 @dataclass
-class Progress:
+class ProgressWriter:
     """Tells at most once per second.
 
     Args:
@@ -85,11 +88,10 @@ class Progress:
             "wall_s": now - self._begun,
             "checkpoint_s": self._checkpoint,
         }
-        temporary = self.folder / ".progress.partial.json"
         try:
-            temporary.write_text(json.dumps(data))
-            os.replace(temporary, self.folder / "progress.json")  # noqa: PTH105
-        except OSError:
+            if self.folder.is_dir():  # one that was taken away is not made again
+                write_text(self.folder / PROGRESS, json.dumps(data))
+        except RunError:
             # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
             return
         if self.show:
@@ -97,7 +99,7 @@ class Progress:
 
     def finish(self) -> None:
         """The run has ended."""
-        (self.folder / "progress.json").unlink(missing_ok=True)
+        (self.folder / PROGRESS).unlink(missing_ok=True)
         if self.show:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""The run directory: claimed by one process at a time, and marked when the run has ended."""
+"""The run directory: claimed by one process at a time, with its log."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from dem.errors import InputError, RunError
-from dem.record.files import write_json
-
-DONE, FAILED, MANIFEST, SCENE, LOCK = "done.json", "failed.json", "run.json", "scene.yaml", ".lock"
+from dem.errors import InputError
+from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 
 @contextmanager
@@ -32,7 +29,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not _is_partial(path.name))
+        held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))
     except OSError as error:
         msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
         raise InputError(msg) from None
@@ -69,11 +66,6 @@ def in_use(out: Path) -> bool:
     return False
 
 
-def _is_partial(name: str) -> bool:
-    """Whether a file is one that a killed process had not finished writing, see `dem.record.files`."""
-    return name.startswith(".") and ".partial." in name
-
-
 def recorded_scene_hash(out: Path) -> str:
     """Hash of the scene that a run directory was made from.
 
@@ -88,39 +80,13 @@ def recorded_scene_hash(out: Path) -> str:
         raise InputError(msg) from None
 
 
-def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
-    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too.
-
-    Args:
-        out: the run directory.
-        status: "failed" or "interrupted".
-        cause: why.
-        time: simulated time that the run came to [s].
-        checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
-    """
-    try:
-        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
-    except RunError:
-        return
-
-
-def mark_done(out: Path, data: dict[str, Any]) -> None:
-    """Write `done.json`, the last file of a run.
-
-    Raises:
-        RunError: it cannot be written.
-    """
-    (out / FAILED).unlink(missing_ok=True)
-    write_json(out / DONE, {"status": "done", **data})
-
-
 @contextmanager
 def log_of(out: Path) -> Iterator[logging.Logger]:
     """The log of a run, `log.txt`; a resumed run appends to it."""
     log = logging.getLogger(f"smarticles.{out.resolve()}")
     log.setLevel(logging.INFO)
     log.propagate = False
-    handler = logging.FileHandler(out / "log.txt", encoding="utf-8")
+    handler = logging.FileHandler(out / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     log.addHandler(handler)
     try:

@@ -3,279 +3,198 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.phases.chain import extent
-from dem.physics.motor import Motors
-from dem.record.columns import (
-    COLUMNS,
-    ENERGY_COLUMNS,
-    HOOK_COLUMNS,
-    LEDGER_COLUMNS,
-    MOTOR_COLUMNS,
-    RELEASE_COLUMNS,
-    STRAIN_COLUMNS,
-)
-from dem.record.files import write_whole
+from dem.errors import InputError
+from dem.record import names
+from dem.record.columns import Columns
+from dem.record.files import cannot_read, write_whole
 
-FORMAT = 1
-
-
-def packing_fraction(heights: NDArray[np.float64], *, solid_volume: float, radius: float) -> float:
-    """φ by the second-highest centre of mass, the paper's definition; NaN for fewer than two smarticles.
-
-    Args:
-        heights: (N,) centres of mass above the floor [m].
-        solid_volume: of one smarticle [m³].
-        radius: of the container [m].
-    """
-    if len(heights) < 2:
-        return math.nan
-    height = np.partition(heights, -2)[-2]
-    return float(len(heights) * solid_volume / (math.pi * radius**2 * height)) if height > 0 else math.nan
+_REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
 @dataclass
 class SeriesWriter:
-    """Samples the engine and rewrites `series.h5` whole when asked.
+    """Keeps rows, and rewrites `series.h5` whole when asked.
 
     Args:
         folder: the run directory.
-        radius: of the container [m].
+        described: what the columns are; every row has a value for each of them.
         attributes: root attributes: scene hash, seed.
-        motors: whether the scene has motors.
-        energy: whether the scene asks for energy.
-        ledger: whether the scene samples dissipation, and energy with it.
-        hooks: whether the scene has hooks.
-        release: whether the scene takes the container away.
-        strained: whether the scene strains a chain.
     """
 
     folder: Path
-    radius: float
-    attributes: dict[str, Any]
-    motors: bool = False
-    energy: bool = False
-    ledger: bool = False
-    hooks: bool = False
-    release: bool = False
-    strained: bool = False
+    described: Columns
+    attributes: Mapping[str, Any]
     _rows: dict[str, list[Any]] = field(default_factory=dict)
-    _before: tuple[float, float, NDArray[np.float64]] | None = None
-    _hooks_before: tuple[int, NDArray[np.float64]] | None = None
-    _strain_before: tuple[int, NDArray[np.float64]] | None = None
 
     def __post_init__(self) -> None:
         self._rows = {name: [] for name in self.described}
 
-    @property
-    def described(self) -> dict[str, tuple[str, str]]:
-        """Unit and description of each column."""
-        columns = dict(COLUMNS)
-        for wanted, more in (
-            (self.motors, MOTOR_COLUMNS),
-            (self.energy, ENERGY_COLUMNS),
-            (self.ledger, LEDGER_COLUMNS),
-            (self.hooks, HOOK_COLUMNS),
-            (self.release, RELEASE_COLUMNS),
-            (self.strained, STRAIN_COLUMNS),
-        ):
-            if wanted:
-                columns |= more
-        return columns
-
-    def sample(self, engine: Engine, state: State, phase: int) -> float:
-        """Take one sample.
-
-        Returns:
-            The packing fraction [1].
-        """
-        boxes = engine.particle.boxes
-        heights = state.positions[:, 2] - engine.floor
-        phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
-        container_force = self._mean_force(engine, state.momentum)
-        more: dict[str, Any] = {}
-        if self.hooks:
-            lower, upper = self._hook_forces(engine)
-            # The balance does not tell hooks from the container.
-            container_force -= lower + upper
-            more |= {
-                "hook_upper_force_N": upper,
-                "hook_lower_force_N": lower,
-                "hook_upper_z_m": engine.fixtures.upper_height,
-            }
-        if self.release:
-            outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
-            more["outside_count"] = np.count_nonzero(outside)
-            if not engine.fixtures.enclosed:
-                phi = math.nan  # a pile that spreads fills no cylinder
-        if self.strained:
-            more |= self._strain_row(engine, state)
-            # Nor does it tell strings, whose pull the smarticles received from elsewhere.
-            pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
-            container_force += np.nan_to_num(pulls)
-        row = {
-            "time_s": engine.time,
-            "phase": phase,
-            "count": engine.count,
-            "container_z_m": engine.floor,
-            "container_velocity_m_per_s": engine.container_velocity,
-            "container_force_N": container_force,
-            "com_height_m": heights.mean() if len(heights) else math.nan,
-            "kinetic_energy_J": state.kinetic_energy,
-            "max_speed_m_per_s": np.linalg.norm(state.velocities, axis=1).max(initial=0.0),
-            "unbalanced_force": engine.unbalanced_force(),
-            "packing_fraction": phi,
-        }
-        if self.motors:
-            row |= _motor_row(engine, state)
-        if self.energy:
-            row |= {
-                "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
-                "container_work_J": engine.account.container_work,
-            }
-        if self.ledger:
-            row |= _ledger_row(engine, row)
-        for name, value in (row | more).items():
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Take one row: a number, (2,) or (3,) values for each column."""
+        if row.keys() != self._rows.keys():
+            msg = f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}"
+            raise ValueError(msg)
+        for name, value in row.items():
             self._rows[name].append(value)
-        return phi
-
-    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
-        # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
-        # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
-        # Smarticles are added at rest, so a layer that was poured in between brings no momentum.
-        time, impulse, before = engine.time, engine.gravity_impulse, self._before
-        self._before = (time, impulse, momentum)
-        if before is None or time <= before[0]:
-            return np.full(3, math.nan)
-        lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
-        mean: NDArray[np.float64] = lost / (time - before[0])
-        return mean
-
-    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
-        steps, sums, before = engine.steps, engine.fixtures.hook_sums, self._hooks_before
-        self._hooks_before = (steps, sums)
-        if before is None or steps <= before[0]:
-            return np.full_like(sums, math.nan)
-        mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
-        return mean
-
-    def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
-        strings, none = engine.strings, np.full(3, math.nan)
-        row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
-        row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
-        if not engine.count:
-            return row
-        row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
-        before, self._strain_before = self._strain_before, None
-        if strings is None:
-            return row
-        walls = engine.fixtures.channel_sums
-        sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
-        self._strain_before = (engine.steps, sums)
-        row["pulled_m"] = strings.pulled
-        row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
-        if before is not None and engine.steps > before[0]:
-            means = (sums - before[1]) / (engine.steps - before[0])
-            row |= dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
-        return row
-
-    @property
-    def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs besides the columns."""
-        marks = {"hooks": self._hooks_before, "strain": self._strain_before}
-        before = self._before
-        return {
-            "before": None if before is None else [before[0], before[1], before[2].tolist()],
-            **{name: None if mark is None else [mark[0], mark[1].tolist()] for name, mark in marks.items()},
-        }
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The series so far: (n,) or (n, 3) arrays by name."""
+        """The series so far: (n,), (n, 2) or (n, 3) arrays by name."""
         return {name: np.array(values) for name, values in self._rows.items()}
 
-    def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from where `memory` and `columns` were taken."""
-        before = memory["before"]
-        self._before = None if before is None else (before[0], before[1], np.array(before[2]))
-        self._hooks_before, self._strain_before = (
-            None if mark is None else (mark[0], np.array(mark[1])) for mark in (memory["hooks"], memory["strain"])
-        )
+    def restore(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from where `columns` were taken."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def write(self) -> None:
-        """Rewrite the file with all samples.
+        """Rewrite the file with all rows.
 
         Raises:
             RunError: it cannot be written.
         """
-        write_whole(self.folder / "series.h5", self._write)
+        write_whole(self.folder / names.SERIES, self._write)
 
     def _write(self, path: Path) -> None:
         # Made in memory: on a full disk HDF5's own library does not fail cleanly but takes the process with it.
         content = io.BytesIO()
         with h5py.File(content, "w") as file:
-            file.attrs["format"] = FORMAT
+            file.attrs["format"] = names.SERIES_FORMAT
             for name, value in self.attributes.items():
                 file.attrs[name] = value
             columns = self.columns
-            for name, (unit, description) in self.described.items():
+            for name, column in self.described.items():
                 dataset = file.create_dataset(name, data=columns[name])
-                dataset.attrs["unit"] = unit
-                dataset.attrs["description"] = description
+                dataset.attrs["unit"] = column.unit
+                dataset.attrs["description"] = column.description
         path.write_bytes(content.getvalue())
 
 
-def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
-    motors: Motors | None = engine.motors
-    angles = _mean(state.angles)
-    if motors is None or not engine.articulated:
-        unknown = math.nan
-        held = angles if motors is None else _mean(motors.commands)
-        behind = error = torque = halted = unknown
-    else:
-        held = _mean(motors.commands)
-        behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
-        error = np.abs(motors.commands - state.angles).max(initial=0.0)
-        torque = math.sqrt(np.square(motors.torques).mean())
-        halted = motors.halted.mean()
-    return {
-        "commanded_angle_rad": held,
-        "angle_rad": angles,
-        "schedule_error_rad": behind,
-        "tracking_error_rad": error,
-        "motor_torque_N_m": torque,
-        "halted_fraction": halted,
-        "motor_work_J": 0.0 if motors is None else motors.work.sum(),
-        "joint_gap_m": engine.joint_gaps().max(initial=0.0),
-    }
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Series:
+    """The recorded quantities of a run against time; all arrays are read-only.
+
+    Attributes:
+        path: The file it came from.
+        data: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. What
+            there is depends on the scene: one that never actuates has no motors to tell of.
+        units: Unit of each, e.g. "m"; "1" for a pure number.
+        descriptions: What each one is.
+        scene_sha256: Hash of the scene the run was made from.
+        seed: Seed of the run.
+    """
+
+    path: Path
+    data: Mapping[str, NDArray[Any]] = field(repr=False)
+    units: Mapping[str, str] = field(repr=False)
+    descriptions: Mapping[str, str] = field(repr=False)
+    scene_sha256: str
+    seed: int
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The array of one quantity.
+
+        Raises:
+            InputError: The series does not hold it.
+        """
+        try:
+            return self.data[name]
+        except KeyError:
+            msg = f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}"
+            raise InputError(msg) from None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """(n,) float64 [s], simulated time of each sample."""
+        times: NDArray[np.float64] = self.data["time_s"]
+        return times
+
+    def nearest(self, time: float) -> int:
+        """Index of the sample nearest in time.
+
+        Args:
+            time: Simulated time [s].
+
+        Returns:
+            Index into every array.
+        """
+        return int(np.argmin(np.abs(self.time - time)))
 
 
-def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
-    contacts, hinges = engine.account.elastic()
-    given = engine.account.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
-    stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
-    return {
-        "added_energy_J": engine.account.added,
-        "contact_elastic_energy_J": contacts,
-        "hinge_elastic_energy_J": hinges,
-        "dissipated_energy_J": engine.account.dissipated,
-        "energy_residual_J": given - stored - engine.account.dissipated,
-    }
+def read_series(directory: Path | str) -> Series:
+    """Reads the time series of a run; the run may be done, failed or still going on.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The series with their units.
+
+    Raises:
+        InputError: The file is missing, damaged, or lacks what it must have.
+
+    Source:
+        ARCHITECTURE.md, "The run directory".
+
+    Example:
+        >>> series = read_series("runs/pile")
+        >>> series["com_height_m"].shape == series.time.shape, series.units["com_height_m"]
+        (True, 'm')
+    """
+    path = Path(directory) / names.SERIES
+    if not path.is_file():
+        cannot_read("series", path, "no such file", _REMEDY)
+    try:
+        with h5py.File(path, "r") as file:
+            attributes = dict(file.attrs)
+            data = {name: _frozen(file[name]) for name in file}
+            texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
+    # h5py fails with OSError, KeyError or RuntimeError, depending on where the damage lies.
+    except Exception as error:
+        cannot_read("series", path, error, _REMEDY)
+    _check(path, attributes, data)
+    return Series(
+        path=path,
+        data=MappingProxyType(data),
+        units=MappingProxyType(texts["unit"]),
+        descriptions=MappingProxyType(texts["description"]),
+        scene_sha256=str(attributes["scene_sha256"]),
+        seed=int(attributes["seed"]),
+    )
 
 
-def _mean(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) mean over smarticles of (N, 2); NaN without smarticles."""
-    mean: NDArray[np.float64] = angles.mean(axis=0) if len(angles) else np.full(2, math.nan)
-    return mean
+def _check(path: Path, attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> None:
+    for key in ("format", "scene_sha256", "seed"):
+        if key not in attributes:
+            cannot_read("series", path, f"attribute '{key}' is missing", _REMEDY)
+    if int(attributes["format"]) != names.SERIES_FORMAT:
+        cause = f"'format' must be {names.SERIES_FORMAT}: got {attributes['format']}"
+        cannot_read("series", path, cause, _REMEDY)
+    for name in ("time_s", "phase"):
+        if name not in data:
+            cannot_read("series", path, f"dataset '{name}' is missing", _REMEDY)
+    rows = len(data["time_s"])
+    if rows == 0:
+        cannot_read("series", path, "it holds no sample yet", _REMEDY)
+    for name, values in data.items():
+        if values.shape not in ((rows,), (rows, 2), (rows, 3)):
+            cause = f"'{name}' has shape {values.shape}, 'time_s' has {rows} samples"
+            cannot_read("series", path, cause, _REMEDY)
+
+
+def _frozen(dataset: Any) -> NDArray[Any]:
+    values = np.atleast_1d(np.asarray(dataset[()]))
+    values.flags.writeable = False
+    return values

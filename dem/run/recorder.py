@@ -9,10 +9,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
-from dem.record.progress import Progress
+from dem.engine.interface import Engine
+from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frames import FrameWriter
+from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
+from dem.run.sampler import Sampler
 from dem.run.watchdog import Watchdog
 
 # Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
@@ -25,7 +27,8 @@ class Recorder:
     """Records at fixed intervals of time; what is rarer than a sample of the series is counted in samples.
 
     Args:
-        series: writes the series.
+        sampler: makes the rows of the series.
+        series: writes them.
         frames: writes the frames.
         watchdog: looks at the state now and then, at every checkpoint and at the end.
         progress: told at every sample.
@@ -36,10 +39,11 @@ class Recorder:
         sphere_every: samples between these.
     """
 
+    sampler: Sampler
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
-    progress: Progress
+    progress: ProgressWriter
     interval: float
     frame_every: int
     watch_every: int | None = None
@@ -57,16 +61,20 @@ class Recorder:
             RunError: the watchdog stopped the run, or a file cannot be written.
         """
         state = engine.state()
-        phi = self.series.sample(engine, state, phase)
+        row = self.sampler.sample(engine, state, phase)
+        self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
+            motors = engine.motors.readings if engine.motors.articulated else None
             mesh = frame_mesh(
                 state,
-                contacts=engine.contacts(),
+                contacts=engine.neighbours(),
                 time=engine.time,
-                floor=engine.floor,
+                floor=engine.fixtures.floor,
                 phase=phase,
-                hinged=engine.hinged,
-                motors=engine.motors if engine.articulated else None,
+                hinged=engine.motors.present,
+                torques=None if motors is None else motors.torques,
+                work=None if motors is None else motors.work,
+                halted=None if motors is None else motors.halted,
             )
             self.frames.write(mesh, engine.time)
             self.series.write()
@@ -75,7 +83,7 @@ class Recorder:
         # After the frame is written: the last picture of a run that fails is worth having.
         if self.samples % (self.watch_every or max(1, round(WATCH_STEPS * engine.time_step / self.interval))) == 0:
             self.watch(engine, state)
-        self.progress.update(time=engine.time, phi=phi, count=engine.count)
+        self.progress.update(time=engine.time, phi=row["packing_fraction"], count=engine.count)
         self.samples += 1
         self.schedule(engine)
 
@@ -92,17 +100,17 @@ class Recorder:
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         watchdog.check(
             state,
-            floor=engine.floor,
+            floor=engine.fixtures.floor,
             time=time,
             spheres=state.spheres(engine.particle),
             raised=engine.fixtures.raised,
-            gaps=engine.joint_gaps() if engine.articulated else None,
+            gaps=engine.motors.gaps() if engine.motors.articulated else None,
         )
-        strain = engine.strain(watchdog.depth)
-        watchdog.check_depths(strain, time=time)
-        given = engine.account.given + engine.motor_work
+        overlaps = engine.overlaps(watchdog.depth)
+        watchdog.check_depths(overlaps, time=time)
+        given = engine.account.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
-        watchdog.check_energy(state, energy=energy, elastic=strain.elastic_energy, time=time)
+        watchdog.check_energy(state, energy=energy, elastic=overlaps.elastic_energy, time=time)
 
     @property
     def memory(self) -> dict[str, Any]:
@@ -113,14 +121,15 @@ class Recorder:
             "next_step": self.next_step,
             "frames": self.frames.times,
             **spheres,
-            "series": self.series.memory,
+            "series": self.sampler.memory,
         }
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
         self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
-        self.series.restore(memory["series"], columns)
+        self.sampler.restore(memory["series"])
+        self.series.restore(columns)
         self.series.write()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:

@@ -3,60 +3,31 @@
 from __future__ import annotations
 
 import logging
-import math
 import platform
 import subprocess
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
 import numpy as np
 
-from dem.engine.yade.engine import Engine
-from dem.engine.yade.hinges import DAMPER_TIME
-from dem.engine.yade.library import yade_threads, yade_version
+from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
-from dem.physics.motor import MotorLaw
-from dem.physics.stability import contact_law, hinge_law, time_steps
-from dem.plan import effects
 from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
-from dem.record.files import write_json, write_text
-from dem.record.frames import FrameWriter
-from dem.record.progress import Progress
-from dem.record.rundir import (
-    DONE,
-    FAILED,
-    MANIFEST,
-    SCENE,
-    claimed,
-    log_of,
-    mark_done,
-    mark_failed,
-    recorded_scene_hash,
-)
-from dem.record.series import SeriesWriter
-from dem.run.recorder import Recorder
+from dem.record.files import write_text
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
+from dem.record.names import DONE, FAILED, SCENE
+from dem.record.progress import ProgressWriter
+from dem.record.rundir import claimed, log_of, recorded_scene_hash
+from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
-from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, dump_scene, scene_hash
-from dem.setting.hooks import PullHook
-from dem.setting.parts import Shake, shake_amplitude
-
-FORMAT = 1
-GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
-SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
-# Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
-# slip through each other; shaking at Γ = 10, draft, reaches 0.4.
-DEPTH_LIMIT = 0.5
-# Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
-# results resolves.
-RISE_LIMIT = 0.5
+from dem.scene.reading import dump_scene, scene_hash
+from dem.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -98,22 +69,21 @@ def run_scene(
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
-    builders = builders or Builders()
-    steps = builders.steps(scene)
-    yade = yade_version()
+    builders, kind = builders or Builders(), engine_kind(scene.engine)
+    steps, made_by = builders.steps(scene), (kind.name, kind.version())
     with claimed(out, resume=resume):
         if resume and (out / DONE).exists():
             return None
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(out / MANIFEST, manifest(scene, steps=steps, command=command, yade=yade, threads=yade_threads()))
+            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=kind.threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, builders, steps=steps, yade=yade, progress=progress, resume=resume)
+            return _run(scene, out, log, builders, steps=steps, made_by=made_by, progress=progress, resume=resume)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -133,11 +103,11 @@ def _run(
     builders: Builders,
     *,
     steps: Sequence[float],
-    yade: str,
+    made_by: tuple[str, str],
     progress: bool,
     resume: bool,
 ) -> RunOutcome:
-    bar = Progress(out, scene.count, show=progress)
+    bar = ProgressWriter(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
         engine = builders.engine(scene, min(steps))
@@ -147,24 +117,15 @@ def _run(
             recorder=builders.recorder(scene, out, bar),
             folder=out,
             log=log,
-            yade=yade,
+            made_by=made_by,
             time_steps=steps,
         )
         for warning in warnings_of(scene):
             simulation.warn(warning)
         if resume:
-            _restore(simulation, scene, out, log, yade)
+            _restore(simulation, scene, out, log)
         phases = simulation.run()
-        mark_done(
-            out,
-            {
-                "time_s": engine.time,
-                "steps": engine.steps,
-                "wall_s": simulation.wall,
-                "cpu_s": simulation.cpu,
-                "phases": phases,
-            },
-        )
+        mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
     except RunError as error:
         _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
@@ -202,12 +163,12 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, *
     return cause
 
 
-def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, yade: str) -> None:
+def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger) -> None:
     if not has_checkpoint(out):
         log.info("resumed from the start: no checkpoint was written")
         simulation.recorder.truncate({})
         return
-    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), yade=yade)
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=simulation.made_by)
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
@@ -224,149 +185,63 @@ def _keep_series(simulation: Simulation | None) -> None:
         return
 
 
-def manifest(scene: Scene, *, steps: Sequence[float], command: str, yade: str, threads: int) -> dict[str, Any]:
-    """The content of `run.json`: what made the run, and the numbers that measures need.
+def manifest(
+    scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
+) -> RunManifest:
+    """What makes the run, and the numbers that measures need.
 
     Args:
         scene: what is run.
+        out: the run directory.
         steps: time step of each phase [s].
         command: the command line.
-        yade: version of YADE.
-        threads: of YADE.
+        made_by: name and version of the engine.
+        threads: that it runs with.
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
-    return {
-        "format": FORMAT,
-        "name": scene.name,
-        "scene_sha256": scene_hash(scene),
-        "seed": scene.seed,
-        "command": command,
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(yade),
-        "threads": threads,
-        "fidelity": scene.fidelity.base,
-        "count": scene.count,
-        "aspect_ratio": scene.smarticle.aspect_ratio,
-        "middle_length_m": boxes.middle_length,
-        "barb_length_m": boxes.barb_length,
-        "thickness_normal_m": boxes.thickness_normal,
-        "thickness_in_plane_m": boxes.thickness_in_plane,
-        "smarticle_mass_kg": boxes.mass,
-        "solid_volume_m3": boxes.volume,
-        "container_radius_m": scene.container.radius_m,
-        "container_tiers": 1 + len(scene.cylinder.upper),
-        "sphere_diameter_m": particle.chain.diameter,
-        "spheres_per_smarticle": len(particle.centres),
-        "time_step_s": min(steps),
-        "phases": [
-            {"index": k, "type": phase.type, "time_step_s": dt}
+    return RunManifest(
+        directory=out,
+        name=scene.name,
+        scene_sha256=scene_hash(scene),
+        seed=scene.seed,
+        command=command,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=versions(made_by),
+        threads=threads,
+        fidelity=scene.fidelity.base,
+        count=scene.count,
+        aspect_ratio=scene.smarticle.aspect_ratio,
+        middle_length=boxes.middle_length,
+        barb_length=boxes.barb_length,
+        thickness_normal=boxes.thickness_normal,
+        thickness_in_plane=boxes.thickness_in_plane,
+        smarticle_mass=boxes.mass,
+        solid_volume=boxes.volume,
+        container_radius=scene.container.radius_m,
+        container_tiers=1 + len(scene.cylinder.upper),
+        sphere_diameter=particle.chain.diameter,
+        spheres_per_smarticle=len(particle.centres),
+        time_step=min(steps),
+        phases=tuple(
+            PhaseRecord(index=k, type=phase.kind, time_step=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
-        ],
-    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
-
-
-def build_engine(scene: Scene, dt: float) -> Engine:
-    """The engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
-    return Engine(
-        particle=scene.particle,
-        cylinder=scene.cylinder,
-        law=contact_law(scene),
-        gravity=scene.gravity_m_per_s2,
-        time_step=dt,
-        shaken=effects.CONTAINER_MOTION.called_for(scene),
-        # No damper may relax more than all of its force in a step.
-        hinges=(replace(hinge_law(scene), damper_time=max(DAMPER_TIME, dt)), motor_law(scene))
-        if effects.ARTICULATION.called_for(scene)
-        else None,
-        track_work=effects.ENERGIES.called_for(scene),
-        dissipation_interval=scene.recording.dissipation_interval_s,
-        hooks=None if scene.hooks is None else scene.hooks.crosses,
-        channel=scene.channel,
-        strengths=scene.motor_strengths,
-    )
-
-
-def motor_law(scene: Scene) -> MotorLaw:
-    """The motors of a scene that actuates."""
-    return MotorLaw(
-        torque_limit=scene.torque_limit,
-        speed_limit=scene.motor.speed_limit_rad_per_s,
-        stiffness=scene.motor.stiffness_N_m_per_rad,
-        law=scene.motor.law,
-        damping=scene.motor.damping_N_m_s_per_rad,
-    )
-
-
-def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
-    """The recorder of a scene, with the watchdog's limits."""
-    gravity, recording = scene.gravity_m_per_s2, scene.recording
-    # No one radius gives the volume of a mould of tiers.
-    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
-    raised = sum(phase.distance_m for phase in scene.phases if isinstance(phase, PullHook))
-    fall = math.sqrt(2 * gravity * (scene.cylinder.height + raised))
-    shaking = max(
-        (
-            shake_amplitude(phase, gravity) * 2 * math.pi * phase.frequency_hz
-            for phase in scene.phases
-            if isinstance(phase, Shake)
         ),
-        default=0.0,
-    )
-    moved = max((getattr(phase, "speed_m_per_s", None) or 0.0 for phase in scene.phases), default=0.0)
-    return Recorder(
-        series=SeriesWriter(
-            out,
-            radius,
-            {"scene_sha256": scene_hash(scene), "seed": scene.seed},
-            motors=effects.MOTORS.called_for(scene),
-            energy=effects.ENERGIES.called_for(scene),
-            ledger=effects.ENERGY_ACCOUNT.called_for(scene),
-            hooks=effects.HOOKS.called_for(scene),
-            release=effects.WALL_REMOVAL.called_for(scene),
-            strained=effects.STRINGS.called_for(scene),
-        ),
-        frames=FrameWriter(out),
-        watchdog=Watchdog(
-            cylinder=scene.cylinder,
-            speed=SPEED_MARGIN * max(fall, shaking, moved),
-            gap=GAP_LIMIT * scene.sphere_diameter,
-            depth=DEPTH_LIMIT * scene.sphere_diameter,
-            # Without gravity there is no such measure.
-            energy=RISE_LIMIT * scene.sphere_diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
-        ),
-        progress=progress,
-        interval=recording.series_interval_s,
-        frame_every=recording.samples_in(recording.frame_interval_s),
-        spheres=FrameWriter(out, "sphere") if effects.SPHERE_GLYPHS.called_for(scene) else None,
-        sphere_every=recording.samples_in(recording.sphere_interval_s),
+        status="unfinished",
+        planar=scene.plane is not None,
+        channel_width=None if scene.plane is None else scene.plane.width_m,
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Builders:
-    """What makes the parts of a run; who watches or spoils one on purpose gives others.
-
-    Args:
-        steps: time step of each phase [s].
-        engine: of a scene and a time step [s].
-        recorder: of a scene, a run directory and its progress.
-    """
-
-    steps: Callable[[Scene], Sequence[float]] = time_steps
-    engine: Callable[[Scene, float], Engine] = build_engine
-    recorder: Callable[[Scene, Path, Progress], Recorder] = build_recorder
-
-
-def versions(yade: str) -> dict[str, str]:
+def versions(made_by: tuple[str, str]) -> dict[str, str]:
     """Versions of everything that results depend on.
 
     Args:
-        yade: that of YADE.
+        made_by: name and version of the engine.
     """
     return {
         "smarticles": _own_version(),
         "git": _git_revision(),
-        "yade": yade,
+        made_by[0]: made_by[1],
         "python": platform.python_version(),
         "numpy": np.__version__,
         "h5py": h5py.__version__,

@@ -12,12 +12,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dem.engine.yade.engine import Engine
+from dem.engine.interface import Engine, Saved
 from dem.errors import RunError
-from dem.phases.stages import Stage, begin
-from dem.record.checkpoint import CURRENT, Checkpoint, write_checkpoint
+from dem.phases.phase import Stage
+from dem.record.checkpoint import Checkpoint, write_checkpoint
+from dem.record.names import CHECKPOINT
 from dem.run.recorder import Recorder
-from dem.scene.scene import Scene, scene_hash
+from dem.scene.reading import scene_hash
+from dem.scene.scene import Scene
 
 SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
 
@@ -36,7 +38,7 @@ class Simulation:
         recorder: what is written.
         folder: the run directory.
         log: its log.
-        yade: version of YADE, stored in the checkpoints.
+        made_by: name and version of the engine, stored in the checkpoints.
         time_steps: of each phase [s].
     """
 
@@ -45,7 +47,7 @@ class Simulation:
     recorder: Recorder
     folder: Path
     log: logging.Logger
-    yade: str
+    made_by: tuple[str, str]
     time_steps: Sequence[float]
     checkpointed: float | None = None
     """Simulated time of the newest checkpoint [s], at which the watchdog found nothing; None: there is none."""
@@ -86,7 +88,7 @@ class Simulation:
     def _run_phase(self) -> None:
         phase = self.scene.phases[self._phase]
         if self._stage is None:
-            self._stage = begin(self.scene, self._phase)
+            self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
             if self.engine.time_step != self.time_steps[self._phase]:
                 self.engine.set_time_step(self.time_steps[self._phase])
                 self.recorder.schedule(self.engine)
@@ -101,7 +103,7 @@ class Simulation:
             )
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
-        duration = getattr(phase, "duration_s", None)
+        duration = phase.progress_duration
         self.recorder.progress.begin(
             index=self._phase,
             phase=phase.type,
@@ -148,21 +150,13 @@ class Simulation:
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def _checkpoint(self) -> None:
-        saved = self.folder / ".engine.partial.yade"
         # A checkpoint is good: the watchdog has looked at it.
         self.recorder.watch(self.engine)
         self._check_space()
-        try:
-            memory = self.engine.save(saved)
-            content = saved.read_bytes()
-            self.engine.load(saved, memory)
-        finally:
-            saved.unlink(missing_ok=True)
+        saved = self.engine.save(self.folder)
         assert self._stage is not None  # a checkpoint is taken while a phase runs
         state = {
-            "yade": self.yade,
-            "scene_sha256": scene_hash(self.scene),
-            "engine": memory,
+            "engine": saved.memory,
             "recorder": self.recorder.memory,
             "phase": self._phase,
             "stage": self._stage.memory,
@@ -171,7 +165,14 @@ class Simulation:
             "wall_s": self.wall,
             "cpu_s": self.cpu,
         }
-        write_checkpoint(self.folder, Checkpoint(state=state, series=self.recorder.series.columns, engine=content))
+        checkpoint = Checkpoint(
+            scene_sha256=scene_hash(self.scene),
+            made_by=self.made_by,
+            state=state,
+            series=self.recorder.series.columns,
+            engine=saved.content,
+        )
+        write_checkpoint(self.folder, checkpoint)
         self._note_checkpoint()
         if self._stop_requested:
             msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
@@ -182,8 +183,8 @@ class Simulation:
         self.recorder.progress.checkpointed(self.engine.time)
 
     def _check_space(self) -> None:
-        # YADE does not notice a full disk when it saves, and would then load what it could not write.
-        newest = self.folder / CURRENT
+        # An engine may not notice a full disk when it saves, and would then load what it could not write.
+        newest = self.folder / CHECKPOINT
         needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
         free = shutil.disk_usage(self.folder).free
         if free < needed:
@@ -196,17 +197,12 @@ class Simulation:
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go on from a checkpoint."""
         state: Mapping[str, Any] = checkpoint.state
-        saved = self.folder / ".engine.partial.yade"
-        try:
-            saved.write_bytes(checkpoint.engine)
-            self.engine.load(saved, state["engine"])
-        finally:
-            saved.unlink(missing_ok=True)
+        self.engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), self.folder)
         self._note_checkpoint()
         self.recorder.restore(state["recorder"], checkpoint.series)
         self._phase, self._target = state["phase"], state["target"]
         self.engine.set_time_step(self.time_steps[self._phase])
-        self._stage = begin(self.scene, self._phase)
+        self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
         self._performed = [dict(entry) for entry in state["performed"]]
         self._spent, self._began = state["wall_s"], time.monotonic()

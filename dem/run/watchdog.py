@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.engine.yade.strain import Strain
 from dem.errors import refuse
+from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -101,24 +101,24 @@ class Watchdog:
             "raise container.height_m or shake less",
         )
 
-    def check_depths(self, strain: Strain, *, time: float) -> None:
+    def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
         """Look at all contacts once.
 
         Args:
-            strain: the contacts, those deeper than `depth` named.
+            overlaps: the contacts, those deeper than `depth` named.
             time: simulated time [s].
 
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
         """
         cause = (
-            f"contacts more than {self.depth:.3g} m deep (deepest {strain.deepest:.3g} m), so that links pass through "
-            "each other or through the container"
+            f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
+            "through each other or through the container"
         )
         way_out = "raise fidelity.stiffness_N_per_m, or load the pile less"
-        if strain.held:
+        if overlaps.held:
             # However stiff: between the two, a contact is all that can give way.
-            first = strain.held[0]
+            first = overlaps.held[0]
             cause += (
                 f"; smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
                 f"{first.apart:.3g} m"
@@ -128,7 +128,7 @@ class Watchdog:
                 if first.between == BOTH_HOOKS
                 else "give the hook more room: a smaller hooks.length_m or a wider container"
             )
-        refuse(strain.deep, time, cause, way_out)
+        refuse(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
         """Compare the energy with what it may be after all that was seen before.

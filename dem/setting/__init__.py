@@ -1,1 +1,1 @@
-"""What is given before anything happens: smarticle, container, contact, motors, fidelity, recording; as validated data."""
+"""What is given before anything happens: smarticle, container, contact, motors, fidelity, recording; as data."""

@@ -1,21 +1,80 @@
-"""The container: an upright cylinder of flat facets, closed at the bottom; or tiers of them, narrower upwards."""
+"""The container: an upright cylinder, closed at the bottom; or tiers of them, narrower upwards."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
 
-from dem.engine.yade.library import Yade
+from dem.setting.part import Length, Part, refuse_wrong_unit
 
 Array = NDArray[np.float64]
 
-WALL_MATERIAL = "wall"
+
+class Tier(Part):
+    """One of several coaxial cylinders that stand on each other."""
+
+    radius_m: Length = Field(..., description="inner radius [m]; at most that of the tier below")
+    height_m: Length = Field(..., description="height of this tier alone [m]")
+
+    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
+
+
+class Container(Part):
+    """Upright hollow cylinder, closed at the bottom, open at the top; or a mould of several tiers."""
+
+    radius_m: Length = Field(0.0234, description="inner radius [m]; the paper's is 2w")
+    height_m: float | None = Field(
+        None, gt=0, description="height of the wall [m]; by default high enough for the pour"
+    )
+
+    tiers: tuple[Tier, ...] | None = Field(
+        None,
+        min_length=1,
+        description="instead of radius_m and height_m: coaxial cylinders from the bottom up, none wider than the one "
+        "below; a flat ceiling closes each step, the top tier is open",
+    )
+
+    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _size_of_tiers(cls, data: Any) -> Any:
+        # What needs one radius and one height takes the widest and the whole one.
+        try:
+            radii, heights = ([0.0 + tier[key] for tier in data["tiers"]] for key in ("radius_m", "height_m"))
+            size = {"radius_m": radii[0], "height_m": math.fsum(heights)}
+        except (KeyError, IndexError, TypeError):
+            return data  # there are none, or validation says what is wrong with them
+        if min(*radii, *heights) <= 0:
+            return data
+        return size | {key: value for key, value in data.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _narrower_upwards(self) -> Self:
+        tiers = self.tiers or ()
+        for number, (below, tier) in enumerate(pairwise(tiers), 1):
+            if tier.radius_m > below.radius_m:
+                msg = (
+                    f"tiers.{number}.radius_m: {tier.radius_m:g} m is wider than the tier below, {below.radius_m:g} m; "
+                    "a mould is filled from the top and lifted off: order tiers from wide to narrow"
+                )
+                raise ValueError(msg)
+        if tiers:
+            whole = math.fsum(tier.height_m for tier in tiers)
+            for key, given, own in (
+                ("radius_m", self.radius_m, tiers[0].radius_m),
+                ("height_m", self.height_m, whole),
+            ):
+                if given is not None and not math.isclose(given, own, rel_tol=1e-9):
+                    msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
+                    raise ValueError(msg)
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,39 +122,3 @@ class Cylinder:
     def inner_radii(self, heights: Array) -> Array:
         """The same for the distances [m] of the flats from the axis."""
         return self.radii(heights) * (self.inner_radius / self.radius)
-
-
-def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
-    """Add the container, its floor at z = 0.
-
-    Returns:
-        Ids of its bodies: the wall from below, and the floor last.
-    """
-    # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
-    bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
-    rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
-    bodies = []
-    for k, ring in enumerate(rings):
-        bodies += list(_band(yade, (ring, bottoms[k]), (ring, bottoms[k + 1])))
-        if k + 1 < len(rings):
-            # The ceiling of the part of a tier that the next one does not cover.
-            bodies += list(_band(yade, (ring, bottoms[k + 1]), (rings[k + 1], bottoms[k + 1])))
-    # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
-    bodies.append(yade.utils.wall(0, axis=2, sense=1, material=WALL_MATERIAL))
-    return [yade.omega.bodies.append(body) for body in bodies]
-
-
-def _ring(cylinder: Cylinder, radius: float) -> Array:
-    """(n + 1, 2) corners of the wall's polygon [m], the first one again at the end."""
-    corner = cylinder.corner_radius_of(radius)
-    angles = 2 * math.pi * np.arange(cylinder.facets + 1) / cylinder.facets
-    return np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
-
-
-def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> Iterator[Any]:
-    """Facets between two rings, each with its height [m]."""
-    for (start, end), (above_start, above_end) in zip(pairwise(one[0]), pairwise(other[0]), strict=True):
-        a, b = yade.vector(*start, one[1]), yade.vector(*end, one[1])
-        c, d = yade.vector(*above_end, other[1]), yade.vector(*above_start, other[1])
-        yield yade.utils.facet([a, b, c], material=WALL_MATERIAL, fixed=True)
-        yield yade.utils.facet([a, c, d], material=WALL_MATERIAL, fixed=True)

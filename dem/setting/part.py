@@ -41,11 +41,11 @@ class Part(BaseModel):
                 continue  # phases share keys, but one's keys do not belong in another; a base is no part of a file
             there = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
             if there:
-                return f"{there[0]!r} belongs in {part._tag()}"
+                return f"{there[0]!r} belongs in {part.tag()}"
         return "known keys: " + ", ".join(cls.model_fields)
 
     @classmethod
-    def _tag(cls) -> str:
+    def tag(cls) -> str:
         """What a scene file calls this part: the value of its `type`, or its key."""
         kind = cls.model_fields.get("type")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()

@@ -25,7 +25,7 @@ Every key with its unit, default and meaning. Editors use it to complete and che
 
 def print_schema(_: argparse.Namespace) -> int:
     """`smarticles schema`."""
-    from dem.scene.scene import json_schema  # noqa: PLC0415
+    from dem.scene.reading import json_schema  # noqa: PLC0415
 
     print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return 0

@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 from dem.errors import RunError
-from smarticles.commands.studies import told_results
-from smarticles.layout import columns
+from smarticles.layout import columns, told_results
 from smarticles.parsing import Commands
 
 

@@ -21,13 +21,16 @@ from scipy.spatial.transform import Rotation
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import YadeKind, contact_law_of, hinge_law, motor_law
 from dem.errors import RunError
-from dem.physics.stability import ContactLaw, contact_law, damping_ratio, hinge_law, time_step
-from dem.record.progress import Progress
+from dem.physics.contact import ContactLaw, damping_ratio
+from dem.plan.steps import time_step
+from dem.record.progress import ProgressWriter
+from dem.run.build import build_recorder
 from dem.run.recorder import Recorder
-from dem.run.run import build_engine, build_recorder, motor_law
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -100,9 +103,9 @@ def ball_law(
     )
 
 
-def build(particle: Particle, law: ContactLaw, *, dt: float, gravity: float = 0.0) -> Engine:
+def build(particle: Particle, law: ContactLaw, *, dt: float, gravity: float = 0.0) -> YadeEngine:
     """An engine with a floor at z = 0 and a wall far away."""
-    return Engine(
+    return YadeEngine(
         particle=particle,
         cylinder=Cylinder(radius=0.5, height=0.2, facets=16),
         law=law,
@@ -112,12 +115,12 @@ def build(particle: Particle, law: ContactLaw, *, dt: float, gravity: float = 0.
     )
 
 
-def build_hinged(scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
+def build_hinged(scene: Scene, *, gravity: float, dt: float | None = None) -> YadeEngine:
     """An engine for smarticles that are articulated."""
-    return Engine(
+    return YadeEngine(
         particle=scene.particle,
         cylinder=Cylinder(radius=0.5, height=scene.cylinder.height, facets=16),
-        law=contact_law(scene),
+        law=contact_law_of(scene),
         gravity=gravity,
         time_step=dt or time_step(scene),
         shaken=False,
@@ -125,12 +128,12 @@ def build_hinged(scene: Scene, *, gravity: float, dt: float | None = None) -> En
     )
 
 
-def add(engine: Engine, position: ArrayLike, rotation: Rotation = FLAT) -> None:
+def add(engine: YadeEngine, position: ArrayLike, rotation: Rotation = FLAT) -> None:
     """Add a body at rest."""
     engine.add(Poses(np.array([position], dtype=float), (rotation,)))
 
 
-def push(engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
+def push(engine: YadeEngine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
     """Give a welded body a velocity and a spin."""
     bodies_, vector = engine._omega.bodies, engine._yade.vector
     clump, (v, w) = bodies_[engine._assembly.bodies[k]].state, (np.asarray(velocity, float), np.asarray(spin, float))
@@ -151,19 +154,19 @@ def body_rotations(state: State) -> Array:
     return rotations
 
 
-def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:
+def advance_watched(engine: YadeEngine, steps: int, look: Callable[[], None]) -> None:
     """Advance, and call `look` after each step."""
     for _ in range(steps):
         engine.advance(1)
         look()
 
 
-def bodies(engine: Engine) -> list[Any]:
+def bodies(engine: YadeEngine) -> list[Any]:
     """States of YADE's rigid bodies: one per smarticle, or three."""
     return [engine._omega.bodies[body].state for body in engine._assembly.bodies]
 
 
-def hold(engine: Engine, links: Iterable[int], *, still: bool = True) -> None:
+def hold(engine: YadeEngine, links: Iterable[int], *, still: bool = True) -> None:
     """Hold links of smarticle 0 where they are, or let go of them."""
     for link in links:
         body, zero = bodies(engine)[link], engine._yade.vector(0, 0, 0)
@@ -172,7 +175,7 @@ def hold(engine: Engine, links: Iterable[int], *, still: bool = True) -> None:
 
 
 def drive(
-    engine: Engine,
+    engine: YadeEngine,
     scene: Scene,
     duration: float,
     targets: Targets,
@@ -187,30 +190,30 @@ def drive(
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
     for look in range(1, round(duration / interval) + 1):
-        engine.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
+        engine.motors.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
         if log is None:
             engine.advance(steps)
         else:
             for _ in range(steps):
                 engine.advance(1)
-                log[0].append(engine._hinges.torques()[0])
-                log[1].append(engine._hinges.angles()[0])
+                log[0].append(engine.motors._hinges.torques()[0])
+                log[1].append(engine.motors._hinges.angles()[0])
         yield look * interval
 
 
 # -- as a run has it ---------------------------------------------------------------------------------------------------
 
 
-def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
+def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, YadeEngine, Recorder]:
     """Engine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
-    engine = build_engine(scene, time_step(scene) if dt is None else dt)
-    progress = Progress(Path(out), scene.count, show=False)
+    engine = YadeKind().build(scene, time_step(scene) if dt is None else dt)
+    progress = ProgressWriter(Path(out), scene.count, show=False)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 
-def look(engine: Engine, recorder: Recorder) -> str | None:
+def look(engine: YadeEngine, recorder: Recorder) -> str | None:
     """What the recorder's next look says, contacts included; None: nothing."""
     recorder.watch_every = 1
     try:
@@ -220,13 +223,13 @@ def look(engine: Engine, recorder: Recorder) -> str | None:
     return None
 
 
-def energy(engine: Engine) -> float:
+def energy(engine: YadeEngine) -> float:
     """Kinetic, potential, and that of the springs of all contacts [J]."""
     state = engine.state()
     return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.account.elastic()[0]
 
 
-def fastest(engine: Engine) -> float:
+def fastest(engine: YadeEngine) -> float:
     """Speed of the fastest link [m/s]."""
     return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
 

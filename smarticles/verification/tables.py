@@ -94,7 +94,7 @@ def compute_known(folder: Path) -> None:
     Raises:
         RunError: YADE is not installed, or a disk is full.
     """
-    write_json(folder / "versions.json", versions(yade_version()))
+    write_json(folder / "versions.json", versions(("yade", yade_version())))
     _write(
         folder / "verification.csv", [row for case in known.CASES for row in _timed(case.name, rows_of_answers, case)]
     )

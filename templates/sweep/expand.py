@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dem.errors import InputError
-from dem.scene.scene import Scene, parse_scene, scene_hash
+from dem.scene.reading import parse_scene, scene_hash
+from dem.scene.scene import Scene
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
 from templates.sweep.sweep_file import SEED, Sweep
 

@@ -20,7 +20,8 @@ from typing import Any, Literal
 
 from dem.errors import InputError
 from dem.record.files import write_json, write_text
-from dem.scene.scene import Scene, dump_scene
+from dem.scene.reading import dump_scene
+from dem.scene.scene import Scene
 from templates.sweep.expand import Point
 from templates.sweep.files import read_json
 from templates.sweep.render import Value

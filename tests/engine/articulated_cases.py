@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import contact_law, hinge_law, time_step
-from dem.run.run import motor_law
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
+from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from smarticles.verification.bench import bodies, drive
@@ -25,12 +25,12 @@ from smarticles.verification.bench import bodies, drive
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
-def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> Engine:
+def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> YadeEngine:
     """A wide container, so that nothing but the floor is near."""
-    return Engine(
+    return YadeEngine(
         particle=scene.particle,
         cylinder=Cylinder(radius=radius, height=scene.cylinder.height, facets=16),
-        law=contact_law(scene),
+        law=contact_law_of(scene),
         gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
         time_step=dt or time_step(scene),
         shaken=False,
@@ -38,9 +38,9 @@ def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None
     )
 
 
-def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, Engine]:
+def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, YadeEngine]:
     """One smarticle, welded, without gravity, far from everything."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, gravity=0.0)
     cases.add(engine, (0, 0, 0.05), TILTED)
     cases.push(engine, 0, velocity=velocity, spin=spin)
@@ -51,17 +51,17 @@ def vec(value: Any) -> np.ndarray:
     return np.array([value[0], value[1], value[2]])
 
 
-def momentum(engine: Engine) -> np.ndarray:
+def momentum(engine: YadeEngine) -> np.ndarray:
     return sum((b.mass * vec(b.vel) for b in bodies(engine)), np.zeros(3))
 
 
-def angular_momentum(engine: Engine) -> np.ndarray:
+def angular_momentum(engine: YadeEngine) -> np.ndarray:
     """About the origin."""
     parts = (np.cross(vec(b.pos), b.mass * vec(b.vel)) + vec(b.angMom) for b in bodies(engine))
     return sum(parts, np.zeros(3))
 
 
-def kinetic_energy(engine: Engine) -> float:
+def kinetic_energy(engine: YadeEngine) -> float:
     """From velocities and from the angular momenta that YADE integrates."""
     total = 0.0
     for b in bodies(engine):
@@ -71,16 +71,16 @@ def kinetic_energy(engine: Engine) -> float:
     return total
 
 
-def sphere_positions(engine: Engine) -> np.ndarray:
+def sphere_positions(engine: YadeEngine) -> np.ndarray:
     """(S, 3) of all smarticles, sphere by sphere, where YADE has them."""
     return np.array([vec(engine._omega.bodies[s].state.pos) for s in sorted(engine._assembly.smarticle_of)])
 
 
-def sphere_velocities(engine: Engine) -> np.ndarray:
+def sphere_velocities(engine: YadeEngine) -> np.ndarray:
     return np.array([vec(engine._omega.bodies[s].state.vel) for s in sorted(engine._assembly.smarticle_of)])
 
 
-def snapshot(engine: Engine) -> dict[str, Any]:
+def snapshot(engine: YadeEngine) -> dict[str, Any]:
     return {
         "p": momentum(engine),
         "l": angular_momentum(engine),
@@ -90,14 +90,14 @@ def snapshot(engine: Engine) -> dict[str, Any]:
         "sphere_velocities": sphere_velocities(engine),
         "vertices": engine.state().vertices,
         "angles": engine.state().angles,
-        "gap": engine.joint_gaps().max(),
+        "gap": engine.motors.gaps().max(),
     }
 
 
 # -- welding and splitting ---------------------------------------------------------------------------------------------
 
 
-def inertia_tensor(engine: Engine) -> np.ndarray:
+def inertia_tensor(engine: YadeEngine) -> np.ndarray:
     """(3, 3) of all bodies about their common centre of mass, where YADE has them."""
     links = bodies(engine)
     mass = sum(b.mass for b in links)
@@ -114,12 +114,12 @@ def split_and_weld(data: dict[str, Any], *, velocity: Any, spin: Any, steps: int
     _, engine = floating(data, velocity=velocity, spin=spin)
     engine.advance(steps)
     out = {"before": snapshot(engine)}
-    engine.articulate()
+    engine.motors.articulate()
     out["split"] = snapshot(engine)
     out["loss"] = engine._assembly.weld()
     out["welded"] = snapshot(engine)
     out["moments"] = np.sort(vec(bodies(engine)[0].inertia))
-    engine.articulate()
+    engine.motors.articulate()
     out["again"] = snapshot(engine)
     return {**out, "dt": engine.time_step, "size": engine.particle.reach}
 
@@ -128,7 +128,7 @@ def weld_in_motion(data: dict[str, Any], *, targets_deg: Any, spin: Any, time: f
     """Barbs that are on their way are welded; what rigid bodies say about the loss."""
     scene, engine = floating(data, velocity=(0.1, -0.2, 0.3), spin=spin)
     engine.advance(1)
-    engine.articulate()
+    engine.motors.articulate()
     begun, goal = engine.state().angles[0], np.radians(targets_deg)
     for _ in drive(engine, scene, time, lambda t: begun + (goal - begun) * t / time):
         pass
@@ -157,7 +157,7 @@ def weld_in_motion(data: dict[str, Any], *, targets_deg: Any, spin: Any, time: f
     }
 
 
-def forces(engine: Engine) -> dict[tuple[int, int], np.ndarray]:
+def forces(engine: YadeEngine) -> dict[tuple[int, int], np.ndarray]:
     """Forces of all contacts that carry one, by sphere."""
     owner = engine._assembly.smarticle_of
     return {
@@ -167,11 +167,11 @@ def forces(engine: Engine) -> dict[tuple[int, int], np.ndarray]:
     }
 
 
-def bonds(engine: Engine) -> int:
+def bonds(engine: YadeEngine) -> int:
     return sum(type(i.phys).__name__ == "CohFrictPhys" for i in engine._omega.interactions)
 
 
-def stale(engine: Engine) -> int:
+def stale(engine: YadeEngine) -> int:
     """Interactions with a body that no longer exists."""
     omega, count = engine._omega, len(engine._omega.bodies)
     return sum(any(body >= count or omega.bodies[body] is None for body in (i.id1, i.id2)) for i in omega.interactions)
@@ -182,7 +182,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
 
     The same steps lead up to the change, so that a pile left alone is the answer.
     """
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, radius=scene.container.radius_m)
     rng = np.random.default_rng(scene.seed)
     layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}
@@ -190,15 +190,15 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
     engine.advance(round(settle / engine.time_step))
     split_first = change in ("split-rest", "weld")
     if split_first:
-        engine.articulate()
+        engine.motors.articulate()
         begun = engine.state().angles
         for _ in drive(engine, scene, 0.1, lambda _: begun):
             pass
     before = kinetic_energy(engine), sphere_positions(engine), forces(engine)
     if change == "split":
-        engine.articulate()
+        engine.motors.articulate()
     elif change == "weld":
-        engine.weld()
+        engine.motors.weld()
     kept = forces(engine)
     energy = kinetic_energy(engine)
     moved = np.abs(sphere_positions(engine) - before[1]).max()
@@ -224,7 +224,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
     }
 
 
-def own_contacts(engine: Engine) -> int:
+def own_contacts(engine: YadeEngine) -> int:
     """Contacts with a force between spheres of one smarticle."""
     owner = engine._assembly.smarticle_of
     return sum(
@@ -237,12 +237,11 @@ def own_contacts(engine: Engine) -> int:
 def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> dict[str, Any]:
     """A smarticle whose barbs are at an angle [rad] saves itself and loads what it saved, and its motors look again."""
     scene, engine = floating(data, spin=spin)
-    engine.articulate()
+    engine.motors.articulate()
     for _ in drive(engine, scene, 0.25, lambda _: [angle, angle]):
         pass
-    path = Path(folder) / "saved.yade"
-    saved = (engine._hinges.angles(), engine._hinges.gaps(), engine._hinges.torques())
-    engine.load(path, engine.save(path))
-    loaded = (engine._hinges.angles(), engine._hinges.gaps(), engine._hinges.torques())
-    engine.actuate(np.full((1, 2), angle), scene.fidelity.control_interval_s)
-    return {"saved": saved, "loaded": loaded, "looked": engine._hinges.torques(), "state": engine.state().angles}
+    saved = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
+    engine.load(engine.save(Path(folder)), Path(folder))
+    loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
+    engine.motors.actuate(np.full((1, 2), angle), scene.fidelity.control_interval_s)
+    return {"saved": saved, "loaded": loaded, "looked": engine.motors._hinges.torques(), "state": engine.state().angles}

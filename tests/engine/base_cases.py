@@ -3,59 +3,58 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import add, advance_watched, build, load, pour
+from cases import add, advance_watched, build, pour
 from fixture_cases import damped
 
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.phases.stages import begin, shake_amplitude
-from dem.physics.stability import time_step
-from dem.record.series import SeriesWriter
+from dem.plan.steps import time_step
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 
 def last_shake(scene: Scene) -> tuple[float, float]:
     """Amplitude [m] and frequency [Hz] of a scene's last shaking."""
     phase = [phase for phase in scene.phases if phase.type == "shake"][-1]
-    return shake_amplitude(phase, scene.gravity_m_per_s2), phase.frequency_hz
+    return phase.amplitude(scene.gravity_m_per_s2), phase.frequency_hz
 
 
-def without_wall(engine: Engine, scene: Scene) -> set[int]:
+def without_wall(engine: YadeEngine, scene: Scene) -> set[int]:
     """Shake with the wall for a part of a period, then take it away; its bodies' ids."""
     amplitude, frequency = last_shake(scene)
-    engine.shake(amplitude=amplitude, frequency=frequency)
+    engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
     engine.advance(round(0.3 / frequency / engine.time_step))
-    engine.stop_container()
+    engine.fixtures.stop()
     wall = set(engine.fixtures.container[:-1])
-    engine.remove_wall()
+    engine.fixtures.remove_wall()
     engine.advance(11)
     return wall
 
 
 def floor_motion(data: dict[str, Any], *, periods: float, refine: int, rest: int) -> dict[str, Any]:
     """Position of the floor at every step, once the wall has shaken with it and is gone."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True, dt=time_step(scene) / refine)
     wall = without_wall(engine, scene)
     amplitude, frequency = last_shake(scene)
-    start = engine.floor
-    engine.shake(amplitude=amplitude, frequency=frequency)
+    start = engine.fixtures.floor
+    engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
     heights: list[float] = []
     steps = math.ceil(periods / frequency / engine.time_step)
-    advance_watched(engine, steps, lambda: heights.append(engine.floor))
-    engine.stop_container()
-    end = engine.floor
+    advance_watched(engine, steps, lambda: heights.append(engine.fixtures.floor))
+    engine.fixtures.stop()
+    end = engine.fixtures.floor
     engine.advance(rest)
     return {
         "time": np.arange(1, steps + 1) * engine.time_step,
         "z": np.array(heights) - start,
         "amplitude": amplitude,
         "dt": engine.time_step,
-        "crept": engine.floor - end,
+        "crept": engine.fixtures.floor - end,
         "start": start,
         "moved": len(engine.fixtures.bodies),
         "bodies": sum(1 for body in wall if engine._omega.bodies[body] is not None),
@@ -64,7 +63,7 @@ def floor_motion(data: dict[str, Any], *, periods: float, refine: int, rest: int
 
 def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
     """A smarticle that lies flat on the floor and moves with it: force on the floor and work at every step."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     engine.account._works = True
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
@@ -81,7 +80,7 @@ def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
         return float(state.kinetic_energy + mass * g * state.positions[0, 2])
 
     before, worked = energy(), engine.account.container_work
-    engine.shake(amplitude=amplitude, frequency=frequency)
+    engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
     rows: list[tuple[float, float, float]] = []
 
     def look() -> None:
@@ -102,26 +101,26 @@ def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
 
 def shaken_pile(data: dict[str, Any], *, count: int, samples: int, every: int) -> dict[str, Any]:
     """A pile on the floor alone, thrown about: the momentum balance against the contact force of every step."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
     wall = without_wall(engine, scene)
     amplitude, frequency = last_shake(scene)
-    engine.shake(amplitude=amplitude, frequency=frequency)
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
-    means = []
+    engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
+    means, balance = [], []
     stale = 0
     for _ in range(samples):
         forces: list[np.ndarray] = []
         advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
         means.append(np.mean(forces, axis=0))
-        writer.sample(engine, engine.state(), 0)
+        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
         stale += sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
     return {
         "steps": np.array(means),
-        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "balance": np.array(balance),
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
         "stale": stale,
     }
@@ -134,14 +133,14 @@ def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
         {"type": "remove-container", "speed_m_per_s": 0.05, "duration_s": 0.06},
         {"type": "shake", "duration_s": 0.1},
     ]
-    scene = load(data | {"count": 1, "phases": phases})
+    scene = scene_of(data | {"count": 1, "phases": phases})
     engine = build(scene, shaken=True)
     add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
-    lifting = begin(scene, 1)
+    lifting = scene.phases[1].begin(scene, 1)
     while wait := lifting.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     try:
-        begin(scene, 2).proceed(engine)
+        scene.phases[2].begin(scene, 2).proceed(engine)
     except RunError as error:
         return str(error)
     return "nothing"

@@ -14,15 +14,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
+from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
-from dem.physics.stability import ContactLaw, contact_law, stable_time_step, time_step
-from dem.record.series import SeriesWriter
+from dem.physics.contact import ContactLaw
+from dem.plan.steps import time_step
 from dem.run.run import run_scene
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from dem.setting.parts import shake_amplitude
 from smarticles.verification.bench import add, advance_watched, body_rotations, push, scene_of
 from smarticles.verification.known.floor import resting
 
@@ -35,11 +37,11 @@ def build(
     dt: float | None = None,
     radius: float | None = None,
     shaken: bool = False,
-) -> Engine:
-    return Engine(
+) -> YadeEngine:
+    return YadeEngine(
         particle=scene.particle,
         cylinder=Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=64),
-        law=law or contact_law(scene),
+        law=law or contact_law_of(scene),
         gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
         time_step=dt or time_step(scene),
         shaken=shaken,
@@ -87,13 +89,13 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
 def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle lying flat on a floor without friction is pushed along it."""
     scene = scene_of(data)
-    engine = resting(scene.particle, contact_law(scene), dt=time_step(scene), speed=speed)
+    engine = resting(scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
     engine.advance(round(duration / engine.time_step))
     return {"v": engine.state().velocities[0, 1]}
 
 
 def pour(
-    engine: Engine, scene: Scene, count: int, obstacles: np.ndarray | None = None, radius: float | None = None
+    engine: YadeEngine, scene: Scene, count: int, obstacles: np.ndarray | None = None, radius: float | None = None
 ) -> None:
     """A layer just above the floor, clear of the centres of spheres (n, 3) that are there."""
     poses = place_layer(
@@ -113,24 +115,24 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     engine = build(scene)
     pour(engine, scene, count)
     engine.advance(round(settle / engine.time_step))
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
     forces: list[np.ndarray] = []
     advance_watched(engine, watch, lambda: forces.append(engine.container_force()))
     state = engine.state()
-    writer.sample(engine, state, 0)
+    balance = sampler.sample(engine, state, 0)["container_force_N"]
     return {
         "forces": np.array(forces),
-        "balance": writer._rows["container_force_N"][-1],
+        "balance": balance,
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
         "speed": np.linalg.norm(state.velocities, axis=1).max(),
         "unbalanced": engine.unbalanced_force(),
         "touches": engine.touches(),
-        "contacts": engine.contacts(),
+        "contacts": engine.neighbours(),
     }
 
 
-def _wall(engine: Engine) -> float:
+def _wall(engine: YadeEngine) -> float:
     """Height of the first facet of the wall."""
     return float(engine._omega.bodies[engine.fixtures.container[0]].state.pos[2])
 
@@ -140,19 +142,19 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     scene = scene_of(data)
     engine = build(scene, shaken=True)
     phase = next(p for p in scene.phases if p.type == "shake")
-    amplitude = shake_amplitude(phase, scene.gravity_m_per_s2)
+    amplitude = phase.amplitude(scene.gravity_m_per_s2)
     if delay:  # YADE takes a run of no steps for one without end
         engine.advance(delay)
-    begun, start = engine.time, engine.floor
+    begun, start = engine.time, engine.fixtures.floor
     wall_start = _wall(engine)
-    engine.shake(amplitude=amplitude, frequency=phase.frequency_hz)
+    engine.fixtures.shake(amplitude=amplitude, frequency=phase.frequency_hz)
     rows: list[tuple[float, float]] = []
     steps = math.ceil(periods / phase.frequency_hz / engine.time_step)
-    advance_watched(engine, steps, lambda: rows.append((engine.floor, engine.container_velocity)))
+    advance_watched(engine, steps, lambda: rows.append((engine.fixtures.floor, engine.fixtures.velocity)))
     floors, speeds = np.array(rows).T
     wall = _wall(engine)
-    last, elapsed = engine.floor, engine.time - begun
-    engine.stop_container()
+    last, elapsed = engine.fixtures.floor, engine.time - begun
+    engine.fixtures.stop()
     if rest:
         engine.advance(rest)
     return {
@@ -163,8 +165,8 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
         "dt": engine.time_step,
         "amplitude": amplitude,
         "wall_moved": wall - wall_start,
-        "crept": engine.floor - last,
-        "rest_velocity": engine.container_velocity,
+        "crept": engine.fixtures.floor - last,
+        "rest_velocity": engine.fixtures.velocity,
     }
 
 
@@ -175,18 +177,18 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
     phase = next(p for p in scene.phases if p.type == "shake")
-    engine.shake(amplitude=shake_amplitude(phase, scene.gravity_m_per_s2), frequency=phase.frequency_hz)
-    writer = SeriesWriter(Path(), scene.container.radius_m, {})
-    writer.sample(engine, engine.state(), 0)
-    means = []
+    engine.fixtures.shake(amplitude=phase.amplitude(scene.gravity_m_per_s2), frequency=phase.frequency_hz)
+    sampler = Sampler(scene.container.radius_m)
+    sampler.sample(engine, engine.state(), 0)
+    means, balance = [], []
     for _ in range(samples):
         forces: list[np.ndarray] = []
         advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
         means.append(np.mean(forces, axis=0))
-        writer.sample(engine, engine.state(), 0)
+        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
     return {
         "steps": np.array(means),
-        "balance": np.array(writer._rows["container_force_N"][1:]),
+        "balance": np.array(balance),
         "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
     }
 
@@ -198,7 +200,7 @@ def stack(
     scene = scene_of(data)
     dt = None
     if times_stable is not None:
-        dt = times_stable * stable_time_step(scene.particle, contact_law(scene))
+        dt = times_stable * stable_time_step(scene.particle, contact_law_of(scene))
     engine = build(scene, dt=dt)
     particle = scene.particle
     thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius

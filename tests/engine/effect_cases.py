@@ -14,12 +14,13 @@ import h5py
 import meshio
 import numpy as np
 
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import time_step
-from dem.plan.effects import Adds, decide
+from dem.engine.effect import Adds
+from dem.engine.yade.engine import YadeEngine
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
+from dem.plan.steps import time_step
+from dem.run.build import build_engine
 from dem.run.recorder import Recorder
-from dem.run.run import build_engine
 
 # What every run directory holds, whatever the scene calls for.
 OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
@@ -27,12 +28,12 @@ OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
 
 def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     """Run a scene; what it was declared to be made of, and what was found at every sample and on the disk."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     declared = Adds.together(decision.adds for decision in decide(scene))
     found: dict[str, set[Any]] = defaultdict(set)
     record = Recorder.record
 
-    def look(recorder: Recorder, engine: Engine, phase: int) -> None:
+    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
         record(recorder, engine, phase)
         _look(engine, found)
 
@@ -58,7 +59,7 @@ def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     }
 
 
-def _look(engine: Engine, found: dict[str, set[Any]]) -> None:
+def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
     omega = engine._omega
     found["engines"].add(tuple(type(one).__name__ for one in omega.engines))
     _, collider, loop, *_ = omega.engines
@@ -84,11 +85,11 @@ def _look(engine: Engine, found: dict[str, set[Any]]) -> None:
 
 def calls_per_step(data: dict[str, Any], *, steps: int, moving: bool = False) -> dict[str, float]:
     """Functions of Python that are entered while time advances, by name, per step; with smarticles present."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build_engine(scene, time_step(scene))
     cases.add(engine, (0, 0, 0.05))
     if moving:
-        engine.shake(amplitude=1e-4, frequency=30)
+        engine.fixtures.shake(amplitude=1e-4, frequency=30)
     engine.advance(3)
     counted: Counter[str] = Counter()
 
@@ -109,12 +110,12 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
     """Smarticles that roll about on the floor, clear of the wall, with the wall and without it."""
     states = []
     for remove in (False, True):
-        scene = cases.load(data)
+        scene = cases.scene_of(data)
         engine = build_engine(scene, time_step(scene))
         cases.pour(engine, scene, scene.count, radius=0.7 * scene.container.radius_m)
         engine.advance(200)
         if remove and lift is None:
-            engine.remove_wall()
+            engine.fixtures.remove_wall()
         elif remove:
             engine.fixtures.lift_wall(lift)
         engine.advance(steps)
@@ -134,12 +135,12 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
 
 def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     """The energy account of a pile right before and right after the simulation is saved and loaded."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)
     engine.advance(2500)
-    before, path = engine.account.elastic(), Path(out) / "engine.yade"
-    engine.load(path, engine.save(path))
+    before, folder = engine.account.elastic(), Path(out)
+    engine.load(engine.save(folder), folder)
     after = engine.account.elastic()
-    engine.remove_wall()
+    engine.fixtures.remove_wall()
     return {"before": before, "after": after, "dissipated": engine.account.dissipated}

@@ -7,30 +7,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import load, pour
+from cases import pour
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import Engine
+from dem.engine.effect import EffectName
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
-from dem.phases.stages import begin
-from dem.physics.stability import contact_law, time_step
-from dem.record.progress import Progress
-from dem.record.series import SeriesWriter
-from dem.run.run import build_recorder
+from dem.plan.steps import time_step
+from dem.record.progress import ProgressWriter
+from dem.run.build import build_recorder
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from smarticles.verification.bench import FLAT, add, advance_watched
+from smarticles.verification.bench import FLAT, add, advance_watched, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
 
-def build(scene: Scene, *, radius: float | None = None) -> Engine:
+def build(scene: Scene, *, radius: float | None = None) -> YadeEngine:
     cylinder = scene.cylinder
     if radius is not None:
         cylinder = type(cylinder)(radius=radius, height=cylinder.height, facets=cylinder.facets)
-    return Engine(
+    return YadeEngine(
         particle=scene.particle,
         cylinder=cylinder,
-        law=contact_law(scene),
+        law=contact_law_of(scene),
         gravity=scene.gravity_m_per_s2,
         time_step=time_step(scene),
         shaken=any(phase.type == "shake" for phase in scene.phases),
@@ -38,19 +39,19 @@ def build(scene: Scene, *, radius: float | None = None) -> Engine:
     )
 
 
-def damped(engine: Engine, damping: float) -> None:
+def damped(engine: YadeEngine, damping: float) -> None:
     """Cundall's damping, to bring things to rest; it is no part of the model."""
     engine._omega.engines[-1].damping = damping
 
 
-def mean_hook_forces(engine: Engine, steps: int) -> np.ndarray:
+def mean_hook_forces(engine: YadeEngine, steps: int) -> np.ndarray:
     """(2, 3) mean over steps, lower and upper hook."""
     before = engine.fixtures.hook_sums
     engine.advance(steps)
     return (engine.fixtures.hook_sums - before) / steps
 
 
-def elastic(engine: Engine) -> float:
+def elastic(engine: YadeEngine) -> float:
     """Energy in the springs of all contacts [J]."""
     total = 0.0
     for contact in engine._omega.interactions:
@@ -61,7 +62,7 @@ def elastic(engine: Engine) -> float:
     return total
 
 
-def energies(engine: Engine) -> dict[str, float]:
+def energies(engine: YadeEngine) -> dict[str, float]:
     state = engine.state()
     return {
         "kinetic": state.kinetic_energy,
@@ -72,7 +73,7 @@ def energies(engine: Engine) -> dict[str, float]:
 
 def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     """A U hung over a bar of the upper hook; then the hook is raised with it."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     cross = scene.hooks.crosses[1]
     particle = scene.particle
@@ -107,7 +108,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     Args:
         limit: overlap at which to stop [m].
     """
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     lower, upper = scene.hooks.crosses
     # The middle link stands at the end of two bars, which the barbs lie along.
@@ -115,12 +116,12 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     middle = standing.apply(engine.particle.centres[engine.particle.links == 1])[:, 0].mean()
     beside = upper.length / 2 + engine.particle.radius + 1e-4
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
-    before = engine.strain(limit)
+    before = engine.overlaps(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
-        strain = engine.strain(limit)
+        strain = engine.overlaps(limit)
     try:
         watchdog.check_depths(strain, time=engine.time)
         said = ""
@@ -136,7 +137,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
 
 def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, Any]:
     """A bar's end inside the mouth of a U that lies on the floor draws it along by its middle link."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, radius=0.2)
     particle = scene.particle
     cross = scene.hooks.crosses[0]
@@ -165,7 +166,7 @@ def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, An
     }
 
 
-def _pour(engine: Engine, scene: Scene, count: int, settle: float) -> None:
+def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
     """A small pile, damped to rest."""
     hooks = [cross.obstacles(2 * scene.particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
     pour(engine, scene, count, np.concatenate([np.empty((0, 3)), *hooks]), engine.cylinder.inner_radius)
@@ -176,7 +177,7 @@ def _pour(engine: Engine, scene: Scene, count: int, settle: float) -> None:
 
 def rest(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
     """Forces on everything that is fixed, under a pile at rest in a container with hooks."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     _pour(engine, scene, count, settle)
     damped(engine, 0.3)
@@ -201,7 +202,7 @@ def rest(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
 
 def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
     """A pile at rest whose wall goes away at once: what is there before, right after, and while it spreads."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     _pour(engine, scene, count, settle)
     wall = set(engine.fixtures.container[:-1])
@@ -210,7 +211,7 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
         return sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
 
     contacts, before, state = with_wall(), energies(engine), engine.state()
-    engine.remove_wall()
+    engine.fixtures.remove_wall()
     after, same = energies(engine), engine.state()
     stale = with_wall()
     totals = [sum(after.values())]
@@ -239,7 +240,7 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
 
 def rub(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle that lies against a flat of a wall, held by a gravity that is turned, while the wall is lifted."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, radius=0.5)
     particle, half = scene.particle, math.pi / engine.cylinder.facets
     outwards = np.array([math.cos(half), math.sin(half), 0.0])
@@ -272,7 +273,7 @@ def rub(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any
 
 def inventory(data: dict[str, Any]) -> dict[str, Any]:
     """What an engine is made of before anything is poured."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     names = [type(one).__name__ for one in engine._omega.engines]
     collider, loop = engine._omega.engines[1], engine._omega.engines[2]
@@ -288,19 +289,19 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(SeriesWriter(Path(), 1.0, {}, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, {EffectName.HOOKS} if scene.hooks is not None else set()).described),
     }
 
 
 def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """The phase itself, on one smarticle that lies on the floor."""
     phase = {"type": "remove-container", "speed_m_per_s": speed, "duration_s": duration}
-    scene = load(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
+    scene = scene_of(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
     engine = build(scene)
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = begin(scene, 1)
+    stage = scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

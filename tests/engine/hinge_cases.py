@@ -18,7 +18,8 @@ from articulated_cases import (
 )
 from scipy.spatial.transform import Rotation
 
-from dem.physics.stability import contact_law, hinge_law, hinged_stable_time_step
+from dem.engine.yade.kind import contact_law_of, hinge_law
+from dem.engine.yade.stable_step import hinged_stable_time_step
 from smarticles.verification.bench import Targets, bodies, drive, hold
 from smarticles.verification.known.hinge import upright
 
@@ -34,10 +35,10 @@ def gait(
     """A free smarticle straightens and bends back; conserved sums, and the work of the motors step by step."""
     scene, engine = floating(data, velocity=velocity, spin=spin)
     engine.advance(1)
-    engine.articulate()
+    engine.motors.articulate()
     begun = engine.state().angles
     rows: list[tuple[Any, ...]] = []
-    torques, angles = [engine._hinges.torques()[0]], [engine._hinges.angles()[0]]
+    torques, angles = [engine.motors._hinges.torques()[0]], [engine.motors._hinges.angles()[0]]
     start = momentum(engine), angular_momentum(engine), kinetic_energy(engine)
 
     def targets(time: float) -> np.ndarray:
@@ -55,7 +56,7 @@ def gait(
                 sum(b.mass * np.linalg.norm(vec(b.vel)) for b in links),
                 np.abs(angular_momentum(engine) - start[1]).max(),
                 sum(np.linalg.norm(part) for part in own),
-                engine.joint_gaps().max() / scene.sphere_diameter,
+                engine.motors.gaps().max() / scene.sphere_diameter,
                 np.abs(engine.state().angles - targets(time)).max(),
                 kinetic_energy(engine),
             )
@@ -65,9 +66,9 @@ def gait(
     return {
         **{key: np.array(column) for key, column in zip(keys, zip(*rows, strict=True), strict=True)},
         "energy_before": start[2],
-        "elastic": engine._hinges.elastic_energy(),
+        "elastic": engine.motors._hinges.elastic_energy(),
         "work": ((tau[1:] + tau[:-1]) / 2 * np.diff(alpha, axis=0)).sum(axis=1).cumsum(),
-        "told": float(engine.motors.work.sum()),
+        "told": float(engine.motors.readings.work.sum()),
         "twisted": float((tau[-1] ** 2).sum() / (2 * scene.motor.stiffness_N_m_per_rad)),
         "angles": engine.state().angles - begun,
     }
@@ -76,14 +77,14 @@ def gait(
 def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: float) -> dict[str, Any]:
     """Both barbs turned from corner to corner [deg] of their range, at a constant speed [rad/s]."""
     scene, engine = floating(data)
-    engine.articulate()
+    engine.motors.articulate()
     touching, reached, gap = 0, [engine.state().angles[0]], 0.0
     for corner in np.radians(corners):
-        begun = engine.motors.commands[0].copy()
+        begun = engine.motors.readings.commands[0].copy()
         duration = max(np.abs(corner - begun).max() / speed, 1e-3)
         for _ in drive(engine, scene, duration, lambda t, a=begun, b=corner, d=duration: a + (b - a) * min(t / d, 1)):
             touching += own_contacts(engine)
-            gap = max(gap, engine.joint_gaps().max())
+            gap = max(gap, engine.motors.gaps().max())
             reached.append(engine.state().angles[0])
     return {
         "touching": touching,
@@ -96,9 +97,14 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
 def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
     """The command jumps to an angle [rad]; the motor follows at its speed limit."""
     scene, engine = floating(data)
-    engine.articulate()
+    engine.motors.articulate()
     rows = [
-        (kinetic_energy(engine), engine.joint_gaps().max(), *engine.state().angles[0], *engine.motors.commands[0])
+        (
+            kinetic_energy(engine),
+            engine.motors.gaps().max(),
+            *engine.state().angles[0],
+            *engine.motors.readings.commands[0],
+        )
         for _ in drive(engine, scene, duration, lambda _: [to, to])
     ]
     table = np.array(rows)
@@ -110,28 +116,31 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
         "angles": table[:, 2:4],
         "commands": table[:, 4:],
         "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
-        "halted": engine.motors.halted,
+        "halted": engine.motors.readings.halted,
         "interval": scene.fidelity.control_interval_s,
     }
 
 
 def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
     """An articulated smarticle hits the floor; its energy from the impact on."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene)
     cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
     cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
     engine.advance(1)
-    engine.articulate()
+    engine.motors.articulate()
     begun = engine.state().angles
     mass, energies, gaps = scene.smarticle.boxes.mass, [], []
     for _ in drive(engine, scene, duration, lambda _: begun):
-        gaps.append(engine.joint_gaps().max())
+        gaps.append(engine.motors.gaps().max())
         if not gaps[-1] < scene.sphere_diameter:  # burst, NaN included
             energies.append(math.inf)
             break
-        height, twist = float(engine.state().positions[0, 2]), engine.motors.commands - engine._hinges.angles()
-        springs = engine._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
+        height, twist = (
+            float(engine.state().positions[0, 2]),
+            engine.motors.readings.commands - engine.motors._hinges.angles(),
+        )
+        springs = engine.motors._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
         energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
     return {
         "energy": np.array(energies),
@@ -143,18 +152,18 @@ def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) ->
 
 def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
     """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
-    scene = cases.load(data)
-    law, particle = contact_law(scene), scene.particle
+    scene = cases.scene_of(data)
+    law, particle = contact_law_of(scene), scene.particle
     dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
     interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
     engine = build(scene, dt=dt)
     thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
     for k in range(layers):
         cases.add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
-    engine.articulate()
+    engine.motors.articulate()
     begun, fastest, gap = engine.state().angles, 0.0, 0.0
     for time in drive(engine, scene, settle + watch, lambda _: begun, interval=interval):
-        gap = max(gap, engine.joint_gaps().max())
+        gap = max(gap, engine.motors.gaps().max())
         if not gap < thick:
             return {"fastest": math.inf, "gap": math.inf, "z": np.full(layers, math.nan), "thick": thick, "dt": dt}
         if time > settle:
@@ -171,22 +180,22 @@ def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: flo
 def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]:
     """All links held while the motors are told to straighten; then freed, or told to go back by an angle."""
     scene, engine = floating(data)
-    engine.articulate()
+    engine.motors.articulate()
     hold(engine, range(3))
     begun = engine.state().angles[0]
     commands, torques, halted = [], [], []
 
     def follow(duration: float, targets: Targets) -> None:
         for _ in drive(engine, scene, duration, targets):
-            commands.append(engine.motors.commands[0])
-            torques.append(engine._hinges.torques()[0])
-            halted.append(engine.motors.halted[0])
+            commands.append(engine.motors.readings.commands[0])
+            torques.append(engine.motors._hinges.torques()[0])
+            halted.append(engine.motors.readings.halted[0])
 
     follow(0.02, lambda t: begun - 5 * t)
     marks = [len(commands)]
     if freed:
         hold(engine, range(3), still=False)
-    goal = begun - 0.1 if freed else engine.motors.commands[0] + back
+    goal = begun - 0.1 if freed else engine.motors.readings.commands[0] + back
     follow(0.1, lambda _: goal)
     return {
         "begun": begun,
@@ -206,7 +215,7 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
 def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any]:
     """Barb 1 is turned about its hinge by hand while the motor holds; torque on it at every step."""
     scene, engine = floating(data)
-    engine.articulate()
+    engine.motors.articulate()
     hold(engine, range(3))
     begun = engine.state().angles
     state = engine.state()
@@ -217,31 +226,37 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
     interval = scene.fidelity.control_interval_s
     for step in range(round(angle / speed / engine.time_step)):
         if step % round(interval / engine.time_step) == 0:
-            engine.actuate(begun, interval)
+            engine.motors.actuate(begun, interval)
         barb.vel = engine._yade.vector(*np.cross(spin, vec(barb.pos) - hinge))
         engine.advance(1)
-        torques.append(engine._hinges.torques()[0, 0])
+        torques.append(engine.motors._hinges.torques()[0, 0])
     return {
         "torques": np.array(torques),
         "angles": engine.state().angles[0] - begun[0],
-        "command": engine.motors.commands[0] - begun[0],
-        "gap": engine.joint_gaps().max(),
+        "command": engine.motors.readings.commands[0] - begun[0],
+        "gap": engine.motors.gaps().max(),
         "limit": scene.torque_limit,
     }
 
 
 def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
     """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
     engine = upright(scene, gravity=0.0, height=height)
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
-        motors = engine.motors
+        told = engine.motors.readings
         rows.append(
-            (time, *motors.commands[0], *engine._hinges.torques()[0], *motors.halted[0], engine.joint_gaps().max())
+            (
+                time,
+                *told.commands[0],
+                *engine.motors._hinges.torques()[0],
+                *told.halted[0],
+                engine.motors.gaps().max(),
+            )
         )
     table = np.array(rows)
     return {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import smarticles
-from dem.scene.scene import parse_scene, scene_hash
+from dem.scene.reading import parse_scene, scene_hash
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]
 

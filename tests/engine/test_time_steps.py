@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from run_files import frame_files, series
 
-from dem.physics.stability import time_steps
-from dem.scene.scene import parse_scene
+from dem.plan.steps import time_steps
+from dem.scene.reading import parse_scene
 
 pytestmark = pytest.mark.engine
 

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from benchmarks import effects, twins
-from dem.physics.stability import time_step
 from dem.plan.effects import EFFECTS, decide
-from dem.scene.scene import parse_scene
+from dem.plan.steps import time_step
+from dem.scene.reading import parse_scene
 
 PAIRS = effects.pairs(0.4, 2e-5)
 

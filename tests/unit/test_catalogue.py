@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.physics.stability import damping_ratio, restitution_of
+from dem.physics.contact import damping_ratio, restitution_of
 from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball
 from smarticles.verification.check import Answer
 from smarticles.verification.known.cases import CASES, LADDERS

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.dissipation import Meter
-from dem.engine.yade.fixtures import Fixtures
+from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.library import Yade
 
 
-class Account:
+class YadeAccount:
     """Energies that have to be added up step by step, each only where it is asked for.
 
     Args:
@@ -26,7 +26,7 @@ class Account:
         self,
         yade: Yade,
         assembly: Assembly,
-        fixtures: Fixtures,
+        fixtures: YadeFixtures,
         *,
         works: bool,
         dissipation_interval: float | None,
@@ -36,7 +36,7 @@ class Account:
         self.added = 0.0
         """Gravitational energy above z = 0 that smarticles had when they were added [J]."""
         self.dissipated = 0.0
-        """Energy dissipated since the start, by contacts, hinges and welding [J]; sampled, see `dem.engine.yade.dissipation`."""
+        """Energy dissipated since the start, by contacts, hinges and welding [J]; sampled, see `Meter`."""
         self._assembly = assembly
         self._fixtures = fixtures
         self._works = works

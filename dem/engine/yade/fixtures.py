@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.engine.yade.container import WALL_MATERIAL, add_channel, add_container
 from dem.engine.yade.library import Yade
-from dem.setting.container import WALL_MATERIAL, Cylinder, add_container
+from dem.errors import RunError
+from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
-from dem.setting.plane import Channel, add_channel
+from dem.setting.plane import Channel
 
 Array = NDArray[np.float64]
 
 
-class Fixtures:
+class YadeFixtures:
     """The fixed bodies of a simulation, how they move, and what they feel.
 
     Args:
@@ -45,13 +47,17 @@ class Fixtures:
         self.moving: list[int] = []
         """Ids of the bodies that move at present, all at one velocity."""
         self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
+        self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
+        """Called with what takes contacts away, by whoever keeps an account of energy."""
 
     def bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
         bodies = self._yade.omega.bodies
         # The wall may be gone from what was loaded.
         self.container = [body for body in self.container if bodies[body] is not None]
-        self.floor = bodies[self.container[-1]].state
+        self._floor = bodies[self.container[-1]].state
+        engines, moved = self._yade.omega.engines, self._yade.classes.HarmonicMotionEngine
+        self._shaker = next((engine for engine in engines if isinstance(engine, moved)), None)
         self._upper = bodies[self.hooks[1][0]].state if self.hooks else None
 
     @property
@@ -69,6 +75,16 @@ class Fixtures:
         """Ids of all bodies that are there."""
         return [*self.container, *(bar for hook in self.hooks for bar in hook)]
 
+    @property
+    def floor(self) -> float:
+        """See `dem.engine.interface.Fixtures`."""
+        return float(self._floor.pos[2])
+
+    @property
+    def velocity(self) -> float:
+        """See `dem.engine.interface.Fixtures`."""
+        return float(self._floor.vel[2])
+
     # -- motion ------------------------------------------------------------------------------------------------
 
     def _move(self, bodies: Sequence[int], speed: float) -> None:
@@ -76,8 +92,25 @@ class Fixtures:
             self._yade.omega.bodies[body].state.vel = self._yade.vector(0, 0, speed)
         self.moving = list(bodies)
 
+    def shake(self, *, amplitude: float, frequency: float) -> None:
+        """See `dem.engine.interface.Fixtures`."""
+        if self._shaker is None:
+            msg = "the engine was built without a shaker"
+            raise RunError(msg)
+        # YADE sets v(t) = -Aω sin(ωt + φ) before the integrator moves by v dt. Half a step is added to the phase, so
+        # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
+        omega, simulation = 2 * math.pi * frequency, self._yade.omega
+        phase = -math.pi / 2 - omega * (simulation.time - simulation.dt / 2)
+        self._shaker.A = self._yade.vector(0, 0, amplitude)
+        self._shaker.f = self._yade.vector(0, 0, frequency)
+        self._shaker.fi = self._yade.vector(0, 0, phase)
+        self._shaker.ids = self.moving = self.bodies
+        self._shaker.dead = False
+
     def stop(self) -> None:
-        """Bring everything to rest where it is."""
+        """See `dem.engine.interface.Fixtures`."""
+        if self._shaker is not None:
+            self._shaker.dead = True
         self._move(self.bodies, 0.0)
         self.moving = []
 
@@ -107,7 +140,10 @@ class Fixtures:
         self._move(self.container[:-1], speed)
 
     def remove_wall(self) -> None:
-        """Take the wall away, moving or not, and every contact with it."""
+        """See `dem.engine.interface.Fixtures`."""
+        self.book_removal(self._remove_wall)
+
+    def _remove_wall(self) -> None:
         self.moving = []
         for body in self.container[:-1]:
             self._yade.omega.bodies.erase(body)
@@ -158,7 +194,7 @@ class Fixtures:
         """
         if not self.hooks:
             return {}
-        floor, wall = float(self.floor.pos[2]), self.container[:-1]
+        floor, wall = self.floor, self.container[:-1]
         found: dict[str, tuple[Sequence[int], float]] = {
             "the lower hook": (self.hooks[0], 0.0),
             "the upper hook": (self.hooks[1], self.upper_height - floor - self._upper_start),
@@ -170,7 +206,7 @@ class Fixtures:
     @property
     def enclosed(self) -> bool:
         """Whether nothing can leave the container: the wall is there, and begins below the floor."""
-        return not self._planar and self.walled and self.wall_bottom < float(self.floor.pos[2])
+        return not self._planar and self.walled and self.wall_bottom < self.floor
 
     @property
     def raised(self) -> float | None:
@@ -183,7 +219,7 @@ class Fixtures:
             return None
         if self._upper is None:
             return 0.0
-        height = self.upper_height - float(self.floor.pos[2])
+        height = self.upper_height - self.floor
         # Moved by the floor's velocity, step by step: apart from it by rounding, when it was never raised.
         return None if height > self._top else max(0.0, height - self._upper_start)
 

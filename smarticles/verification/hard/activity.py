@@ -113,17 +113,17 @@ def oscillation(out: Path, *, seconds: float, count: int = 3) -> list[Check]:
         height = 3 * particle.reach * (k + 0.5) / 2 + lying(described)
         add(engine, (0, 0, height), Rotation.from_euler("zx", [1.1 * k, 0.2 * k]))
     engine.advance(round(0.15 / engine.time_step))
-    engine.articulate()
+    engine.motors.articulate()
     interval, centre = described.fidelity.control_interval_s, np.radians(described.smarticle.angles_deg)
     rows, said = [], None
     for n in range(1, round(seconds / interval) + 1):
         angle = math.radians(5) * math.sin(2 * math.pi * 8 * n * interval)
-        engine.actuate(np.tile(centre + angle, (count, 1)), interval)
+        engine.motors.actuate(np.tile(centre + angle, (count, 1)), interval)
         engine.advance(round(interval / engine.time_step))
         if n % 20 == 0:
             state = engine.state()
             height = state.potential_energy(engine.gravity, 0.0)
-            rows.append((n * interval, state.kinetic_energy, height, engine.joint_gaps().max()))
+            rows.append((n * interval, state.kinetic_energy, height, engine.motors.gaps().max()))
         if n % 500 == 0 and (said := look(engine, recorder)):
             break
     time, kinetic, height, gap = np.array(rows).T

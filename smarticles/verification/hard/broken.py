@@ -6,14 +6,15 @@ import math
 from pathlib import Path
 from typing import Any
 
+from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.container import WALL_MATERIAL
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.physics.stability import stable_step
-from dem.record.rundir import FAILED
+from dem.plan.steps import stable_step
+from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
-from dem.setting.container import WALL_MATERIAL
 from smarticles.verification.bench import add, fastest, look, lying, push, watched
 from smarticles.verification.check import Check, below, says
 from smarticles.verification.hard.runs import whole
@@ -42,7 +43,7 @@ def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]
         add(engine, (0, 0, lying(described) + 1e-5 + 3 * k * described.particle.radius))
     engine.advance(10)
     if articulated:
-        engine.articulate()
+        engine.motors.articulate()
     before = look(engine, recorder)
     _put(engine, what)
     try:
@@ -56,7 +57,7 @@ def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]
     return [Check("the look before says", before or "nothing", "nothing", before is None), says(said, expected)]
 
 
-def _put(engine: Engine, what: str) -> None:
+def _put(engine: YadeEngine, what: str) -> None:
     """Spoil the second smarticle, or its last link."""
     links = len(engine._assembly.bodies) // 3
     body = engine._omega.bodies[engine._assembly.bodies[2 * links - 1]].state
@@ -79,7 +80,7 @@ def _put(engine: Engine, what: str) -> None:
         body.pos = vector(*places[what])
 
 
-def _resting(out: Path, count: int) -> tuple[Engine, Recorder]:
+def _resting(out: Path, count: int) -> tuple[YadeEngine, Recorder]:
     """Smarticles in a low stack that has come to rest, and a recorder that has seen it."""
     described, engine, recorder = watched(scene(count=count), out)
     for k in range(count):
@@ -154,6 +155,7 @@ def late(out: Path) -> list[Check]:
 
     def spoil(engine: Engine) -> None:
         if engine.time > 0.55:
+            assert isinstance(engine, YadeEngine)  # hands are YADE's
             push(engine, 2, velocity=(0, 0, 100))
 
     run = whole(data, out, spoil=spoil)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dem.errors import InputError
-from dem.physics.stability import stable_step, time_step
+from dem.plan.steps import stable_step, time_step
 from smarticles.verification.bench import scene_of
 from smarticles.verification.check import Check, below, near, says
 from smarticles.verification.hard.runs import Watched, whole

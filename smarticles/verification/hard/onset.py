@@ -22,9 +22,9 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
-from dem.engine.yade.engine import Engine
+from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
-from dem.physics.stability import stable_step
+from dem.plan.steps import stable_step
 from dem.run.run import _git_revision
 from dem.scene.scene import Scene
 from smarticles.verification.bench import lying, scene_of, watched
@@ -134,7 +134,7 @@ def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
         described, engine, _ = watched(data, scratch, dt=factor * stable)
     engine.add(poses(setting, described, seed))
     if setting.articulated:
-        engine.articulate()
+        engine.motors.articulate()
     lift = setting.count * described.smarticle.boxes.mass * engine.gravity * described.sphere_diameter
     speeds, lowest, rise = [], math.inf, 0.0
     try:
@@ -157,19 +157,19 @@ def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     }
 
 
-def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
+def _looks(engine: YadeEngine, described: Scene) -> Iterator[tuple[float, float, float]]:
     """Let time pass; time [s], kinetic energy [J] and all energy but the motors' [J] about every millisecond."""
     dt = engine.time_step
     interval = dt * max(1, round(described.fidelity.control_interval_s / dt))
     held, looks = engine.state().angles, max(1, round(1e-3 / interval))
     while engine.time < SETTLE + WATCH:
         for _ in range(looks):
-            if engine.articulated:
-                engine.actuate(held, interval)
+            if engine.motors.articulated:
+                engine.motors.actuate(held, interval)
             engine.advance(round(interval / dt))
         state = engine.state()
         total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())
-        yield engine.time, state.kinetic_energy, total - engine.motor_work
+        yield engine.time, state.kinetic_energy, total - engine.motors.work
 
 
 def climb(name: str, seed: int) -> list[dict[str, Any]]:

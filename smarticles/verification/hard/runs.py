@@ -12,15 +12,16 @@ import h5py
 import numpy as np
 
 from dem.body.state import State
-from dem.engine.yade.engine import Engine
-from dem.engine.yade.strain import Strain
+from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
-from dem.physics.stability import time_steps
-from dem.record.progress import Progress
-from dem.run import run
+from dem.physics.overlaps import Overlaps
+from dem.plan.steps import time_steps
+from dem.record.progress import ProgressWriter
+from dem.run import build, run
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
-from dem.scene.scene import Scene, parse_scene
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
 from smarticles.verification.check import Check, below, near
 
 
@@ -45,10 +46,10 @@ class Noting(Watchdog):
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
-    def check_depths(self, strain: Strain, **options: Any) -> None:
+    def check_depths(self, overlaps: Overlaps, **options: Any) -> None:
         """See `Watchdog`."""
-        self._note("depth", strain.deepest / self.depth)
-        super().check_depths(strain, **options)
+        self._note("depth", overlaps.deepest / self.depth)
+        super().check_depths(overlaps, **options)
 
     def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
         """See `Watchdog`."""
@@ -135,7 +136,7 @@ class Watched:
         height = float(self.series["com_height_m"][-1])
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any look [d]", run.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            below("deepest contact at any look [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
             near(
                 "height of the centre of mass at the end [m]",
                 height,
@@ -147,7 +148,7 @@ class Watched:
         if rest is not None:
             checks.append(below("speed at the end [m/s]", float(self.series["max_speed_m_per_s"][-1]), rest))
         if "gap" in self.nearest:
-            gap = run.GAP_LIMIT * self.nearest["gap"]
+            gap = build.GAP_LIMIT * self.nearest["gap"]
             checks.append(below("largest joint gap [d]", gap, 0.02))
         return checks
 
@@ -171,8 +172,8 @@ def whole(
     """
     built: list[tuple[Timing, Noting | None]] = []
 
-    def recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
-        timing = Timing(**vars(run.build_recorder(scene, out, progress)), spoil=spoil)
+    def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
+        timing = Timing(**vars(build.build_recorder(scene, out, progress)), spoil=spoil)
         noting = Noting(**vars(timing.watchdog)) if note else None
         timing.watchdog = noting or timing.watchdog
         built.append((timing, noting))
@@ -183,7 +184,7 @@ def whole(
     try:
         scene = parse_scene(data, source="case")
         run.run_scene(
-            scene, out, command="stability", progress=False, builders=run.Builders(steps=steps, recorder=recorder)
+            scene, out, command="stability", progress=False, builders=build.Builders(steps=steps, recorder=recorder)
         )
     except (InputError, RunError) as caught:
         error = type(caught).__name__, str(caught)

@@ -22,20 +22,20 @@ def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:
     add(engine, (0, 0, 0.02), TILTED)
     push(engine, 0, velocity=(0, 0, -speed))
     if articulated:
-        engine.articulate()
+        engine.motors.articulate()
     held = engine.state().angles
     said = look(engine, recorder)
     energies, lows, gaps = [energy(engine)], [math.inf], [0.0]
     interval = described.fidelity.control_interval_s
     for _ in range(round(time / interval)):
         if articulated:
-            engine.actuate(held, interval)
+            engine.motors.actuate(held, interval)
         engine.advance(round(interval / engine.time_step))
         energies.append(energy(engine))
         lows.append(engine.state().positions[0, 2])
-        gaps.append(engine.joint_gaps().max())
+        gaps.append(engine.motors.gaps().max())
     d, particle = described.sphere_diameter, described.particle
-    work = 0.0 if engine.motors is None else max(0.0, float(engine.motors.work.sum()))
+    work = max(0.0, engine.motors.work)
     # As deep as if one spring took it all.
     depth = speed * math.sqrt(particle.boxes.mass / described.fidelity.stiffness_N_per_m)
     return [
@@ -73,13 +73,13 @@ def landing(out: Path, *, time: float) -> list[Check]:
     recorder.watchdog = noting
     for k in range(4):
         add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
-    engine.articulate()
-    assert engine.motors is not None  # articulated smarticles have them
+    engine.motors.articulate()
+    assert engine.motors.deciding is not None  # articulated smarticles have them
     held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
     while not said and engine.time < time:
-        engine.actuate(held, interval)
+        engine.motors.actuate(held, interval)
         engine.advance(round(interval / engine.time_step))
-        hardest = max(hardest, float(np.abs(engine.motors.torques).max()) / described.torque_limit)
+        hardest = max(hardest, float(np.abs(engine.motors.deciding.torques).max()) / described.torque_limit)
         said = look(engine, recorder)
     return [
         Check("the watchdog says", said or "nothing", "nothing", said is None),

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.physics.stability import ContactLaw, contact_law
+from dem.engine.yade.kind import contact_law_of
+from dem.physics.contact import ContactLaw
 from smarticles.verification.bench import (
     BALL_MASS,
     BALL_RADIUS,
@@ -104,7 +105,7 @@ def collision_errors(steps: Sequence[float], *, smooth: bool, phases: int = PHAS
         smooth: in one plane, elastic and without friction; otherwise tilted, with the law of the scene.
         phases: places of the onset in a step.
     """
-    law = contact_law(scene())
+    law = contact_law_of(scene())
     if smooth:
         law = dataclasses.replace(law, normal_damping=0.0, wall_damping=0.0, friction=0.0)
     # No theory: against the same at a step eight times finer than the finest.

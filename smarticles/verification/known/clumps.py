@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dem.physics.stability import contact_law, restitution_of, time_step, typical_effective_mass
+from dem.engine.yade.kind import contact_law_of
+from dem.physics.contact import restitution_of, typical_effective_mass
+from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from smarticles.verification.bench import Array, G, add, build, push, scene
 from smarticles.verification.check import Answer
@@ -74,7 +76,7 @@ def _touching(one: Scene) -> Array:
 
 def _thrown(one: Scene, dt: float) -> tuple[float, float]:
     """Restitution [1] and time in contact [s] of a flat throw."""
-    engine = build(one.particle, contact_law(one), dt=dt)
+    engine = build(one.particle, contact_law_of(one), dt=dt)
     rest = one.particle.radius - float(one.particle.centres[:, 2].min())
     add(engine, (0, 0, rest + 3.3 * SPEED * dt))
     push(engine, 0, velocity=(0, 0, -SPEED))
@@ -89,7 +91,7 @@ def _thrown(one: Scene, dt: float) -> tuple[float, float]:
 
 def _sunk(one: Scene, dt: float, *, time: float) -> float:
     """How deep the centre of mass of a smarticle that lies flat has sunk [m]."""
-    engine = build(one.particle, contact_law(one), dt=dt, gravity=G)
+    engine = build(one.particle, contact_law_of(one), dt=dt, gravity=G)
     rest = one.particle.radius - float(one.particle.centres[:, 2].min())
     add(engine, (0, 0, rest))
     engine.advance(round(time / dt))
@@ -105,7 +107,7 @@ def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
 def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImpact:
     """Throw a smarticle flat at the floor, and lay it there."""
     one = flat_scene(rows=rows, pitch=pitch, restitution=restitution)
-    law, boxes, points = contact_law(one), one.smarticle.boxes, _touching(one)
+    law, boxes, points = contact_law_of(one), one.smarticle.boxes, _touching(one)
     stiffness, damping, mass, count = law.normal_stiffness, law.wall_damping, boxes.mass, len(points)
     ratio = count * damping / (2 * math.sqrt(count * stiffness * mass))
     after, lasts = falling_on_springs(

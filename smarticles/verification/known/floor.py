@@ -9,8 +9,10 @@ import numpy as np
 from scipy.linalg import eigh
 
 from dem.body.particle import Particle
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import ContactLaw, contact_law, time_step
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of
+from dem.physics.contact import ContactLaw
+from dem.plan.steps import time_step
 from smarticles.verification.bench import (
     BALL_MASS,
     BALL_RADIUS,
@@ -29,7 +31,7 @@ from smarticles.verification.check import Answer
 FRICTION = 0.4
 
 
-def resting(particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> Engine:
+def resting(particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> YadeEngine:
     """A body lying on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
     engine = build(particle, law, dt=dt, gravity=G)
     sunk = particle.boxes.mass * G / (len(particle.centres) * law.normal_stiffness)
@@ -114,14 +116,14 @@ def ball_rolls() -> list[Answer]:
 def bar_rolls() -> list[Answer]:
     """A bar of many spheres, with the inertia of its box."""
     one = scene(fidelity="standard", smarticle={"aspect_ratio": 0})
-    return roll(one.particle, contact_law(one), speed=0.3, dt=time_step(one) / 4)
+    return roll(one.particle, contact_law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
 def slide(*, aspect_ratio: float, friction: float) -> list[Answer]:
     """A smarticle lying flat is pushed along the floor, along its axis of symmetry, and stops."""
     speed = 0.3
     one = scene(smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
-    engine = resting(one.particle, contact_law(one), dt=time_step(one), speed=speed)
+    engine = resting(one.particle, contact_law_of(one), dt=time_step(one), speed=speed)
     stops = speed / (friction * G)
     times, ways, speeds = [0.0], [-0.03], [speed]
     while engine.time < 1.5 * stops:
@@ -202,7 +204,7 @@ def roll_errors(steps: Sequence[float], *, phases: int = 5) -> list[float]:
 # -- a stack -----------------------------------------------------------------------------------------------------------
 
 
-def two_high(law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool) -> Engine:
+def two_high(law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool) -> YadeEngine:
     """Two balls on each other on the floor, let go as deep as they will be pressed, or just touching."""
     press = BALL_MASS * G / STIFFNESS * sunk
     engine = build(ball(), law, dt=dt, gravity=G)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from dem.physics.stability import contact_law
+from dem.engine.yade.kind import contact_law_of
 from smarticles.verification.bench import Array, G, add, body_rotations, build, push, scene
 from smarticles.verification.check import Answer
 from smarticles.verification.known.theory import free_rotation
@@ -32,7 +32,7 @@ def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array,
         that it has turned [rad].
     """
     one = scene()
-    engine = build(one.particle, contact_law(one), dt=dt, gravity=G)
+    engine = build(one.particle, contact_law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, 0.1), START)
     push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
@@ -101,7 +101,7 @@ def spin_rotations(dt: float, *, spin: Array, times: Array) -> tuple[Rotation, A
         Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].
     """
     one = scene()
-    engine = build(one.particle, contact_law(one), dt=dt)
+    engine = build(one.particle, contact_law_of(one), dt=dt)
     add(engine, (0, 0, 0.1), START)
     push(engine, 0, spin=spin)
     rows, spins = [], []

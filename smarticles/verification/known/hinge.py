@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import hinge_law
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import hinge_law
 from dem.scene.scene import Scene
 from smarticles.verification.bench import Array, G, add, bodies, build_hinged, drive, hold, scene
 from smarticles.verification.check import Answer
@@ -31,13 +31,13 @@ def hinged(
     )
 
 
-def upright(one: Scene, *, gravity: float, height: float = 0.05, dt: float | None = None) -> Engine:
+def upright(one: Scene, *, gravity: float, height: float = 0.05, dt: float | None = None) -> YadeEngine:
     """One articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
     engine = build_hinged(one, gravity=gravity, dt=dt)
     middle = Rotation.from_matrix(one.smarticle.boxes.link_rotations[1].T)
     turned = Rotation.from_euler("x", -90, degrees=True) * middle
     add(engine, np.array([0, 0, height]) - turned.apply(one.smarticle.boxes.link_centres[1]), turned)
-    engine.articulate()
+    engine.motors.articulate()
     hold(engine, [1])
     return engine
 
@@ -59,7 +59,7 @@ def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
     one, duration = hinged(aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
-    engine.articulate()
+    engine.motors.articulate()
     straight = engine.state().angles
     along = engine.state().link_rotations[0, 1, :, 0]
     force, gaps = 100 * one.smarticle.boxes.mass * G, []
@@ -67,7 +67,7 @@ def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
         grown = min(1.0, 2 * time / duration) * force * along
         for link, sign in ((0, -1), (2, 1)):
             engine._omega.forces.setPermF(engine._assembly.bodies[link], engine._yade.vector(*(sign * grown)))
-        gaps.append(engine.joint_gaps().max())
+        gaps.append(engine.motors.gaps().max())
     theory = force / hinge_law(one).pin_stiffness
     return [
         Answer(
@@ -95,7 +95,7 @@ def droop(*, aspect_ratio: float, fidelity: str) -> list[Answer]:
     engine = upright(one, gravity=G)
     begun = engine.state().angles
     rows = [
-        (*engine._hinges.torques()[0], *engine.joint_gaps()[0], *(engine.state().angles - begun)[0])
+        (*engine.motors._hinges.torques()[0], *engine.motors.gaps()[0], *(engine.state().angles - begun)[0])
         for _ in drive(engine, one, 0.2, lambda _: begun)
     ]
     # Barbs vibrate about where they hang. Hann's window takes the vibration out.
@@ -139,13 +139,13 @@ def tilt(*, sweeps: int) -> list[Answer]:
     one = hinged()
     engine = build_hinged(one, gravity=G)
     add(engine, (0, 0, 0.05))
-    engine.articulate()
+    engine.motors.articulate()
     hold(engine, [1])
     begun, goal, each = engine.state().angles[0], math.radians(-15), 0.35
     for _ in drive(engine, one, each * sweeps, lambda t: begun + (goal - begun) * (1 - abs(t / each % 2 - 1))):
         pass
-    assert engine.motors is not None  # the scene actuates
-    last, tilts = engine.motors.commands[0].copy(), []
+    assert engine.motors.deciding is not None  # the scene actuates
+    last, tilts = engine.motors.deciding.commands[0].copy(), []
     for _ in drive(engine, one, 0.05, lambda _: last):
         normals = engine.state().link_rotations[0, :, :, 2]
         tilts.append(np.cross(normals[1], normals[[0, 2]]))
@@ -259,7 +259,7 @@ def shaft_mode(one: Scene, *, held: bool) -> tuple[float, Array]:
     return math.sqrt(squares[place]), shape / (shape[0] if held else shape[2] - shape[1])
 
 
-def floating(one: Scene, *, held: bool, dt: float | None = None) -> Engine:
+def floating(one: Scene, *, held: bool, dt: float | None = None) -> YadeEngine:
     """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad.
 
     Args:
@@ -269,7 +269,7 @@ def floating(one: Scene, *, held: bool, dt: float | None = None) -> Engine:
     """
     engine = build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
-    engine.articulate()
+    engine.motors.articulate()
     frequency, shape = shaft_mode(one, held=held)
     rates = 0.01 * frequency * shape
     if held:

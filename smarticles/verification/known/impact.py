@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import Engine
-from dem.physics.stability import ContactLaw, contact_law, time_step, typical_effective_mass
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import contact_law_of
+from dem.physics.contact import ContactLaw, typical_effective_mass
+from dem.plan.steps import time_step
 from smarticles.verification.bench import (
     BALL_MASS,
     BALL_RADIUS,
@@ -50,7 +52,7 @@ class Touch:
     deepest: float
 
 
-def touch(engine: Engine, *, most: int) -> Touch:
+def touch(engine: YadeEngine, *, most: int) -> Touch:
     """Advance until a body has met the floor and left it again.
 
     Args:
@@ -182,7 +184,7 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Answer]:
         resized: whether to size the dashpots for the bar's mass, so that it holds here.
     """
     one = scene(smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
-    law, mass, speed = contact_law(one), one.smarticle.boxes.mass, 0.5
+    law, mass, speed = contact_law_of(one), one.smarticle.boxes.mass, 0.5
     if resized:
         scale = math.sqrt(mass / typical_effective_mass(one.particle))
         law = dataclasses.replace(law, wall_damping=law.wall_damping * scale)
@@ -215,7 +217,7 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Answer]:
 def bars_rebound(restitution: float) -> list[Answer]:
     """Two upright bars in free space, end to end, with a scene's law."""
     one = scene(smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
-    law, mass, speed = contact_law(one), one.smarticle.boxes.mass, 0.5
+    law, mass, speed = contact_law_of(one), one.smarticle.boxes.mass, 0.5
     engine = build(one.particle, law, dt=time_step(one) / 8)
     add(engine, (0, 0, 0.05), UPRIGHT)
     add(engine, (0, 0, 0.05 + one.smarticle.middle_length_m + 1e-4), UPRIGHT)
@@ -256,7 +258,7 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Answer]:
         turn: rotation vector of its pose [rad].
     """
     one = scene(contact={"restitution": restitution, "friction_wall": 0})
-    law, boxes, particle, speed = contact_law(one), one.smarticle.boxes, one.particle, 0.02
+    law, boxes, particle, speed = contact_law_of(one), one.smarticle.boxes, one.particle, 0.02
     pose = Rotation.from_rotvec(turn)
     heights = np.sort(pose.apply(particle.centres)[:, 2])
     arm = pose.apply(particle.centres)[np.argmin(pose.apply(particle.centres)[:, 2])]

@@ -12,7 +12,7 @@ from command_cases import WriteRun
 
 import smarticles
 from dem.errors import InputError, RunError
-from dem.scene.scene import parse_scene
+from dem.scene.reading import parse_scene
 
 HEAVY = (
     "dem",

@@ -11,7 +11,7 @@ import pytest
 from sweep_cases import SWEEP, MakeFolder
 
 from dem.errors import InputError
-from dem.scene.scene import load_scene, scene_hash
+from dem.scene.reading import load_scene, scene_hash
 from templates.sweep.folder import Folder, count_states, open_folder, run_status
 
 

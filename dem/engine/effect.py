@@ -1,0 +1,80 @@
+"""The effects that a scene may call for, by name, and what one adds to a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from itertools import chain
+
+
+class EffectName(StrEnum):
+    """Every effect, as `smarticles plan` prints it, in that order."""
+
+    CONTACT = "contact"
+    CONTAINER = "container"
+    PLANE = "plane"
+    STRINGS = "strings"
+    GRAVITY = "gravity"
+    FRICTION = "friction"
+    RESTITUTION = "restitution"
+    CONTAINER_MOTION = "container motion"
+    ARTICULATION = "articulation"
+    MOTORS = "motors"
+    TORQUE_CAP = "torque cap"
+    HOOKS = "hooks"
+    WALL_REMOVAL = "wall removal"
+    ENERGIES = "energies"
+    ENERGY_ACCOUNT = "energy account"
+    SERIES = "series"
+    FRAMES = "frames"
+    SPHERE_GLYPHS = "sphere glyphs"
+    CHECKPOINTS = "checkpoints"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adds:
+    """What an effect adds to a run; nothing of it exists in a run without the effect.
+
+    Args:
+        engines: what an engine runs in every step, by its own names.
+        functors: what these are given to work with.
+        materials: labels of materials.
+        shapes: kinds of bodies.
+        series: datasets of `series.h5`.
+        arrays: cell data of every frame.
+        files: of the run directory.
+        python: what Python does for it, and how often, and what else it takes.
+    """
+
+    engines: tuple[str, ...] = ()
+    functors: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
+    series: tuple[str, ...] = ()
+    arrays: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    python: str = ""
+
+    @staticmethod
+    def together(parts: Iterable[Adds]) -> Adds:
+        """The union, in order of mention."""
+        each = list(parts)
+        names = [field.name for field in fields(Adds) if field.name != "python"]
+        lists = {
+            name: tuple(dict.fromkeys(chain.from_iterable(getattr(part, name) for part in each))) for name in names
+        }
+        return Adds(**lists, python="; ".join(part.python for part in each if part.python))
+
+    def to_text(self) -> str:
+        """One line, lists that are long by their length; empty for nothing."""
+        counted = ((self.functors, "functors"), (self.series, "datasets"), (self.arrays, "arrays per frame"))
+        named = (
+            ("engines", self.engines),
+            ("materials", self.materials),
+            ("bodies", self.shapes),
+            ("files", self.files),
+        )
+        told = [f"{what} {', '.join(names)}" for what, names in named if names]
+        told += [f"{len(names)} {what}" for names, what in counted if names]
+        return "; ".join(filter(None, [*told, self.python]))

@@ -1,0 +1,76 @@
+"""The engines that there are, and what is asked of one before there is a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from dem.engine.demand import Demand
+from dem.engine.effect import Adds, EffectName
+from dem.engine.interface import Engine
+from dem.errors import InputError
+
+
+class EngineKind(Protocol):
+    """One engine: what it is, what scenes cost on it, and how a simulation on it begins."""
+
+    @property
+    def name(self) -> str:
+        """What a scene calls it."""
+
+    @property
+    def damps_once_per_look(self) -> bool:
+        """Whether a servo's damper acts on what the last look told; it must then look in every step."""
+
+    def version(self) -> str:
+        """Version of what results depend on.
+
+        Raises:
+            RunError: it is not installed.
+        """
+
+    def threads(self) -> int:
+        """Threads that it runs with here."""
+
+    def adds(self, effect: EffectName) -> Adds:
+        """What an effect adds to what it does."""
+
+    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
+        """What runs in every step, in the order in which it does."""
+
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
+        """Largest stable time step [s] of a scene.
+
+        Args:
+            scene: the scene.
+            articulated: whether barbs may turn, or have turned before.
+        """
+
+    def seconds_per_step(self, scene: Demand) -> float:
+        """Wall seconds that a step of rigid smarticles costs in the full pile, one core, about."""
+
+    @property
+    def actuated_share(self) -> float:
+        """What a step costs while motors are at work, over one of rigid smarticles [1]."""
+
+    def build(self, scene: Demand, time_step: float) -> Engine:
+        """A simulation of a scene, empty, with a time step [s] of its phases with motors that is not checked."""
+
+
+def engine_kind(name: str) -> EngineKind:
+    """The engine that a scene names.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    # Imported when asked for: a scene on one engine needs nothing of the other.
+    if name == "yade":
+        from dem.engine.yade.kind import YadeKind  # noqa: PLC0415
+
+        return YadeKind()
+    if name == "links":
+        from dem.engine.links.kind import LinksKind  # noqa: PLC0415
+
+        return LinksKind()
+    msg = f"engine: {name!r} is not built into this version; use yade or links"
+    raise InputError(msg)

@@ -1,0 +1,200 @@
+"""The stable time step on YADE, from masses and inertias rather than from sphere size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, eigh
+from scipy.optimize import brentq
+
+from dem.body.particle import LINKS, Boxes, Particle
+from dem.engine.yade.hinges import HingeLaw
+from dem.physics.contact import ContactLaw
+
+Array = NDArray[np.float64]
+
+# Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
+# smarticle's chain touches two of them; more act along different directions and do not add up in one mode.
+CONTACTS_AT_A_TIP = 2
+# Contacts of a sphere in a row with another row along it, as far as it is pressed in by less than a twentieth of the
+# square of the pitch, in diameters: the spheres beside the nearest one are touched, those beyond are not.
+CONTACTS_IN_A_ROW = 3
+
+
+def stable_time_step(particle: Particle, law: ContactLaw) -> float:
+    """Largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
+
+    Modes are masses on parallel springs and dashpots: the lightest points of two smarticles against each other and
+    against the container, `CONTACTS_AT_A_TIP` contacts each; a pile of smarticles lying flat, every sphere in contact
+    with the neighbours above and below that move against it, which is the stiffest of any such pile and stiffer than
+    one lying on the container; and the same pile in which all roll alike, surfaces rubbing against those above and
+    below, stiffer still for bars with barbs below l/w = 0.2, which have little inertia about themselves. Smarticles
+    that break the flat or the rolling mode do not blow up but chatter for ever, which shakes the pile and lets it
+    compact. YADE takes the dashpot's velocity half a step late, so a mode is stable while ω²dt² + 2c dt ≤ 4 with
+    ω² = K/m, c = C/m.
+
+    Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1; chain of equal masses at the
+    edge of its band, K = 4k.
+    """
+    lightest, mass, spheres = particle.smallest_effective_mass, particle.boxes.mass, len(particle.centres)
+    flat_damping = max(law.normal_damping, law.wall_damping / 2)
+    modes = [
+        (lightest / 2, CONTACTS_AT_A_TIP, law.normal_stiffness, law.normal_damping),
+        (lightest, CONTACTS_AT_A_TIP, law.normal_stiffness, law.wall_damping),
+        (mass / 4, spheres, law.normal_stiffness, flat_damping),
+    ]
+    arms = float(((particle.centres[:, 2] + particle.radius) ** 2).sum())
+    modes += [
+        (inertia / arms, 4, law.tangential_stiffness, flat_damping * law.tangential_damping)
+        for inertia in particle.boxes.inertia[:2]
+    ]
+    steps = []
+    for moved, contacts, stiffness, damping in modes:
+        squared = contacts * stiffness / moved
+        rate = contacts * damping / moved
+        steps.append((math.sqrt(rate**2 + 4 * squared) - rate) / squared)
+    return min(steps)
+
+
+def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
+    """Largest stable time step [s] of an articulated smarticle, over its stiffest modes of hinges and contact together.
+
+    Three free links, 18 degrees of freedom, joined by the springs of the pins, in the same three surroundings as in
+    `stable_time_step`: the tip of a barb against another such tip, against the container, and all of it in a flat pile.
+    With M, K and C the matrices of mass, stiffness and damping, stable while K dt² + 2 C dt - 4 M has no positive
+    eigenvalue.
+
+    Args:
+        particle: one smarticle.
+        law: contact law.
+        hinges: stiffness of the hinges.
+    """
+    boxes = particle.boxes
+    mass = _mass_matrix(boxes)
+    pins = _hinge_stiffness(boxes, hinges)
+    tip = _push_shape(particle, [int(np.flatnonzero(particle.links == 0)[-1])], np.eye(3))
+    flat = _push_shape(particle, range(len(particle.centres)), np.array([[0.0, 0.0, 1.0]]))
+    steps = []
+    for shape, contacts, damping in (
+        (tip, 2 * CONTACTS_AT_A_TIP, law.normal_damping),
+        (tip, CONTACTS_AT_A_TIP, law.wall_damping),
+        (flat, 4, max(law.normal_damping, law.wall_damping / 2)),
+    ):
+        stiffness = pins + contacts * law.normal_stiffness * shape
+        damped = contacts * damping * shape
+        if hinges.shaft_damping:
+            damped = damped + hinges.shaft_damping * _twist_shape()
+        steps.append(_stable_step(mass, stiffness, damped))
+    # Links that roll about themselves all alike in a flat pile: surfaces rub against those above and below, and a link
+    # has little inertia about itself. In series, the wall's dashpot is at most twice the other.
+    roll = _roll_shape(particle)
+    damping = max(law.normal_damping, law.wall_damping / 2) * law.tangential_damping
+    steps.append(_stable_step(mass, pins + 4 * law.tangential_stiffness * roll, 4 * damping * roll))
+    return min(steps)
+
+
+def planar_stable_time_step(
+    particle: Particle, law: ContactLaw, hinges: HingeLaw, strings: Sequence[tuple[float, float]] = ()
+) -> float:
+    """The same for smarticles that lie flat in a plane, where none lies on another.
+
+    The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
+    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it;
+    and a barb with a string at its tip.
+
+    Args:
+        particle: one smarticle.
+        law: contact law.
+        hinges: stiffness of the hinges.
+        strings: stiffness [N/m] and damping [N s/m] of each.
+    """
+    boxes = particle.boxes
+    mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)
+    twisted = hinges.shaft_damping * _twist_shape()
+    steps = []
+    for link, contacts, damping in ((0, 2 * CONTACTS_IN_A_ROW, law.normal_damping), (1, 1, law.wall_damping)):
+        across = boxes.link_rotations[link][:, 1][None, :]
+        shape = _push_shape(particle, np.flatnonzero(particle.links == link), across)
+        stiffness = pins + contacts * law.normal_stiffness * shape
+        steps.append(_stable_step(mass, stiffness, contacts * damping * shape + twisted))
+    tip = _velocity_of(boxes, 0, boxes.vertices[0])[:2]
+    for pulled, damping in strings:
+        steps.append(_stable_step(mass, pins + pulled * tip.T @ tip, damping * tip.T @ tip + twisted))
+    return min(steps)
+
+
+def _roll_shape(particle: Particle) -> Array:
+    """(18, 18): the stiffness matrix of springs of 1 N/m across the highest point of every sphere, against rolling."""
+    shape = np.zeros((6 * LINKS, 6 * LINKS))
+    for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
+        about = slice(6 * int(link) + 3, 6 * int(link) + 5)
+        shape[about, about] += np.eye(2) * height**2
+    return shape
+
+
+def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
+    def excess(step: float) -> float:
+        return float(eigh(stiffness * step**2 + 2 * damping * step, mass, eigvals_only=True)[-1]) - 4
+
+    undamped = 2 / math.sqrt(float(eigh(stiffness, mass, eigvals_only=True)[-1]))
+    return float(brentq(excess, 0.0, undamped, xtol=1e-12)) if damping.any() else undamped
+
+
+def _mass_matrix(boxes: Boxes) -> Array:
+    """(18, 18) of three links: velocity and angular velocity of each, in the body frame."""
+    blocks = []
+    for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
+        blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
+    return np.asarray(block_diag(*blocks))
+
+
+def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
+    """(3, 18): velocity of a point of a link (3,) [m], body frame, from those of all links."""
+    x, y, z = point - boxes.link_centres[link]
+    rows = np.zeros((3, 6 * LINKS))
+    rows[:, 6 * link : 6 * link + 3] = np.eye(3)
+    rows[:, 6 * link + 3 : 6 * link + 6] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    return rows
+
+
+def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
+    """(18, 18): the stiffness matrix of both hinges."""
+    stiffness = np.zeros((6 * LINKS, 6 * LINKS))
+    plane = np.eye(3)[:2]
+    # The damper acts half way between the centre and the end of the axis (see `dem.engine.yade.hinges`).
+    damper = np.array([0.0, 0.0, boxes.thickness_normal / 4])
+    for hinge, barb in ((1, 0), (2, 2)):
+        centre = boxes.vertices[hinge]
+        apart = _velocity_of(boxes, barb, centre) - _velocity_of(boxes, 1, centre)
+        damped = plane @ (_velocity_of(boxes, barb, centre + damper) - _velocity_of(boxes, 1, centre + damper))
+        tilt = np.zeros((2, 6 * LINKS))
+        tilt[:, 6 * barb + 3 : 6 * barb + 6], tilt[:, 9:12] = plane, -plane
+        stiffness += law.pin_stiffness * apart.T @ apart
+        stiffness += law.damper_stiffness * damped.T @ damped
+        twist = _twist(barb)
+        stiffness += law.tilt_stiffness * tilt.T @ tilt + law.shaft_stiffness * twist.T @ twist
+    return stiffness
+
+
+def _twist(barb: int) -> Array:
+    """(1, 18): how much a barb turns against the middle link, about the normal."""
+    row = np.zeros((1, 6 * LINKS))
+    row[0, 6 * barb + 5], row[0, 11] = 1, -1
+    return row
+
+
+def _twist_shape() -> Array:
+    """(18, 18): the matrix of twist springs of 1 N m/rad at both hinges."""
+    return np.asarray(sum(_twist(barb).T @ _twist(barb) for barb in (0, 2)))
+
+
+def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
+    """(18, 18): the stiffness matrix of springs of 1 N/m on spheres, along directions (k, 3)."""
+    shape = np.zeros((6 * LINKS, 6 * LINKS))
+    for sphere in spheres:
+        rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])
+        shape += rows.T @ rows
+    return shape

@@ -1,0 +1,124 @@
+"""The phase that moves barbs as its motions say."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dem.phases.actuated import ActuatedPhase
+from dem.phases.drive import BARBS, Gait
+from dem.setting.motion import Hold, Motion
+from dem.setting.motor import Motor
+from dem.setting.part import Duration, Part
+from dem.setting.smarticle import Smarticle
+
+ActiveFraction = Annotated[
+    float, Field(gt=0, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]")
+]
+
+
+Offsets = Annotated[
+    Literal["none", "random"],
+    Field(
+        description="none: all smarticles move together; random: each begins at another point of the period, drawn "
+        "from the scene's seed"
+    ),
+]
+
+
+def _length_of_motions(data: dict[str, Any]) -> float:
+    """Default of `Actuate.duration_s`: the longest motion of those given; inf if that has no end."""
+    motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
+    return max((motion.duration for motion in motions), default=math.inf)
+
+
+class Actuate(Part, ActuatedPhase):
+    """Move the barbs: one motion for both, `barbs`, or one for each, `barb_1` and `barb_2`."""
+
+    type: Literal["actuate"]
+    barbs: Motion | None = Field(None, description="motion of both barbs")
+    barb_1: Motion | None = Field(None, description="motion of barb 1, angle α1")
+    barb_2: Motion | None = Field(None, description="motion of barb 2, angle α2")
+    duration_s: Duration = Field(
+        default_factory=_length_of_motions, description="length of the phase [s]; default: that of the motion"
+    )
+    active_fraction: ActiveFraction = 1.0
+    offsets: Offsets = "none"
+
+    @model_validator(mode="after")
+    def _one_motion_each(self) -> Self:
+        apart = (self.barb_1 is not None) + (self.barb_2 is not None)
+        if self.barbs is not None and apart:
+            msg = "barbs: one motion for both barbs, but barb_1 or barb_2 is given as well; leave one or the other out"
+            raise ValueError(msg)
+        if self.barbs is None and apart != BARBS:
+            missing = "barbs" if not apart else "barb_1" if self.barb_1 is None else "barb_2"
+            msg = f"{missing}: missing; give barbs, or both barb_1 and barb_2 ({{type: hold}} for one that stays)"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _motions_fill_the_phase(self) -> Self:
+        if math.isinf(self.duration_s):
+            msg = "duration_s: missing, and the motion has no end of its own; give the phase or the motion one"
+            raise ValueError(msg)
+        for key, motion in self._named().items():
+            if motion.duration < self.duration_s * (1 - 1e-9):
+                msg = (
+                    f"{key}: the motion ends after {motion.duration:g} s, before duration_s = {self.duration_s:g} s; "
+                    "shorten the phase or end the motion with a step that holds"
+                )
+                raise ValueError(msg)
+            if self.offsets == "random" and motion.period is None and not isinstance(motion, Hold):
+                msg = (
+                    f"offsets: random, but {key} ({motion.type}) has no period; use 'none', a sine, a triangle or a "
+                    "sequence with repeat"
+                )
+                raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _something_to_offset(self) -> Self:
+        if self.offsets == "random" and all(motion.period is None for motion in self.motions):
+            msg = "offsets: random, but both barbs hold; use 'none'"
+            raise ValueError(msg)
+        return self
+
+    def _named(self) -> dict[str, Motion]:
+        named = {"barbs": self.barbs, "barb_1": self.barb_1, "barb_2": self.barb_2}
+        return {key: motion for key, motion in named.items() if motion is not None}
+
+    @property
+    def known_duration(self) -> float:
+        """See `Phase.known_duration`."""
+        return self.duration_s
+
+    @property
+    def keys(self) -> tuple[str, str]:
+        """The keys under which the motions of barb 1 and barb 2 stand."""
+        return ("barbs", "barbs") if self.barbs is not None else ("barb_1", "barb_2")
+
+    @property
+    def motions(self) -> tuple[Motion, Motion]:
+        """Motions of barb 1 and barb 2."""
+        named = self._named()
+        return named[self.keys[0]], named[self.keys[1]]
+
+    def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
+        """See `ActuatedPhase.gait`."""
+        return Gait(
+            motions=self.motions,
+            keys=self.keys,
+            duration=self.duration_s,
+            active_fraction=self.active_fraction,
+            offsets=self.offsets,
+        )
+
+    def own(self, key: str) -> tuple[str, float | None]:
+        """See `ActuatedPhase.own`: a key of one of the motions, such as barbs.steps.1.amplitude_deg."""
+        here: Any = self
+        for part in key.split("."):
+            here = here[int(part)] if part.isdigit() else getattr(here, part)
+        return key, here

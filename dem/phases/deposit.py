@@ -1,0 +1,180 @@
+"""The phase that pours smarticles, layer by layer."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dem.body.placement import place_layer
+from dem.engine.interface import Engine
+from dem.errors import RunError
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
+from dem.setting.part import Duration, Part
+
+LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
+LAYER_SECONDS = 0.1  # from a layer of a pour to the next, about
+SETTLE_SECONDS = 0.2  # of a pile that was poured, about
+
+
+class Settle(Part):
+    """When a pile counts as settled: all hold at every look over a stretch of time."""
+
+    speed_m_per_s: float = Field(0.02, gt=0, description="largest speed of any smarticle [m/s]")
+    unbalanced_force: float = Field(0.05, gt=0, description="mean net force on a smarticle over its weight [1]")
+    hold_s: float = Field(0.05, ge=0, description="how long both must hold [s]")
+    timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
+
+
+class Deposit(Part, Phase):
+    """Pour smarticles in layers of random, non-overlapping poses just above the pile, then wait until it settles."""
+
+    pours: ClassVar[bool] = True
+    type: Literal["deposit"]
+    per_layer: int = Field(10, ge=1, description="smarticles per layer [1]")
+    layer_height_w: float = Field(
+        1.0,
+        gt=0,
+        le=10,
+        description="height of the slab above the pile that a layer is spread over, in units of w [1]",
+    )
+    landed_speed_m_per_s: float = Field(
+        0.2,
+        gt=0,
+        description="a layer has come down when each of its smarticles touches something "
+        "and falls slower than this [m/s]",
+    )
+    settle: Settle = Field(default_factory=Settle, description="when the poured pile counts as settled")
+
+    def check(self, scene: SceneView, index: int) -> None:
+        """See `Phase.check`: something comes down, and a wall is high enough for one layer."""
+        if scene.gravity_m_per_s2 == 0:
+            msg = "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
+            raise ValueError(msg)
+        height = scene.container.height_m
+        if height is not None:
+            self._check_first_layer(scene, height)
+
+    def _check_first_layer(self, scene: SceneView, height: float) -> None:
+        """The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top."""
+        slab = self.layer_height_w * scene.smarticle.middle_length_m
+        least = 2 * scene.particle.radius + slab + scene.particle.reach
+        if height < least:
+            key = "container.height_m" if scene.container.tiers is None else "container.tiers"
+            what = "it" if scene.container.tiers is None else "height_m of the top tier"
+            msg = (
+                f"{key}: {height:g} m of wall is too low for one layer of the pour, spread over "
+                f"phases.0.layer_height_w = {self.layer_height_w:g} w, which reaches {least:.4g} m; raise {what} by at "
+                f"least {least - height:.3g} m or lower layer_height_w"
+            )
+            raise ValueError(msg)
+
+    @property
+    def known_duration(self) -> None:
+        """See `Phase.known_duration`."""
+        return
+
+    def expected_duration(self, count: int) -> float:
+        """See `Phase.expected_duration`."""
+        return LAYER_SECONDS * math.ceil(count / self.per_layer) + SETTLE_SECONDS
+
+    def begin(self, scene: SceneView, index: int) -> Stage:
+        """See `Phase.begin`."""
+        return Pouring(self, scene)
+
+
+class Pouring:
+    """Layers of random poses just above the pile, the next when the last has come down; then the pile settles."""
+
+    def __init__(self, phase: Deposit, scene: SceneView) -> None:
+        self._phase = phase
+        self._scene = scene
+        rng = np.random.default_rng(scene.seed_for("deposit"))
+        # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile;
+        # `still` [s] that the pile has been.
+        self.memory: Memory = {
+            "left": scene.count,
+            "layer": 0,
+            "waited": 0.0,
+            "still": 0.0,
+            "random": rng.bit_generator.state,
+        }
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory = self.memory
+        if memory["layer"]:
+            self._look_at_layer(engine)
+        elif not memory["left"] and self._has_settled(engine):
+            return 0.0
+        if memory["left"] and not memory["layer"]:
+            self._pour(engine)
+        memory["waited"] += CHECK_INTERVAL
+        return CHECK_INTERVAL
+
+    def _pour(self, engine: Engine) -> None:
+        memory = self.memory
+        size = min(self._phase.per_layer, memory["left"])
+        rng = np.random.default_rng()
+        rng.bit_generator.state = memory["random"]
+        _pour_layer(self._phase, self._scene, engine, size, rng)
+        memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)
+
+    def _look_at_layer(self, engine: Engine) -> None:
+        size, limit = self.memory["layer"], self._phase.landed_speed_m_per_s
+        fastest = float(-engine.state().velocities[-size:, 2].min())
+        if fastest < limit and engine.touches()[-size:].min() > 0:
+            self.memory.update(layer=0, waited=0.0)
+        elif self.memory["waited"] > LAYER_TIMEOUT:
+            msg = (
+                f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
+                f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
+            )
+            raise RunError(msg)
+
+    def _has_settled(self, engine: Engine) -> bool:
+        settle: Settle = self._phase.settle
+        speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
+        unbalanced = engine.unbalanced_force()
+        still = speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force
+        self.memory["still"] = self.memory["still"] + CHECK_INTERVAL if still else 0.0
+        if self.memory["still"] > settle.hold_s:
+            return True
+        if self.memory["waited"] > settle.timeout_s:
+            msg = (
+                f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
+                f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
+                f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
+            )
+            raise RunError(msg)
+        return False
+
+
+def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng: np.random.Generator) -> None:
+    particle, state = scene.particle, engine.state()
+    tops = state.vertices[..., 2].max(axis=1)
+    top = tops.max(initial=engine.fixtures.floor)
+    near = tops > top - 2 * particle.radius
+    cylinder, bottom = engine.cylinder, top + particle.radius
+    hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
+    poses = place_layer(
+        particle,
+        count=size,
+        radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
+        bottom=bottom,
+        height=phase.layer_height_w * scene.smarticle.middle_length_m,
+        obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
+        rng=rng,
+        narrower=cylinder.inner_radii if cylinder.upper else None,
+    )
+    highest = poses.positions[:, 2].max() + particle.reach
+    if highest > cylinder.height:
+        key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
+        msg = (
+            f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} m, "
+            f"above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
+        )
+        raise RunError(msg)
+    engine.add(poses)

@@ -1,0 +1,160 @@
+"""The phase that pulls a hook out of the pile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
+from dem.setting.hooks import TOLERANCE, with_defaults
+from dem.setting.part import Duration, Length, Part, refuse_wrong_unit
+from dem.setting.smarticle import Smarticle
+
+HELD_FAST = 0.1  # s that a hook stays where its force limit has stopped it, for the force to be measured
+
+
+def _time_of_pull(data: dict[str, Any]) -> float:
+    """Default of `PullHook.duration_s`: until the hook has arrived."""
+    return float(data["distance_m"] / data["speed_m_per_s"])
+
+
+class PullHook(Part, Phase):
+    """Raise a hook at constant speed; its reaction force is the outcome. Motors hold: smarticles are welded."""
+
+    type: Literal["pull-hook"]
+    which: Literal["upper"] = Field("upper", description="the hook that is raised; the other one stays")
+    distance_m: Length = Field(..., description="how far the hook is raised [m]; default: 2w")
+    speed_m_per_s: float = Field(..., gt=0, description="speed of the hook [m/s]; default: w per second")
+    duration_s: Duration = Field(
+        default_factory=_time_of_pull,
+        description="length of the phase [s]; default: until the hook has arrived; longer: it then stays where it is",
+    )
+    force_limit_N: float | None = Field(
+        None,
+        gt=0,
+        description="force on the raised hook, mean over 0.01 s, at which it stops and the phase soon ends [N], as a "
+        "testing machine does before it breaks; null: none. A rigid smarticle that holds both hooks takes any force",
+    )
+
+    _length_unit = field_validator("distance_m")(refuse_wrong_unit)
+
+    @model_validator(mode="after")
+    def _arrives(self) -> Self:
+        needed = self.distance_m / self.speed_m_per_s
+        if self.duration_s < needed * (1 - TOLERANCE):
+            msg = (
+                f"duration_s: {self.duration_s:g} s is too short to raise the hook by distance_m = "
+                f"{self.distance_m:g} m at speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
+            )
+            raise ValueError(msg)
+        return self
+
+    def check(self, scene: SceneView, index: int) -> None:
+        """See `Phase.check`: there is a hook to pull."""
+        if scene.hooks is None:
+            msg = f"phases.{index}: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {{}}` will do)"
+            raise ValueError(msg)
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        """See `Phase.warnings`: hooks that one smarticle can hold both of, where one is pulled with any force."""
+        hooks = scene.hooks
+        if hooks is None or self.force_limit_N is not None:
+            return ()
+        across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
+        inside = scene.smarticle.middle_length_m - scene.sphere_diameter
+        if across >= inside:
+            return ()
+        return (
+            f"hooks.upper_height_m: the hooks are {across:.3g} m from outside to outside, less than a smarticle's "
+            f"inner length, {inside:.3g} m: one smarticle can hold both hooks, and then only the contacts give way; "
+            f"set them at least {1.005 * (inside - hooks.side_m):.3g} m apart, or give pull-hook a force_limit_N",
+        )
+
+    @property
+    def known_duration(self) -> float:
+        """See `Phase.known_duration`."""
+        return self.duration_s
+
+    @property
+    def pushing_speed(self) -> float:
+        """See `Phase.pushing_speed`."""
+        return self.speed_m_per_s
+
+    @property
+    def raises(self) -> float:
+        """See `Phase.raises`."""
+        return self.distance_m
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        """See `Phase.calls`."""
+        until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
+        return {
+            EffectName.HOOKS: f"phase {index} raises the upper one by {1e3 * self.distance_m:.3g} mm at "
+            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}"
+        }
+
+    def begin(self, scene: SceneView, index: int) -> Stage:
+        """See `Phase.begin`."""
+        return Pulling(self)
+
+
+# Widths w and thicknesses t2 that the keys are by default.
+_DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
+
+
+def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
+    """Data of a phase with the keys filled in that follow from the smarticle; left alone unless it pulls a hook."""
+    pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
+    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
+
+
+class Pulling:
+    """The upper hook is raised until it has arrived or takes too much force, and then stays where it is."""
+
+    def __init__(self, phase: PullHook) -> None:
+        self._phase = phase
+        # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last look.
+        self.memory: Memory = {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory, phase = self.memory, self._phase
+        if memory["end"] is None:
+            arrival = engine.time + phase.distance_m / phase.speed_m_per_s
+            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True, felt=_felt_above(engine))
+            engine.motors.weld()
+            engine.fixtures.raise_upper(phase.speed_m_per_s)
+            self._note(engine)
+        elif memory["raising"] and self._overloaded(engine):
+            memory.update(arrival=engine.time, end=engine.time + HELD_FAST)
+        if memory["raising"] and (left := time_left(engine, memory["arrival"])):
+            return left if phase.force_limit_N is None else min(CHECK_INTERVAL, left)
+        if memory["raising"]:
+            memory["raising"] = False
+            engine.fixtures.stop()
+        left = time_left(engine, memory["end"])
+        if not left and memory.get("felt") == _felt_above(engine):
+            memory["warning"] = (
+                "no smarticle touched the upper hook while it was raised, and its force is 0 N throughout; lower "
+                "hooks.upper_height_m or raise count"
+            )
+        return left
+
+    def _overloaded(self, engine: Engine) -> bool:
+        """Whether the hook took more than it may since the last look, on average."""
+        limit, before, step = self._phase.force_limit_N, self.memory["force_sum"], self.memory["step"]
+        self._note(engine)
+        return limit is not None and before - self.memory["force_sum"] > limit * (self.memory["step"] - step)
+
+    def _note(self, engine: Engine) -> None:
+        self.memory.update(force_sum=float(engine.fixtures.hook_sums[1, 2]), step=engine.steps)
+
+
+def _felt_above(engine: Engine) -> list[float]:
+    """All that the upper hook has felt so far, summed over steps [N]: unchanged where nothing touches it."""
+    felt: list[float] = engine.fixtures.hook_sums[1].tolist()
+    return felt

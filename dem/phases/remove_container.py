@@ -1,0 +1,94 @@
+"""The phase that takes the container away."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
+from dem.setting.part import Duration, Part
+
+
+class RemoveContainer(Part, Phase):
+    """Take the container's wall away and let the pile rest on its floor, which has no end. Motors hold.
+
+    Smarticles are not held back from then on: how far they go is measured, not refused. A later phase that shakes the
+    container shakes the floor, and those that have rolled away with it.
+    """
+
+    frees: ClassVar[bool] = True
+    type: Literal["remove-container"]
+    duration_s: Duration = Field(1.0, description="length of the phase [s]")
+    parts: Literal["wall"] = Field("wall", description="what is taken away: the whole wall, every tier of it")
+    speed_m_per_s: float | None = Field(
+        None,
+        gt=0,
+        description="speed at which the wall is lifted, rubbing along the pile, until its lower edge is above the pile "
+        "[m/s]; a wall that is not clear of it at the end of the phase stays where it is; null: gone at once",
+    )
+
+    def check(self, scene: SceneView, index: int) -> None:
+        """See `Phase.check`: the container is taken away once at most."""
+        for earlier, phase in enumerate(scene.phases[:index]):
+            if phase.frees:
+                msg = f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
+                raise ValueError(msg)
+
+    @property
+    def known_duration(self) -> float:
+        """See `Phase.known_duration`."""
+        return self.duration_s
+
+    @property
+    def pushing_speed(self) -> float:
+        """See `Phase.pushing_speed`."""
+        return self.speed_m_per_s or 0.0
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        """See `Phase.calls`."""
+        speed = self.speed_m_per_s
+        how = "at once" if speed is None else f"lifted at {1e3 * speed:.3g} mm/s"
+        return {EffectName.WALL_REMOVAL: f"phase {index}: {how}"}
+
+    def begin(self, scene: SceneView, index: int) -> Stage:
+        """See `Phase.begin`."""
+        return Removing(self)
+
+
+class Removing:
+    """The container's wall goes away, at once or upwards, and the pile rests on the floor.
+
+    Args:
+        phase: the phase.
+    """
+
+    def __init__(self, phase: RemoveContainer) -> None:
+        self._phase = phase
+        self.memory: Memory = {"end": None, "lifting": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        memory, speed = self.memory, self._phase.speed_m_per_s
+        if memory["end"] is None:
+            memory["end"] = engine.time + self._phase.duration_s
+            engine.motors.weld()
+            if speed is None:
+                engine.fixtures.remove_wall()
+            else:
+                engine.fixtures.lift_wall(speed)
+                memory["lifting"] = True
+        left = time_left(engine, memory["end"])
+        if memory["lifting"]:
+            top = engine.state().vertices[..., 2].max() + engine.particle.radius
+            if engine.fixtures.wall_bottom > top:
+                engine.fixtures.remove_wall()
+                memory["lifting"] = False
+            elif not left:
+                engine.fixtures.stop()
+            else:
+                return min(CHECK_INTERVAL, left)
+        return left

@@ -1,0 +1,92 @@
+"""The phase that shakes the container."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.errors import RunError
+from dem.phases.phase import Memory, Phase, SceneView, Stage
+from dem.setting.part import Duration, Part
+
+
+class Shake(Part, Phase):
+    """Shake the whole container along the vertical, z = A sin(2πft) with A = Γg/(2πf)².
+
+    After a phase that takes the container away, its floor alone is shaken, a plane without end: what rolls off the
+    pile goes on being shaken.
+    """
+
+    type: Literal["shake"]
+    duration_s: Duration = Field(20.0, description="length of the phase [s]")
+    frequency_hz: float = Field(30.0, gt=0, le=2000, description="f, frequency [Hz]")
+    peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
+
+    def amplitude(self, gravity: float) -> float:
+        """A = Γ g / (2πf)² [m], gravity in m/s²."""
+        return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
+
+    @property
+    def known_duration(self) -> float:
+        """See `Phase.known_duration`."""
+        return self.duration_s
+
+    def peak_speed(self, gravity: float) -> float:
+        """See `Phase.peak_speed`."""
+        return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        """See `Phase.calls`."""
+        alone = ", the floor alone" if _freed(scene, index) else ""
+        return {
+            EffectName.CONTAINER_MOTION: f"phase {index}: Γ = {self.peak_acceleration_g:g}, f = "
+            f"{self.frequency_hz:g} Hz, A = {1e3 * self.amplitude(scene.gravity_m_per_s2):.3g} mm{alone}"
+        }
+
+    def begin(self, scene: SceneView, index: int) -> Stage:
+        """See `Phase.begin`."""
+        return Shaking(self, scene.gravity_m_per_s2, freed=_freed(scene, index))
+
+
+def _freed(scene: SceneView, index: int) -> bool:
+    """Whether the container is taken away before a phase."""
+    return any(before.frees for before in scene.phases[:index])
+
+
+class Shaking:
+    """The container moves, or its floor alone where the wall was taken away.
+
+    Args:
+        phase: the phase.
+        gravity: g [m/s²].
+        freed: whether the wall was to be taken away before.
+    """
+
+    def __init__(self, phase: Shake, gravity: float, *, freed: bool) -> None:
+        self._phase = phase
+        self._amplitude = phase.amplitude(gravity)
+        self._freed = freed
+        self.memory: Memory = {"begun": False}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        if self.memory["begun"]:
+            engine.fixtures.stop()
+            return 0.0
+        if self._freed and engine.fixtures.walled:
+            edge = engine.fixtures.wall_bottom - engine.fixtures.floor
+            msg = (
+                f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
+                "not clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its "
+                "speed_m_per_s"
+            )
+            raise RunError(msg)
+        self.memory["begun"] = True
+        engine.motors.weld()
+        engine.fixtures.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)
+        return self._phase.duration_s

@@ -1,0 +1,92 @@
+"""The law of contact: linear spring, dashpot and Coulomb friction, and what restitution makes of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from dem.body.particle import Particle
+from dem.setting.contact import Contact
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactLaw:
+    """Linear spring, dashpot and Coulomb friction of one contact.
+
+    Args:
+        normal_stiffness: kn [N/m].
+        tangential_stiffness: ks [N/m].
+        normal_damping: cn between smarticles [N s/m].
+        wall_damping: cn against the container [N s/m].
+        tangential_damping: cs over cn [1].
+        friction: Coulomb coefficient between smarticles [1].
+        wall_friction: Coulomb coefficient against the container [1].
+    """
+
+    normal_stiffness: float
+    tangential_stiffness: float
+    normal_damping: float
+    wall_damping: float
+    tangential_damping: float
+    friction: float
+    wall_friction: float
+
+
+def typical_effective_mass(particle: Particle) -> float:
+    """Harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
+
+    The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace.
+    """
+    inverse = 1.0 / particle.boxes.inertia
+    x, y, z = particle.centres.T
+    rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3
+    return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
+
+
+def restitution_of(damping_ratio: float) -> float:
+    """Restitution [1] of a linear spring and dashpot that never pulls.
+
+    The contact ends when its force is zero, before the spring is back at zero length.
+
+    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007): with ω = √(1 - ζ²) in units of the undamped frequency,
+    e = exp[-(ζ/ω)(π - arg(ω² - ζ² + 2iζω))] for ζ < 1, and its continuation above.
+    """
+    zeta = damping_ratio
+    if zeta < 1:
+        omega = math.sqrt(1 - zeta**2)
+        return math.exp(-zeta / omega * (math.pi - math.atan2(2 * zeta * omega, omega**2 - zeta**2)))
+    if zeta == 1:
+        return math.exp(-2)
+    omega = math.sqrt(zeta**2 - 1)
+    return float(((zeta + omega) / (zeta - omega)) ** (-zeta / omega))
+
+
+def damping_ratio(restitution: float) -> float:
+    """Damping ratio ζ [1] of a contact with the given restitution, the inverse of `restitution_of`."""
+    if restitution == 1:
+        return 0.0
+    return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
+
+
+def contact_law(particle: Particle, contact: Contact, stiffness: float) -> ContactLaw:
+    """The contact law of a scene; restitution holds at the typical effective mass of a pair.
+
+    Args:
+        particle: one smarticle.
+        contact: friction and restitution.
+        stiffness: kn of one contact [N/m].
+    """
+    single = typical_effective_mass(particle)
+    zeta = damping_ratio(contact.restitution)
+    return ContactLaw(
+        normal_stiffness=stiffness,
+        tangential_stiffness=stiffness * contact.tangential_stiffness_ratio,
+        normal_damping=2 * zeta * math.sqrt(stiffness * single / 2),
+        wall_damping=2 * zeta * math.sqrt(stiffness * single),
+        tangential_damping=contact.tangential_damping_ratio,
+        friction=contact.friction_smarticle,
+        wall_friction=contact.friction_wall,
+    )

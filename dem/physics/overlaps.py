@@ -1,0 +1,42 @@
+"""How deep contacts are: what the watchdog asks of an engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+APART = 0.1  # of the depth that is too deep; fixtures that have moved against each other by less have not
+
+
+@dataclass(frozen=True)
+class Held:
+    """A smarticle between two fixtures that have moved apart: what gives way is the contact alone.
+
+    Args:
+        smarticle: its number.
+        between: names of the two fixtures.
+        apart: by how much they have moved against each other since the start [m].
+    """
+
+    smarticle: int
+    between: tuple[str, str]
+    apart: float
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """All contacts and hinges at one instant.
+
+    Args:
+        deepest: overlap of the deepest contact [m].
+        deep: (N,) bool, smarticles with a contact that is deeper than asked for.
+        elastic_energy: no less than what the springs of all contacts and hinges hold [J].
+        held: those of the deep ones that two fixtures hold.
+    """
+
+    deepest: float
+    deep: NDArray[np.bool_]
+    elastic_energy: float
+    held: tuple[Held, ...] = ()

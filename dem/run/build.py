@@ -1,0 +1,85 @@
+"""What a run is made of, from its scene: the engine, and what records and watches it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.engine.kinds import engine_kind
+from dem.plan.effects import called_for
+from dem.plan.steps import time_steps
+from dem.record.frames import FrameWriter
+from dem.record.names import SPHERE
+from dem.record.progress import ProgressWriter
+from dem.record.series import SeriesWriter
+from dem.run.recorder import Recorder
+from dem.run.sampler import Sampler
+from dem.run.watchdog import Watchdog
+from dem.scene.reading import scene_hash
+from dem.scene.scene import Scene
+
+GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
+SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
+# Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
+# slip through each other; shaking at Γ = 10, draft, reaches 0.4.
+DEPTH_LIMIT = 0.5
+# Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
+# results resolves.
+RISE_LIMIT = 0.5
+
+
+def build_engine(scene: Scene, dt: float) -> Engine:
+    """The engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
+    return engine_kind(scene.engine).build(scene, dt)
+
+
+def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
+    """The recorder of a scene, with the watchdog's limits."""
+    recording = scene.recording
+    # No one radius gives the volume of a mould of tiers.
+    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
+    sampler = Sampler(radius, {effect for effect in EffectName if called_for(scene, effect)})
+    return Recorder(
+        sampler=sampler,
+        series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
+        frames=FrameWriter(out),
+        watchdog=build_watchdog(scene),
+        progress=progress,
+        interval=recording.series_interval_s,
+        frame_every=recording.samples_in(recording.frame_interval_s),
+        spheres=FrameWriter(out, SPHERE) if called_for(scene, EffectName.SPHERE_GLYPHS) else None,
+        sphere_every=recording.samples_in(recording.sphere_interval_s),
+    )
+
+
+def build_watchdog(scene: Scene) -> Watchdog:
+    """The watchdog of a scene, with its limits."""
+    gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
+    fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
+    return Watchdog(
+        cylinder=scene.cylinder,
+        speed=SPEED_MARGIN * max(fall, *(phase.peak_speed(gravity) for phase in scene.phases)),
+        gap=GAP_LIMIT * diameter,
+        depth=DEPTH_LIMIT * diameter,
+        # Without gravity there is no such measure.
+        energy=RISE_LIMIT * diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
+    )
+
+
+@dataclass(frozen=True)
+class Builders:
+    """What makes the parts of a run; who watches or spoils one on purpose gives others.
+
+    Args:
+        steps: time step of each phase [s].
+        engine: of a scene and a time step [s].
+        recorder: of a scene, a run directory and its progress.
+    """
+
+    steps: Callable[[Scene], Sequence[float]] = time_steps
+    engine: Callable[[Scene, float], Engine] = build_engine
+    recorder: Callable[[Scene, Path, ProgressWriter], Recorder] = build_recorder

@@ -1,0 +1,220 @@
+"""What the series is made of: numbers that the engine is asked for at each sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.chain import extent
+from dem.body.state import State
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.record.columns import (
+    COLUMNS,
+    ENERGY_COLUMNS,
+    HOOK_COLUMNS,
+    LEDGER_COLUMNS,
+    MOTOR_COLUMNS,
+    RELEASE_COLUMNS,
+    STRAIN_COLUMNS,
+    Columns,
+)
+from dem.record.packing import packing_fraction
+
+COLUMNS_OF: Mapping[EffectName, Columns] = {
+    EffectName.MOTORS: MOTOR_COLUMNS,
+    EffectName.ENERGIES: ENERGY_COLUMNS,
+    EffectName.ENERGY_ACCOUNT: LEDGER_COLUMNS,
+    EffectName.HOOKS: HOOK_COLUMNS,
+    EffectName.WALL_REMOVAL: RELEASE_COLUMNS,
+    EffectName.STRINGS: STRAIN_COLUMNS,
+}
+"""What effects add to the rows."""
+
+
+@dataclass
+class Sampler:
+    """Makes a row of the series of what the engine says; means since the sample before are its memory.
+
+    Args:
+        radius: of the container [m].
+        effects: what the scene calls for.
+    """
+
+    radius: float
+    effects: Set[EffectName] = frozenset()
+    _before: tuple[float, float, NDArray[np.float64]] | None = None
+    _hooks_before: tuple[int, NDArray[np.float64]] | None = None
+    _strain_before: tuple[int, NDArray[np.float64]] | None = None
+
+    @property
+    def described(self) -> Columns:
+        """The columns of its rows."""
+        columns = dict(COLUMNS)
+        for effect, more in COLUMNS_OF.items():
+            if effect in self.effects:
+                columns |= more
+        return columns
+
+    def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
+        """One row.
+
+        Args:
+            engine: what is asked.
+            state: its smarticles now.
+            phase: index of the phase.
+        """
+        boxes = engine.particle.boxes
+        heights = state.positions[:, 2] - engine.fixtures.floor
+        phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
+        container_force = self._mean_force(engine, state.momentum)
+        more: dict[str, Any] = {}
+        if EffectName.HOOKS in self.effects:
+            lower, upper = self._hook_forces(engine)
+            # The balance does not tell hooks from the container.
+            container_force -= lower + upper
+            more |= {
+                "hook_upper_force_N": upper,
+                "hook_lower_force_N": lower,
+                "hook_upper_z_m": engine.fixtures.upper_height,
+            }
+        if EffectName.WALL_REMOVAL in self.effects:
+            outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
+            more["outside_count"] = np.count_nonzero(outside)
+            if not engine.fixtures.enclosed:
+                phi = math.nan  # a pile that spreads fills no cylinder
+        if EffectName.STRINGS in self.effects:
+            more |= self._strain_row(engine, state)
+            # Nor does it tell strings, whose pull the smarticles received from elsewhere.
+            pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
+            container_force += np.nan_to_num(pulls)
+        row = {
+            "time_s": engine.time,
+            "phase": phase,
+            "count": engine.count,
+            "container_z_m": engine.fixtures.floor,
+            "container_velocity_m_per_s": engine.fixtures.velocity,
+            "container_force_N": container_force,
+            "com_height_m": heights.mean() if len(heights) else math.nan,
+            "kinetic_energy_J": state.kinetic_energy,
+            "max_speed_m_per_s": np.linalg.norm(state.velocities, axis=1).max(initial=0.0),
+            "unbalanced_force": engine.unbalanced_force(),
+            "packing_fraction": phi,
+        }
+        if EffectName.MOTORS in self.effects:
+            row |= _motor_row(engine, state)
+        if EffectName.ENERGIES in self.effects:
+            row |= {
+                "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
+                "container_work_J": engine.account.container_work,
+            }
+        if EffectName.ENERGY_ACCOUNT in self.effects:
+            row |= _ledger_row(engine, row)
+        return row | more
+
+    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+        # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
+        # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
+        # Smarticles are added at rest, so a layer that was poured in between brings no momentum.
+        time, impulse, before = engine.time, engine.gravity_impulse, self._before
+        self._before = (time, impulse, momentum)
+        if before is None or time <= before[0]:
+            return np.full(3, math.nan)
+        lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
+        mean: NDArray[np.float64] = lost / (time - before[0])
+        return mean
+
+    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
+        steps, sums, before = engine.steps, engine.fixtures.hook_sums, self._hooks_before
+        self._hooks_before = (steps, sums)
+        if before is None or steps <= before[0]:
+            return np.full_like(sums, math.nan)
+        mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
+        return mean
+
+    def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
+        strings, none = engine.strings, np.full(3, math.nan)
+        row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
+        row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
+        if not engine.count:
+            return row
+        row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
+        before, self._strain_before = self._strain_before, None
+        if not strings.tied:
+            return row
+        walls = engine.fixtures.channel_sums
+        sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
+        self._strain_before = (engine.steps, sums)
+        row["pulled_m"] = strings.pulled
+        row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
+        if before is not None and engine.steps > before[0]:
+            means = (sums - before[1]) / (engine.steps - before[0])
+            row |= dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
+        return row
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs."""
+        marks = {"hooks": self._hooks_before, "strain": self._strain_before}
+        before = self._before
+        return {
+            "before": None if before is None else [before[0], before[1], before[2].tolist()],
+            **{name: None if mark is None else [mark[0], mark[1].tolist()] for name, mark in marks.items()},
+        }
+
+    def restore(self, memory: Mapping[str, Any]) -> None:
+        """Go on from where `memory` was taken."""
+        before = memory["before"]
+        self._before = None if before is None else (before[0], before[1], np.array(before[2]))
+        self._hooks_before, self._strain_before = (
+            None if mark is None else (mark[0], np.array(mark[1])) for mark in (memory["hooks"], memory["strain"])
+        )
+
+
+def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
+    motors = engine.motors.readings
+    angles = _mean(state.angles)
+    if motors is None or not engine.motors.articulated:
+        unknown = math.nan
+        held = angles if motors is None else _mean(motors.commands)
+        behind = error = torque = halted = unknown
+    else:
+        held = _mean(motors.commands)
+        behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
+        error = np.abs(motors.commands - state.angles).max(initial=0.0)
+        torque = math.sqrt(np.square(motors.torques).mean())
+        halted = motors.halted.mean()
+    return {
+        "commanded_angle_rad": held,
+        "angle_rad": angles,
+        "schedule_error_rad": behind,
+        "tracking_error_rad": error,
+        "motor_torque_N_m": torque,
+        "halted_fraction": halted,
+        "motor_work_J": 0.0 if motors is None else motors.work.sum(),
+        "joint_gap_m": engine.motors.gaps().max(initial=0.0),
+    }
+
+
+def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
+    contacts, hinges = engine.account.elastic()
+    given = engine.account.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
+    stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
+    return {
+        "added_energy_J": engine.account.added,
+        "contact_elastic_energy_J": contacts,
+        "hinge_elastic_energy_J": hinges,
+        "dissipated_energy_J": engine.account.dissipated,
+        "energy_residual_J": given - stored - engine.account.dissipated,
+    }
+
+
+def _mean(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) mean over smarticles of (N, 2); NaN without smarticles."""
+    mean: NDArray[np.float64] = angles.mean(axis=0) if len(angles) else np.full(2, math.nan)
+    return mean

@@ -1,0 +1,108 @@
+"""Scenes read, written and told apart."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from dem.errors import InputError
+from dem.scene.overrides import apply_override
+from dem.scene.refusal import first_line
+from dem.scene.scene import Scene
+from dem.scene.yaml_text import load_yaml
+from dem.setting.fidelity import FIDELITIES
+
+SCHEMA_VERSION = 1
+DEFAULT_ENGINE = "yade"
+
+
+def parse_scene(data: Any, *, source: str) -> Scene:
+    """Validate plain data.
+
+    Args:
+        data: the content of a scene file.
+        source: file name for messages.
+
+    Raises:
+        InputError: one line with file, key, value and the way out.
+    """
+    if data is None:
+        msg = f"{source}: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
+        raise InputError(msg)
+    if not isinstance(data, Mapping):
+        msg = f"{source}: a scene is a mapping of keys to values, got {type(data).__name__}"
+        raise InputError(msg)
+    version = data.get("schema_version")
+    if isinstance(version, int) and version != SCHEMA_VERSION:
+        msg = f"{source}: schema_version: {version} is not known here; this version reads {SCHEMA_VERSION}"
+        raise InputError(msg)
+    try:
+        return Scene.model_validate(data)
+    except ValidationError as error:
+        msg = f"{source}: {first_line(error, data)}"
+        raise InputError(msg) from None
+
+
+def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
+    """Read a scene file.
+
+    Args:
+        path: YAML file.
+        overrides: `KEY=VALUE` with dots for nesting, e.g. `phases.1.duration_s=2`; the value is read as YAML.
+
+    Raises:
+        InputError: unreadable file, bad YAML, bad override or invalid scene.
+    """
+    try:
+        data = load_yaml(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror}); give the path of a scene file"
+        raise InputError(msg) from None
+    except UnicodeDecodeError:
+        msg = f"{path}: is not a text file; give the path of a scene file"
+        raise InputError(msg) from None
+    except yaml.YAMLError as error:
+        msg = f"{path}: not valid YAML: {' '.join(str(error).split())}"
+        raise InputError(msg) from None
+    for override in overrides if isinstance(data, Mapping) else ():
+        apply_override(data, override)
+    return parse_scene(data, source=str(path))
+
+
+def _plain(scene: Scene) -> dict[str, Any]:
+    """The resolved scene as plain data; the default engine is not told, as before there was another one."""
+    data = scene.model_dump(mode="json")
+    if scene.engine == DEFAULT_ENGINE:
+        del data["engine"]
+    return data
+
+
+def dump_scene(scene: Scene) -> str:
+    """The resolved scene as YAML, every default written out."""
+    return str(yaml.safe_dump(_plain(scene), sort_keys=False, allow_unicode=True))
+
+
+def scene_hash(scene: Scene) -> str:
+    """SHA-256 of the canonical JSON of the resolved scene."""
+    text = json.dumps(_plain(scene), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of the scene file, for editors."""
+    schema = Scene.model_json_schema()
+    # The file may name a fidelity, or give its base and some knobs; the model that pydantic describes has them all.
+    fidelity = schema["properties"]["fidelity"]
+    mapping = {"$ref": fidelity.pop("$ref")}
+    fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
+    schema["$defs"]["Fidelity"].pop("required")
+    # These follow from the smarticle where they are not given.
+    schema["$defs"]["Hooks"].pop("required")
+    schema["$defs"]["PullHook"]["required"] = ["type"]
+    return schema

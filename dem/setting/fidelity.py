@@ -1,0 +1,81 @@
+"""Accuracy against cost: knobs, and the names of settings of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from dem.setting.part import Part
+
+
+class Fidelity(Part):
+    """Knobs of accuracy against cost; none of them changes mass or inertia."""
+
+    base: Literal["draft", "standard", "reference"] = Field(
+        "standard", description="named setting that the other knobs start from"
+    )
+    rows: int = Field(..., ge=1, le=4, description="rows of spheres across t1, the thickness along the normal [1]")
+    diameter_m: float | None = Field(
+        None,
+        gt=0,
+        description="sphere diameter [m]; default: one row such that two crossing chains touch at the same mean "
+        "distance as two bars of the true section, 2(t1+t2)/π; several rows t2, the true section",
+    )
+    pitch: float = Field(
+        ...,
+        gt=0,
+        le=1.4,
+        description="largest distance of neighbouring spheres over their diameter [1]; "
+        "from √2 on chains pass through each other",
+    )
+    stiffness_N_per_m: float = Field(..., gt=0, description="normal stiffness kn of one contact [N/m]")
+    time_step_fraction: float = Field(
+        ...,
+        gt=0,
+        le=1,
+        description="time step over the stable one, which is computed from masses and stiffness [1]",
+    )
+    time_step_s: float | None = Field(
+        None,
+        gt=0,
+        description="time step [s] by hand; refused above the stable one; default: from the fraction",
+    )
+    wall_facets: int = Field(64, ge=16, le=512, description="flat facets around the cylinder's wall [1]")
+    control_interval_s: float = Field(
+        ..., gt=0, description="time between two looks of the motor control [s]; the paper's time step is 2e-4 s"
+    )
+    hinge_stiffness_N_per_m: float = Field(
+        ..., gt=0, description="stiffness of the pin that holds the two links of a hinge together [N/m]"
+    )
+
+
+# The pin of standard and reference gives way by 1 % of a sphere's diameter under a pull of 100 times the own weight, up
+# to l/w = 1; the softer one of draft allows longer time steps and gives way by as much in a pile that is actuated.
+FIDELITIES: Mapping[str, Mapping[str, Any]] = {
+    "draft": {
+        "rows": 1,
+        "pitch": 1.3,
+        "stiffness_N_per_m": 250.0,
+        "time_step_fraction": 0.9,
+        "control_interval_s": 2e-4,
+        "hinge_stiffness_N_per_m": 5000.0,
+    },
+    "standard": {
+        "rows": 1,
+        "pitch": 1.0,
+        "stiffness_N_per_m": 500.0,
+        "time_step_fraction": 0.9,
+        "control_interval_s": 2e-4,
+        "hinge_stiffness_N_per_m": 14500.0,
+    },
+    "reference": {
+        "rows": 2,
+        "pitch": 1.0,
+        "stiffness_N_per_m": 500.0,
+        "time_step_fraction": 0.9,
+        "control_interval_s": 2e-4,
+        "hinge_stiffness_N_per_m": 14500.0,
+    },
+}

@@ -1,0 +1,84 @@
+"""One smarticle: its geometry and material."""
+
+from __future__ import annotations
+
+import math
+from typing import Self
+
+from pydantic import Field, field_validator, model_validator
+
+from dem.body.particle import Boxes
+from dem.setting.part import Length, Part, in_hinge_range, refuse_wrong_unit
+
+
+class Smarticle(Part):
+    """Geometry and material of one smarticle."""
+
+    middle_length_m: Length = Field(0.0117, description="w, length of the middle link, hinge to hinge [m]")
+    aspect_ratio: float = Field(0.7, ge=0, le=2, description="l/w, barb length over middle length [1]")
+    thickness_normal_m: Length = Field(
+        1.27e-3, description="t1, thickness along the normal of the smarticle's plane [m]"
+    )
+    thickness_in_plane_m: Length = Field(0.5e-3, description="t2, thickness in the smarticle's plane [m]")
+    density_kg_per_m3: float = Field(
+        7850.0,
+        gt=0,
+        description="density of the links [kg/m³]; mass and inertia are those of the boxes",
+    )
+    angles_deg: tuple[float, float] = Field(
+        (90.0, 90.0),
+        description="barb angles (α1, α2) [deg]: 0 straight, 90 the U; from -15 to 105",
+    )
+
+    _length_unit = field_validator("middle_length_m", "thickness_normal_m", "thickness_in_plane_m")(refuse_wrong_unit)
+
+    @field_validator("density_kg_per_m3")
+    @classmethod
+    def _density_unit(cls, value: float) -> float:
+        if not 50 <= value <= 25000:
+            msg = f"{value:g} kg/m³ is outside 50 … 25000 kg/m³; density is in kg/m³: steel is 7850, not 7.85"
+            raise ValueError(msg)
+        return value
+
+    @field_validator("angles_deg")
+    @classmethod
+    def _angle_range(cls, value: tuple[float, float]) -> tuple[float, float]:
+        return (in_hinge_range(value[0]), in_hinge_range(value[1]))
+
+    @model_validator(mode="after")
+    def _thinner_than_long(self) -> Self:
+        thickest = max(self.thickness_normal_m, self.thickness_in_plane_m)
+        if thickest > self.middle_length_m / 2:
+            msg = (
+                f"thickness {thickest:g} m is more than half of middle_length_m = {self.middle_length_m:g} m; "
+                "a smarticle is a chain of thin links"
+            )
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _barbs_apart(self) -> Self:
+        if self.tip_clearance(self.angles_deg) < 0:
+            msg = (
+                f"angles_deg: at {self.angles_deg[0]:g}° and {self.angles_deg[1]:g}° the barbs of l/w = "
+                f"{self.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
+            )
+            raise ValueError(msg)
+        return self
+
+    def tip_clearance(self, angles_deg: tuple[float, float]) -> float:
+        """Free distance [m] between the barb tips at angles [deg] beyond 90°; negative: the barbs cross."""
+        inward = -sum(math.cos(math.radians(angle)) for angle in angles_deg if angle > 90)
+        return self.middle_length_m * (1 - self.aspect_ratio * inward) - self.thickness_in_plane_m
+
+    @property
+    def boxes(self) -> Boxes:
+        """Exact geometry, mass and inertia."""
+        return Boxes(
+            middle_length=self.middle_length_m,
+            barb_length=self.aspect_ratio * self.middle_length_m,
+            thickness_normal=self.thickness_normal_m,
+            thickness_in_plane=self.thickness_in_plane_m,
+            density=self.density_kg_per_m3,
+            angles=(math.radians(self.angles_deg[0]), math.radians(self.angles_deg[1])),
+        )

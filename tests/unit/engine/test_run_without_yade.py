@@ -1,0 +1,97 @@
+"""A machine without YADE: a clear error, and nothing written. And what the engine asks of YADE, from a double of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.library import import_yade
+from dem.errors import RunError
+from dem.run.run import run_scene
+from dem.scene.scene import Scene
+
+MakeScene = Callable[..., Scene]
+
+
+@pytest.fixture
+def no_yade(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An import of yade that fails, whatever is installed."""
+    monkeypatch.setitem(sys.modules, "yade", None)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+
+
+@pytest.mark.usefixtures("no_yade")
+def test_missing_yade_says_how_to_get_it() -> None:
+    with pytest.raises(RunError) as caught:
+        import_yade()
+    assert str(caught.value) == (
+        "YADE cannot be imported (import of yade halted; None in sys.modules); install it with `make setup` or "
+        "`apt-get install yade`, see environment.md; `smarticles doctor` tells what is missing"
+    )
+
+
+@pytest.mark.usefixtures("no_yade")
+def test_missing_yade_leaves_no_directory(make_scene: MakeScene, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    with pytest.raises(RunError, match=r"^YADE cannot be imported .* `make setup`"):
+        run_scene(make_scene(), out, command="test", progress=False)
+    assert not out.exists()
+
+
+def test_yade_that_breaks_on_import_says_the_cause(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "yade").mkdir()
+    (tmp_path / "yade" / "__init__.py").write_text("raise ImportError('libboost_python311.so.1.74: cannot open')")
+    monkeypatch.delitem(sys.modules, "yade", raising=False)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    with pytest.raises(RunError, match=r"^YADE cannot be imported \(libboost_python311\.so\.1\.74: cannot open\)"):
+        import_yade()
+
+
+class Omega:
+    """What `YadeEngine.advance` sees of YADE."""
+
+    def __init__(self, stops_at: int | None = None) -> None:
+        self.iter, self.time, self.asked = 0, 0.0, 0
+        self._stops_at = stops_at
+
+    def step(self) -> None:
+        self.asked += 1
+        self.iter = self.iter + 1 if self._stops_at is None else min(self.iter + 1, self._stops_at)
+
+
+def make_engine(omega: Omega) -> YadeEngine:
+    engine = YadeEngine.__new__(YadeEngine)
+    # What `advance` needs, without YADE: Omega, and what counts the smarticles' seconds.
+    vars(engine).update(
+        _yade=SimpleNamespace(omega=omega),
+        _omega=omega,
+        _assembly=SimpleNamespace(count=0, hinges=None),
+        _shaker=None,
+        strings=None,
+        fixtures=SimpleNamespace(moving=[], felt=()),
+        account=SimpleNamespace(step=lambda number, advance: advance()),
+        _smarticle_seconds=0.0,
+        time_step=1e-5,
+    )
+    return engine
+
+
+def test_engine_that_stops_early_is_a_run_error() -> None:
+    engine = make_engine(Omega(stops_at=7))
+    engine.advance(5)
+    with pytest.raises(RunError) as caught:
+        engine.advance(5)
+    assert str(caught.value) == "YADE stopped at step 7 of 10 (t = 0.0000 s); see its message above"
+
+
+def test_no_steps_are_no_run() -> None:
+    omega = Omega()
+    make_engine(omega).advance(0)
+    assert omega.asked == 0

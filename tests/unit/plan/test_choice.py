@@ -1,0 +1,190 @@
+"""The fidelity chosen from a measured table: by error, by hours, by both, and what is said where none will do."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from dem.errors import InputError
+from dem.plan import choice
+from dem.plan.choice import Error, Expectation, Measured, choose, pick, read_table
+from dem.plan.outlook import plan
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+
+HEADER = (
+    "knob,value,unit,variant,seeds [-],aspect ratio [-],smarticles [-],activity,"
+    "processor time over expected wall time [-],"
+    "phi_0 error [%],phi_0 error 95 % [%],phi_f error [%],phi_f error 95 % [%],"
+    "crossings error [%],crossings error 95 % [%],verdict"
+)
+TABLE = f"""\
+{HEADER}
+time-step,0.9,,base,3,0.7,60,shake,1.5,0.1,1,0.1,1,0.1,1,not resolved
+fidelity,draft,,base,3,0.7,60,shake,1.5,-2,1.5,6,2,-30,12,resolved
+fidelity,standard,,standard,3,0.7,60,shake,2,1,1.5,-2,2,-20,10,not resolved
+fidelity,reference,,reference,3,0.7,60,shake,1,0,1,0,1.2,0,5,reference
+# Study accuracy, …
+"""
+
+
+def scene_of(**changes: object) -> Scene:
+    phases = [{"type": "deposit"}, {"type": "relax"}, {"type": "shake", "duration_s": 2}]
+    return parse_scene({"schema_version": 1, "seed": 1, "count": 60, "phases": phases, **changes}, source="test")
+
+
+@pytest.fixture
+def table_file(tmp_path: Path) -> Path:
+    file = tmp_path / "table.csv"
+    file.write_text(TABLE, encoding="utf-8")
+    return file
+
+
+def expected(fidelity: str, error: float, hours: float, *, band: float = 0.01) -> Expectation:
+    errors = (Error(of="φ_0", value=error / 2, band=band), Error(of="φ_f", value=-error, band=band))
+    measured = Measured(fidelity=fidelity, errors=errors, seeds=3, ratio=1.0, is_reference=fidelity == "reference")
+    return Expectation(measured=measured, hours=hours)
+
+
+THREE = [expected("draft", 0.06, 0.5), expected("standard", 0.02, 2.0), expected("reference", 0.0, 30.0)]
+
+
+def test_a_table_is_read(table_file: Path) -> None:
+    table = read_table(table_file)
+    assert [one.fidelity for one in table.fidelities] == ["draft", "standard", "reference"]
+    assert (table.aspect_ratio, table.count, table.activity) == (0.7, 60, "shake")
+    draft = table.fidelities[0]
+    assert draft.ratio == 1.5
+    assert draft.worst == Error(of="φ_f", value=0.06, band=0.02)
+    assert [one.is_reference for one in table.fidelities] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("max_error", "max_hours", "picked"),
+    [
+        (0.1, None, "draft"),
+        (0.03, None, "standard"),
+        (0.01, None, "reference"),
+        (None, 1.0, "draft"),
+        (None, 4.0, "standard"),
+        (None, 100.0, "reference"),
+        (0.03, 4.0, "standard"),
+        (0.1, 100.0, "draft"),
+    ],
+)
+def test_the_cheapest_within_the_error_or_the_finest_within_the_hours(
+    max_error: float | None, max_hours: float | None, picked: str
+) -> None:
+    assert pick(THREE, max_error=max_error, max_hours=max_hours)[0].measured.fidelity == picked
+
+
+@pytest.mark.parametrize(
+    ("max_error", "max_hours", "message"),
+    [
+        (
+            0.01,
+            4.0,
+            "--max-error 0.01 and --max-hours 4 contradict each other: reference, the cheapest within the error, is "
+            "expected to take 30 h; accuracy goes first, so the hours give way: --max-hours 30; or accept standard "
+            r"\(φ_f -0.020 ± 0.010\) with --max-error 0.02",
+        ),
+        (0.03, 0.1, "so the hours give way: --max-hours 2$"),
+        (None, 0.1, "--max-hours 0.1: even draft is expected to take 0.5 h; give --max-hours 0.5 or a smaller scene"),
+    ],
+)
+def test_limits_that_cannot_be_kept_say_which_gives_way(
+    max_error: float | None, max_hours: float | None, message: str
+) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        pick(THREE, max_error=max_error, max_hours=max_hours)
+    assert "\n" not in str(error.value)
+
+
+def test_an_unknown_error_is_within_no_limit() -> None:
+    unknown = [expected("draft", math.nan, 0.5), expected("standard", 0.02, 2.0)]
+    assert pick(unknown, max_error=0.5, max_hours=None)[0].measured.fidelity == "standard"
+    with pytest.raises(InputError, match="no fidelity of the table is known to be within; the best is standard"):
+        pick(unknown, max_error=0.01, max_hours=None)
+    # What is suggested is enough.
+    assert pick(unknown, max_error=0.02, max_hours=None)[0].measured.fidelity == "standard"
+
+
+def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -> None:
+    scene = scene_of(fidelity={"base": "draft", "pitch": 1.1})
+    chosen = choose(scene, read_table(table_file), max_error=0.03)
+    assert chosen.fidelity == "standard"
+    plain = plan(scene_of(fidelity="standard"))
+    assert chosen.expected.hours == pytest.approx(2 * plain.wall_s / 3600)
+    # The plan that is shown beside it has the same hours: one number stands.
+    assert chosen.planned == plain.corrected(2)
+    assert chosen.planned.wall_s / 3600 == pytest.approx(chosen.expected.hours)
+    assert sum(phase.wall_s for phase in chosen.planned.phases) == pytest.approx(chosen.planned.wall_s)
+    assert "(one core, corrected by 2 as measured at this fidelity; machines differ" in chosen.planned.to_text()
+    assert "(one core; machines differ by a factor of two)" in plain.to_text()
+    text = chosen.to_text()
+    assert text.startswith("fidelity standard: the cheapest within --max-error 0.03\nexpected: ")
+    assert "φ_0 +0.010 ± 0.015, φ_f -0.020 ± 0.020 (3 seeds)" in text
+    assert "allows an error up to 0.04, more than --max-error 0.03" in text
+    assert text.endswith("use it: --set fidelity=standard")
+    assert chosen.to_dict()["errors"][1] == {"of": "φ_f", "value": -0.02, "band": 0.02}
+
+
+def test_an_assured_error_needs_no_caution_and_another_scene_does(table_file: Path) -> None:
+    table = read_table(table_file)
+    notes = choose(scene_of(), table, max_error=0.05).notes
+    assert notes == ("not asked for (--of): ⟨N⟩ -0.200 ± 0.100", f"table: {table_file}")
+    notes = choose(scene_of(count=270, smarticle={"aspect_ratio": 0.5}), table, max_error=0.05).notes
+    assert notes[1:3] == (
+        "errors were measured at l/w 0.7, this scene has 0.5",
+        "errors were measured at N 60, this scene has 270",
+    )
+
+
+def test_a_limit_can_be_of_the_crossings(table_file: Path) -> None:
+    chosen = choose(scene_of(), read_table(table_file, of=["crossings"]), max_error=0.05)
+    assert chosen.fidelity == "reference"
+    chosen = choose(scene_of(), read_table(table_file, of=["phi_0", "crossings"]), max_error=0.25)
+    assert chosen.fidelity == "standard"
+    assert "φ_0 +0.010 ± 0.015, ⟨N⟩ -0.200 ± 0.100" in chosen.to_text()
+    assert "not asked for (--of): φ_f -0.020 ± 0.020" in chosen.to_text()
+
+
+def test_a_fidelity_that_the_scene_cannot_have_is_passed_over(table_file: Path) -> None:
+    square = scene_of(smarticle={"thickness_in_plane_m": 1.27e-3})
+    chosen = choose(square, read_table(table_file), max_hours=1e6)
+    assert chosen.fidelity == "standard"
+    assert "2 rows of 0.00127 m do not fit" in chosen.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("variant,seeds [-]\ndraft,3\n", "has no column 'knob', so it is no table of work and precision; make one: "),
+        ("", "has no column 'knob'"),
+        (f"{HEADER}\n", "tells of fewer than two named fidelities with runs"),
+        (TABLE.replace("reference,3", "reference,0"), "tells of fewer than two named fidelities with runs"),
+        (TABLE.replace("-2,1.5", "about two,1.5"), "a row of knob fidelity does not hold numbers"),
+        (TABLE.replace("fidelity,draft,,base,3,0.7", "fidelity,draft,,base,3"), "does not hold numbers"),
+    ],
+)
+def test_another_table_is_refused(text: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "other.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as error:
+        read_table(file)
+    assert str(file) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_without_a_table_the_way_to_one_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"absent.csv: cannot be read \(No such file or directory\); make one: smart"):
+        read_table(tmp_path / "absent.csv")
+    monkeypatch.setattr(choice, "SHIPPED", tmp_path / "shipped.csv")
+    with pytest.raises(
+        InputError, match=r"no table of measured errors ships at .*; make one: smarticles accuracy SCENE"
+    ):
+        read_table(None)
+    (tmp_path / "shipped.csv").write_text(TABLE, encoding="utf-8")
+    assert read_table(None).count == 60

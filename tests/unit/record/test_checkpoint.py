@@ -1,0 +1,73 @@
+"""A checkpoint is plain data and an engine's own bytes; one of before engines had names is read."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dem.errors import InputError
+from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint, write_checkpoint
+
+MADE_BY = ("double", "1.2")
+
+
+def checkpoint(time: float = 0.5) -> Checkpoint:
+    return Checkpoint(
+        scene_sha256="abc",
+        made_by=MADE_BY,
+        state={"engine": {"steps": 7}, "stage": {"left": 3}, "wall_s": time},
+        series={"time_s": np.array([0.0, time]), "container_force_N": np.zeros((2, 3))},
+        engine=b"\x00opaque",
+    )
+
+
+def test_everything_comes_back_and_the_one_before_is_kept(tmp_path: Path) -> None:
+    assert not has_checkpoint(tmp_path)
+    for time in (0.25, 0.5):
+        write_checkpoint(tmp_path, checkpoint(time))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["checkpoint.previous.zip", "checkpoint.zip"]
+    found, warning = read_checkpoint(tmp_path, scene_sha256="abc", made_by=MADE_BY)
+    assert warning is None
+    assert (found.engine, found.made_by) == (b"\x00opaque", MADE_BY)
+    assert found.state["engine"] == {"steps": 7}
+    assert found.series["time_s"].tolist() == [0.0, 0.5]
+    (tmp_path / "checkpoint.zip").write_bytes(b"half")
+    found, warning = read_checkpoint(tmp_path, scene_sha256="abc", made_by=MADE_BY)
+    assert found.series["time_s"].tolist() == [0.0, 0.25]
+    assert "going on from checkpoint.previous.zip" in str(warning)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "told"),
+    [
+        ({"scene_sha256": "other"}, "scene abc, here is other"),
+        ({"made_by": ("double", "2.0")}, "engine double 1.2, here is double 2.0"),
+        ({"made_by": ("yade", "1.2")}, "engine double 1.2, here is yade 1.2"),
+    ],
+)
+def test_one_of_another_scene_or_engine_is_refused(tmp_path: Path, wanted: dict[str, object], told: str) -> None:
+    write_checkpoint(tmp_path, checkpoint())
+    with pytest.raises(InputError, match=rf"checkpoint\.zip: made with {told}; .*start anew"):
+        read_checkpoint(tmp_path, **({"scene_sha256": "abc", "made_by": MADE_BY} | wanted))
+
+
+@pytest.mark.parametrize("format_", [4, 3])
+def test_one_of_before_engines_had_names_is_of_yade(tmp_path: Path, format_: int) -> None:
+    columns = io.BytesIO()
+    np.savez(columns, time_s=np.array([0.0]))
+    state = {"format": format_, "yade": "2023.02a", "scene_sha256": "abc", "engine": {"steps": 7}}
+    with zipfile.ZipFile(tmp_path / "checkpoint.zip", "w") as archive:
+        archive.writestr("state.json", json.dumps(state))
+        archive.writestr("series.npz", columns.getvalue())
+        archive.writestr("engine.yade", b"bodies")
+    if format_ == 3:
+        with pytest.raises(InputError, match="made with checkpoint format 3, here is 4; resume with what made it"):
+            read_checkpoint(tmp_path, scene_sha256="abc", made_by=("yade", "2023.02a"))
+        return
+    found, _ = read_checkpoint(tmp_path, scene_sha256="abc", made_by=("yade", "2023.02a"))
+    assert (found.engine, found.state["engine"]) == (b"bodies", {"steps": 7})

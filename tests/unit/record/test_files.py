@@ -1,0 +1,176 @@
+"""Files appear whole or not at all, also on a disk that fills up."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+
+from dem.errors import RunError
+from dem.record.files import write_json, write_text, write_whole
+from dem.record.frames import FrameWriter
+
+ROOT = Path(__file__).resolve().parents[3]
+FULL = (
+    "cannot be written (No space left on device); free space or choose another --out; "
+    "everything written before is whole"
+)
+
+
+def full(_: Path) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_text_and_json_come_back(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "φ = 0.1\n")
+    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "φ = 0.1\n"
+    write_json(tmp_path / "a.json", {"φ": [1, 0.1]})
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    assert json.loads(text) == {"φ": [1, 0.1]}
+    assert "φ" in text
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.txt"]
+
+
+def test_writer_sees_a_temporary_name_with_the_suffix_and_never_the_final_one(tmp_path: Path) -> None:
+    final = tmp_path / "frame_000001.vtu"
+    final.write_text("old")
+    seen = []
+
+    def write(path: Path) -> None:
+        path.write_text("half")
+        seen.append((path.suffix, path.parent, final.read_text(), path == final))
+        path.write_text("whole")
+
+    write_whole(final, write)
+    assert seen == [(".vtu", tmp_path, "old", False)]
+    assert final.read_text() == "whole"
+    assert list(tmp_path.iterdir()) == [final]
+
+
+@pytest.mark.parametrize("error", [ValueError("broken"), KeyboardInterrupt()])
+def test_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path: Path, error: BaseException) -> None:
+    final = tmp_path / "series.h5"
+    final.write_text("old")
+
+    def write(path: Path) -> None:
+        path.write_text("half")
+        raise error
+
+    with pytest.raises(type(error)):
+        write_whole(final, write)
+    assert final.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [final]
+
+
+def test_full_disk_is_a_run_error_with_the_way_out(tmp_path: Path) -> None:
+    final = tmp_path / "run.json"
+    final.write_text("old")
+
+    def write(path: Path) -> None:
+        path.write_text("half")
+        full(path)
+
+    with pytest.raises(RunError) as caught:
+        write_whole(final, write)
+    assert str(caught.value) == f"{final}: {FULL}"
+    assert final.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [final]
+
+
+def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
+    write_text(tmp_path / "new" / "a.txt", "x")
+    assert (tmp_path / "new" / "a.txt").read_text() == "x"
+    with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written \(No such file or directory\)"):
+        write_text(tmp_path / "gone" / "far" / "a.txt", "x")
+
+
+@pytest.fixture
+def tiny_disk(mount_disk: Callable[[str], Path]) -> Path:
+    """A file system of 64 KiB. Needs root; the tests above do not."""
+    return mount_disk("64k")
+
+
+def test_text_on_a_really_full_disk(tiny_disk: Path) -> None:
+    final = tiny_disk / "a.txt"
+    write_text(final, "old")
+    with pytest.raises(RunError) as caught:
+        write_text(final, "x" * 200_000)
+    assert str(caught.value) == f"{final}: {FULL}"
+    assert final.read_text() == "old"
+    assert list(tiny_disk.iterdir()) == [final]
+    write_text(final, "there is room again")
+    assert final.read_text() == "there is room again"
+
+
+LONG_SERIES = """
+import sys
+from pathlib import Path
+import numpy as np
+from dem.errors import RunError
+from dem.record.columns import COLUMNS
+from dem.record.series import SeriesWriter
+
+def write(length):
+    writer = SeriesWriter(Path(sys.argv[1]), COLUMNS, {"seed": 1})
+    for _ in range(length):
+        writer.add({name: np.zeros(3) if name == "container_force_N" else 0.0 for name in COLUMNS})
+    writer.write()
+
+write(10)
+try:
+    write(5000)
+except RunError as error:
+    print(error)
+"""
+
+
+def test_series_on_a_really_full_disk(tiny_disk: Path) -> None:
+    # In a process of its own: HDF5 cannot close a file that it could not flush, and crashes at the end.
+    answer = subprocess.run(
+        [sys.executable, "-c", LONG_SERIES, str(tiny_disk)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout == f"{tiny_disk}/series.h5: {FULL}\n"
+    assert answer.stderr == ""
+    with h5py.File(tiny_disk / "series.h5") as file:
+        assert len(file["time_s"]) == 10
+    assert [path.name for path in tiny_disk.iterdir()] == ["series.h5"]
+
+
+def test_frame_on_a_really_full_disk(tiny_disk: Path) -> None:
+    writer = FrameWriter(tiny_disk)
+    rng = np.random.default_rng(0)
+
+    def mesh(points: int) -> meshio.Mesh:
+        lines = np.stack([np.arange(points - 1), np.arange(1, points)], axis=1)
+        return meshio.Mesh(rng.random((points, 3)), [("line", lines)])
+
+    writer.write(mesh(8), 0.0)
+    with pytest.raises(RunError, match="cannot be written"):
+        writer.write(mesh(20_000), 0.1)
+    # What the collection lists is there and whole.
+    assert 'timestep="0"' in (tiny_disk / "frames.pvd").read_text()
+    assert "frame_000001" not in (tiny_disk / "frames.pvd").read_text()
+    assert [path.name for path in (tiny_disk / "frames").iterdir()] == ["frame_000000.vtu"]
+    assert len(meshio.read(tiny_disk / "frames" / "frame_000000.vtu").points) == 8
+
+
+def test_frames_folder_that_cannot_be_made_is_a_run_error(tmp_path: Path) -> None:
+    (tmp_path / "frames").write_text("a file in the way")
+    mesh = meshio.Mesh(np.zeros((2, 3)), [("line", np.array([[0, 1]]))])
+    with pytest.raises(RunError, match="cannot be written"):
+        FrameWriter(tmp_path).write(mesh, 0.0)

@@ -1,0 +1,146 @@
+"""What a run tells the person and other processes while it goes on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dem.record import progress as module
+from dem.record.progress import ProgressWriter
+
+
+class Wall:
+    """Wall time under the test's control."""
+
+    now = 100.0
+
+
+@pytest.fixture
+def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
+    clock = Wall()
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock.now)
+    return clock
+
+
+def last_line(text: str) -> str:
+    return text.rsplit("\r\x1b[K", 1)[-1]
+
+
+def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
+    bar = ProgressWriter(tmp_path, 270, show=False)
+    bar.begin(index=2, phase="shake", start=3.0, now=3.0, end=8.0)
+    wall.now += 5
+    bar.update(time=4.5, phi=0.123, count=270)
+    assert json.loads((tmp_path / "progress.json").read_text()) == {
+        "phase": "shake",
+        "phase_index": 2,
+        "time_s": 4.5,
+        "end_s": 8.0,
+        "phi": 0.123,
+        "count": 270,
+        "wall_s": 5.0,
+        "checkpoint_s": None,
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["progress.json"]
+    bar.finish()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
+    def told() -> tuple[float, float | None]:
+        data = json.loads((tmp_path / "progress.json").read_text())
+        return data["time_s"], data["checkpoint_s"]
+
+    bar = ProgressWriter(tmp_path, 2, show=False)
+    bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
+    bar.checkpointed(0.1)  # nothing else is known yet
+    assert not (tmp_path / "progress.json").exists()
+    bar.update(time=0.2, phi=0.1, count=2)
+    assert told() == (0.2, 0.1)
+    wall.now += 0.01
+    bar.update(time=0.3, phi=0.1, count=2)
+    bar.checkpointed(0.3)
+    assert told() == (0.3, 0.3)
+    wall.now += 2
+    bar.update(time=0.5, phi=0.1, count=2)
+    assert told() == (0.5, 0.3)
+
+
+def test_unknown_phi_is_null(tmp_path: Path, wall: Wall) -> None:
+    bar = ProgressWriter(tmp_path, 2, show=False)
+    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
+    wall.now += 1
+    bar.update(time=0.1, phi=float("nan"), count=1)
+    data = json.loads((tmp_path / "progress.json").read_text())
+    assert (data["phi"], data["end_s"]) == (None, None)
+
+
+def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
+    bar = ProgressWriter(tmp_path, 2, show=False)
+    bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
+
+    def told(time: float) -> bool:
+        (tmp_path / "progress.json").unlink(missing_ok=True)
+        bar.update(time=time, phi=0.1, count=2)
+        return (tmp_path / "progress.json").exists()
+
+    assert told(0.1)
+    wall.now += 0.99
+    assert not told(0.2)
+    wall.now += 0.02
+    assert told(0.3)
+    bar.begin(index=2, phase="shake", start=1.0, now=1.0, end=2.0)
+    assert told(1.0)
+
+
+def test_line_shows_phase_share_time_phi_and_time_left(
+    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bar = ProgressWriter(tmp_path, 10, show=True)
+    bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
+    wall.now += 30
+    bar.update(time=3.0, phi=0.1234, count=10)
+    line = last_line(capsys.readouterr().err)
+    # A quarter done in 30 s: 90 s to go.
+    assert line == "shake    █████                 25 %  t = 3.00 s  φ 0.123  90 s left in this phase"
+
+
+def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
+    bar = ProgressWriter(tmp_path, 20, show=True)
+    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
+    wall.now += 10
+    bar.update(time=0.3, phi=float("nan"), count=10)
+    line = last_line(capsys.readouterr().err)
+    assert line == "deposit  ██████████           10/20  t = 0.30 s  about 30 s left in this phase"
+
+
+@pytest.mark.parametrize("time", [6.0, 6.0 + 1e-9])
+def test_end_of_a_phase_leaves_no_negative_time(
+    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str], time: float
+) -> None:
+    bar = ProgressWriter(tmp_path, 10, show=True)
+    bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
+    wall.now += 30
+    bar.update(time=time, phi=0.1, count=10)
+    line = last_line(capsys.readouterr().err)
+    assert "100 %" in line
+    assert "-" not in line
+
+
+def test_quiet_progress_draws_nothing(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
+    bar = ProgressWriter(tmp_path, 10, show=False)
+    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
+    wall.now += 10
+    bar.update(time=0.1, phi=0.1, count=3)
+    bar.finish()
+    assert capsys.readouterr().err == ""
+
+
+def test_full_disk_does_not_stop_the_run_here(tmp_path: Path, wall: Wall) -> None:
+    bar = ProgressWriter(tmp_path / "gone", 10, show=False)
+    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
+    wall.now += 10
+    bar.update(time=0.1, phi=0.1, count=3)
+    bar.finish()
