@@ -7,7 +7,8 @@
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
 # A test is one thread: threads that find no free core spin, and bits depend on their number.
-PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
+# As many processes as cores, a file of tests in one of them, those that run YADE first: they take longest.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
