@@ -68,5 +68,9 @@ def engine_kind(name: str) -> EngineKind:
         from dem.engine.yade.kind import YadeKind  # noqa: PLC0415
 
         return YadeKind()
-    msg = f"engine: {name!r} is not built into this version; use yade"
+    if name == "links":
+        from dem.engine.links.kind import LinksKind  # noqa: PLC0415
+
+        return LinksKind()
+    msg = f"engine: {name!r} is not built into this version; use yade or links"
     raise InputError(msg)

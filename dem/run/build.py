@@ -14,7 +14,7 @@ from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter
 from dem.record.names import SPHERE
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.sampler import Sampler
@@ -37,7 +37,7 @@ def build_engine(scene: Scene, dt: float) -> Engine:
     return engine_kind(scene.engine).build(scene, dt)
 
 
-def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
+def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
     """The recorder of a scene, with the watchdog's limits."""
     recording = scene.recording
     # No one radius gives the volume of a mould of tiers.
@@ -82,4 +82,4 @@ class Builders:
 
     steps: Callable[[Scene], Sequence[float]] = time_steps
     engine: Callable[[Scene, float], Engine] = build_engine
-    recorder: Callable[[Scene, Path, Progress], Recorder] = build_recorder
+    recorder: Callable[[Scene, Path, ProgressWriter], Recorder] = build_recorder

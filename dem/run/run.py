@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
@@ -20,10 +19,11 @@ from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
-from dem.record.files import write_json, write_text
-from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, SCENE
-from dem.record.progress import Progress
-from dem.record.rundir import claimed, log_of, mark_done, mark_failed, recorded_scene_hash
+from dem.record.files import write_text
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
+from dem.record.names import DONE, FAILED, SCENE
+from dem.record.progress import ProgressWriter
+from dem.record.rundir import claimed, log_of, recorded_scene_hash
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import dump_scene, scene_hash
@@ -77,9 +77,7 @@ def run_scene(
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(
-                out / MANIFEST, manifest(scene, steps=steps, command=command, made_by=made_by, threads=kind.threads())
-            )
+            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=kind.threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
@@ -109,7 +107,7 @@ def _run(
     progress: bool,
     resume: bool,
 ) -> RunOutcome:
-    bar = Progress(out, scene.count, show=progress)
+    bar = ProgressWriter(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
         engine = builders.engine(scene, min(steps))
@@ -127,16 +125,7 @@ def _run(
         if resume:
             _restore(simulation, scene, out, log)
         phases = simulation.run()
-        mark_done(
-            out,
-            {
-                "time_s": engine.time,
-                "steps": engine.steps,
-                "wall_s": simulation.wall,
-                "cpu_s": simulation.cpu,
-                "phases": phases,
-            },
-        )
+        mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
     except RunError as error:
         _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
@@ -197,46 +186,50 @@ def _keep_series(simulation: Simulation | None) -> None:
 
 
 def manifest(
-    scene: Scene, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
-) -> dict[str, Any]:
-    """The content of `run.json`: what made the run, and the numbers that measures need.
+    scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
+) -> RunManifest:
+    """What makes the run, and the numbers that measures need.
 
     Args:
         scene: what is run.
+        out: the run directory.
         steps: time step of each phase [s].
         command: the command line.
         made_by: name and version of the engine.
         threads: that it runs with.
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
-    return {
-        "format": MANIFEST_FORMAT,
-        "name": scene.name,
-        "scene_sha256": scene_hash(scene),
-        "seed": scene.seed,
-        "command": command,
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(made_by),
-        "threads": threads,
-        "fidelity": scene.fidelity.base,
-        "count": scene.count,
-        "aspect_ratio": scene.smarticle.aspect_ratio,
-        "middle_length_m": boxes.middle_length,
-        "barb_length_m": boxes.barb_length,
-        "thickness_normal_m": boxes.thickness_normal,
-        "thickness_in_plane_m": boxes.thickness_in_plane,
-        "smarticle_mass_kg": boxes.mass,
-        "solid_volume_m3": boxes.volume,
-        "container_radius_m": scene.container.radius_m,
-        "container_tiers": 1 + len(scene.cylinder.upper),
-        "sphere_diameter_m": particle.chain.diameter,
-        "spheres_per_smarticle": len(particle.centres),
-        "time_step_s": min(steps),
-        "phases": [
-            {"index": k, "type": phase.kind, "time_step_s": dt}
+    return RunManifest(
+        directory=out,
+        name=scene.name,
+        scene_sha256=scene_hash(scene),
+        seed=scene.seed,
+        command=command,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=versions(made_by),
+        threads=threads,
+        fidelity=scene.fidelity.base,
+        count=scene.count,
+        aspect_ratio=scene.smarticle.aspect_ratio,
+        middle_length=boxes.middle_length,
+        barb_length=boxes.barb_length,
+        thickness_normal=boxes.thickness_normal,
+        thickness_in_plane=boxes.thickness_in_plane,
+        smarticle_mass=boxes.mass,
+        solid_volume=boxes.volume,
+        container_radius=scene.container.radius_m,
+        container_tiers=1 + len(scene.cylinder.upper),
+        sphere_diameter=particle.chain.diameter,
+        spheres_per_smarticle=len(particle.centres),
+        time_step=min(steps),
+        phases=tuple(
+            PhaseRecord(index=k, type=phase.kind, time_step=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
-        ],
-    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
+        ),
+        status="unfinished",
+        planar=scene.plane is not None,
+        channel_width=None if scene.plane is None else scene.plane.width_m,
+    )
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from studies.accuracy.rung import Rung
     from studies.accuracy.study import Accuracy
     from templates.sweep.expand import Point
-    from templates.sweep.sweep import Sweep
+    from templates.sweep.sweep_file import Sweep
 
 _SEEDS = "1,2,3"
 
@@ -147,7 +147,7 @@ def _expanded(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Expanded:
 def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
     """The ladder as a table, and what it is expected to take."""
     from dem.plan.outlook import plan  # noqa: PLC0415
-    from templates.local.local import slots_here  # noqa: PLC0415
+    from templates.local.runner import slots_here  # noqa: PLC0415
 
     ladder = expanded.ladder
     references = ladder.references()

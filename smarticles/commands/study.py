@@ -119,7 +119,7 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     """
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity is None:
         return {}
@@ -151,7 +151,7 @@ def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
     """How what is run differs from the full study as it ships, one line."""
     from studies.base.shipped import differences  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     here = expand(with_constants(load_sweep(file), changed))
     lines = differences(here, expand(load_sweep(registry.study_file(name))))

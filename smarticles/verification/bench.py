@@ -26,7 +26,7 @@ from dem.engine.yade.kind import YadeKind, contact_law_of, hinge_law, motor_law
 from dem.errors import RunError
 from dem.physics.contact import ContactLaw, damping_ratio
 from dem.plan.steps import time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.recorder import Recorder
 from dem.scene.reading import parse_scene
@@ -209,7 +209,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = YadeKind().build(scene, time_step(scene) if dt is None else dt)
-    progress = Progress(Path(out), scene.count, show=False)
+    progress = ProgressWriter(Path(out), scene.count, show=False)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 

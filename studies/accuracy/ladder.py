@@ -14,14 +14,13 @@ from types import MappingProxyType
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE, Rung
 from templates.sweep.render import Value, render_yaml
-from templates.sweep.sweep import SEED, Sweep, SweepFile
-from templates.sweep.texts import nearest
+from templates.sweep.sweep_file import SEED, Sweep, SweepFile
 
 KNOBS: Mapping[str, str] = MappingProxyType(
     {

@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from dem.record.series import read_series
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.series import read_series
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference

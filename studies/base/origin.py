@@ -12,7 +12,7 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report import figures

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.frames import Frame, FrameSequence, read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
+from dem.record.frame import Frame
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
 from postprocess.measures.table import PASSIVE_PHASES
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Verdict

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import PhaseRecord, RunManifest, read_run
+from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from postprocess.statistics.columns import SEED
 
 Row = Mapping[str, object]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.columns import ASPECT, SEED

@@ -11,7 +11,7 @@ from typing import Generic
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from studies.base.origin import Origin, make_folder
 from studies.base.references import Reference
 from studies.base.report import Judgement, Report

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 
 VARIANT = "variant"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
 from postprocess.statistics.columns import SEED

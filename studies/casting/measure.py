@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from postprocess.geometry.outline import BALL
+from postprocess.geometry.region import Region
 from postprocess.measures.heights import heights
-from postprocess.measures.mould import cast
-from postprocess.measures.outline import BALL
-from postprocess.measures.region import Cylinder
-from postprocess.scene_file import read_tiers
+from postprocess.measures.mould import cast, read_tiers
 from studies.base.release import around, labels, removal
 from studies.base.runs import duration
 
@@ -60,7 +59,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 """What is averaged over seeds: columns of the table of runs."""
 
 
-def mould(run: RunManifest) -> tuple[Cylinder, ...]:
+def mould(run: RunManifest) -> tuple[Region, ...]:
     """The tiers of the mould: those of the container but the top one, the neck that it is filled through.
 
     Raises:

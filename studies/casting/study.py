@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-from postprocess.manifest import RunManifest
-from postprocess.measures.outline import BALL
+from dem.record.manifest import RunManifest
+from postprocess.geometry.outline import BALL
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from studies.base.paper import PaperStudy

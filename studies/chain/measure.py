@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
-from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_pull
+from dem.record.manifest import RunManifest
+from postprocess.measures.strain import QUANTITIES, STRAIN, YIELD, measured, read_strain_test
 from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.points import averaged
@@ -26,7 +26,7 @@ def chain_row(run: RunManifest) -> dict[str, object]:
     if len(strained) != 1:
         msg = f"{run.directory}: {len(strained)} phases that strain a chain; give runs of the study chain"
         raise InputError(msg)
-    pull = read_pull(run)
+    pull = read_strain_test(run)
     row: dict[str, object] = {
         VARIANT: run.name,
         COUNT: run.count,

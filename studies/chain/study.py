@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.strain import (
     AT_PEAK,
     CARRIES,

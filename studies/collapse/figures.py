@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from postprocess.manifest import RunManifest
+    from dem.record.manifest import RunManifest
 
 _LABELS = {REMAINING: "remaining", COM: "centre of mass", CORE: "centre of mass within the radius"}
 _LOOKS = {

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.runs import duration
 from studies.collapse.column import COM, DEFINITIONS, collapse_of, column_history, vibration

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, told_number

@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.frames import read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
-from postprocess.measures.geometry import centres_of_mass
+from dem.record.frames import read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.series import Series, read_series
+from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import (
     END,
     FREE,
     PULL,
     WINDOW,
-    Pull,
+    HookPull,
     freed,
     held_at,
     held_fast,
@@ -31,7 +32,6 @@ from postprocess.measures.pull import (
 )
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
-from postprocess.series import Series, read_series
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
 from studies.base.runs import DEFINITION, duration
@@ -141,7 +141,7 @@ def _limit(asked: PhaseSettings) -> float:
     return math.inf if asked.values.get("force_limit_N") is None else asked.number("force_limit_N", positive=True)
 
 
-def _of_pull(run: RunManifest, pull: Pull) -> dict[str, float]:
+def _of_pull(run: RunManifest, pull: HookPull) -> dict[str, float]:
     total = run.count * weight_of_one(run)
     highest, free = peak(pull), freed(pull)
     return {

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from dem.record.series import read_series
 from postprocess.report import figures
-from postprocess.series import read_series
 from studies.base.figures import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,

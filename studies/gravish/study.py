@@ -15,7 +15,7 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS

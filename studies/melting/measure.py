@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.heights import heights
 from postprocess.measures.spread import centre_of_mass, free_pile, has_toppled
 from postprocess.scene_file import read_phases

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.spread import OUTSIDE, TOUCHING
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding

@@ -17,10 +17,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import PhaseRecord, RunManifest
+from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.series import Series, read_series
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.scene_file import read_phases
-from postprocess.series import Series, read_series
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.procedures import (
     ACTIVE,

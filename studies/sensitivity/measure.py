@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds, relative_difference
 from studies.base.runs import DEFINITION, Row

@@ -13,7 +13,7 @@ from typing import Never
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import told_number

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
 import yaml
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.record import manifest as record
+from dem.record.frame import centreline_mesh
+from dem.record.frames import FrameWriter
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed
 from synthetic.series import write_series
+from synthetic.shapes import RADIUS, T1, T2, W, u_shape
 
-W, T1, T2, RADIUS = 0.0117, 0.00127, 0.0005, 0.0234
 PHASES = ("deposit", "relax", "shake", "relax")
 SETTINGS = {"shape-change": {"straight_deg": 0.0, "opening_s": 1.5, "straight_hold_s": 0.0, "closing_s": 1.5}}
 ACTUATED = ("shape-change", "internal-oscillation")
@@ -27,7 +32,7 @@ class SyntheticRun:
 
     `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
     a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
-    `wall_s` [s]; `more` are constant series: name, value, unit.
+    `wall_s` [s]; `more` are constant series: name, value.
     """
 
     aspect_ratio: float = 0.7
@@ -46,7 +51,7 @@ class SyntheticRun:
     floor_z: float = 0.0
     name: str = "synthetic"
     wall_s: float = 1.0
-    more: tuple[tuple[str, float, str], ...] = ()
+    more: tuple[tuple[str, float], ...] = ()
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -94,40 +99,32 @@ class SyntheticRun:
         return centres[:, None] + np.einsum("nij,kj->nki", turn, shape)
 
 
-def u_shape(barb: float, middle: float = W) -> NDArray[np.float64]:
-    """(4, 3) [m]: a U in the x-y plane with its centre of mass at the origin."""
-    shape = np.array([[-1.0, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]]) * middle / 2
-    shape[[0, 3], 1] = barb
-    shape[:, 1] -= barb**2 / (middle + 2 * barb)
-    return shape
-
-
-def write_frame(
-    path: Path,
+def mesh_of(
     vertices: NDArray[np.float64],
     *,
-    time: float,
-    phase: int,
+    time: float = 0.0,
+    phase: int = 0,
     floor_z: float = 0.0,
-    contacts: NDArray[np.int64] | None = None,
-) -> None:
-    """One frame as in ARCHITECTURE.md."""
+    contacts: ArrayLike | None = None,
+    extra: Mapping[str, NDArray[Any]] | None = None,
+) -> meshio.Mesh:
+    """One frame of smarticles at rest."""
     count = len(vertices)
-    first = 4 * np.arange(count)[:, None] + np.arange(3)
-    lines = np.stack([first, first + 1], axis=-1).reshape(-1, 2)
-    contacts = np.arange(count) % 5 if contacts is None else contacts
-    data = {
-        "smarticle_id": np.repeat(np.arange(count), 3),
-        "link": np.tile(np.arange(3), count),
-        "velocity_m_per_s": np.zeros((3 * count, 3)),
-        "angular_velocity_rad_per_s": np.zeros((3 * count, 3)),
-        "contacts": np.repeat(contacts, 3).astype(np.int64),
-        "time_s": np.full(3 * count, time),
-        "floor_z_m": np.full(3 * count, floor_z),
-        "phase": np.full(3 * count, phase, dtype=np.int64),
-    }
-    mesh = meshio.Mesh(vertices.reshape(-1, 3), [("line", lines)], cell_data={k: [v] for k, v in data.items()})
-    meshio.vtu.write(str(path), mesh)
+    return centreline_mesh(
+        vertices,
+        velocities=np.zeros((count, 3, 3)),
+        spins=np.zeros((count, 3, 3)),
+        contacts=np.arange(count) % 5 if contacts is None else np.asarray(contacts),
+        time=time,
+        floor=floor_z,
+        phase=phase,
+        extra=extra,
+    )
+
+
+def write_frame(path: Path, vertices: NDArray[np.float64], **told: Any) -> None:
+    """One frame file; keywords as `mesh_of`."""
+    meshio.vtu.write(str(path), mesh_of(vertices, **told))
 
 
 def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
@@ -136,20 +133,17 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
     directory.mkdir(parents=True, exist_ok=True)
     write_manifest(directory, run)
     _write_scene(directory, run)
-    (directory / "frames").mkdir(exist_ok=True)
-    entries, rows, timed, start = [], [], [], 0.0
+    frames, rows, spans, start = FrameWriter(directory), [], [], 0.0
     previous = run.packing[0]
     for index, kind in enumerate(run.phases):
         end = start + run.durations[kind]
         target = run.packing[index]
         # Frames at the end of a phase scatter about its φ; their mean is φ to second order.
-        times = np.linspace(start, end, run.frames_per_phase + 1)[1:]
+        times = np.linspace(start, end, run.frames_per_phase + 1)[1:].tolist()
         wobble = 0.002 * np.cos(np.pi * np.arange(run.frames_per_phase))
         for time, shift in zip(times, wobble, strict=True):
-            name = f"frames/frame_{len(entries):06d}.vtu"
             vertices = run.vertices(target * (1 + shift))
-            write_frame(directory / name, vertices, time=time, phase=index, floor_z=run.floor_z)
-            entries.append((time, name))
+            frames.write(mesh_of(vertices, time=time, phase=index, floor_z=run.floor_z), time)
         for time in np.linspace(start, end, 200)[1:]:
             part = (time - start) / (end - start)
             packing = previous + (target - previous) * (1 - math.exp(-5 * part))
@@ -157,60 +151,65 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
             active = kind not in ("deposit", "relax")
             done = part if active else float(any(row[4] > 0 for row in rows))
             rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
-        timed.append(
-            {"index": index, "type": kind, "start_s": start, "end_s": end, "wall_s": run.wall_s, "cpu_s": run.wall_s}
-        )
+        spans.append((start, end))
         start, previous = end, target
-    sets = "".join(f'<DataSet timestep="{t!r}" file="{n}"/>' for t, n in map(_plain, entries))
-    (directory / "frames.pvd").write_text(f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>')
     if run.series:
         _write_series(directory, run, np.array(rows))
-    if run.status == "done":
-        wall = run.wall_s * len(run.phases)
-        done = {"status": "done", "time_s": start, "steps": 1000, "wall_s": wall, "phases": timed}
-        (directory / "done.json").write_text(json.dumps(done))
-    elif run.status != "unfinished":
-        failed = {"status": run.status, "cause": "a smarticle escaped", "time_s": start}
-        (directory / "failed.json").write_text(json.dumps(failed))
+    write_ending(directory, run.phases, spans, status=run.status, wall=run.wall_s)
     return directory
 
 
-def _plain(entry: tuple[float, str]) -> tuple[float, str]:
-    return float(entry[0]), entry[1]
+def write_ending(
+    directory: Path, phases: Sequence[str], spans: Iterable[tuple[float, float]], *, status: str, wall: float
+) -> None:
+    """`done.json` or `failed.json`, or neither for a run that is unfinished.
+
+    Args:
+        directory: the run directory.
+        phases: their types.
+        spans: start and end of each [s].
+        status: as in `RunManifest`.
+        wall: wall and processor time of each phase [s].
+    """
+    timed = [
+        {"index": k, "type": kind, "start_s": float(start), "end_s": float(end), "wall_s": wall, "cpu_s": wall}
+        for k, (kind, (start, end)) in enumerate(zip(phases, spans, strict=True))
+    ]
+    end, total = timed[-1]["end_s"], wall * len(timed)
+    if status == "done":
+        mark_done(directory, time=end, steps=1000, wall=total, cpu=total, phases=timed)
+    elif status != "unfinished":
+        mark_failed(directory, status=status, cause="a smarticle escaped", time=end, checkpoint=None)
 
 
-def write_manifest(directory: Path, run: SyntheticRun) -> None:
-    manifest = {
-        "format": 1,
-        "name": run.name,
-        "scene_sha256": f"{round(1000 * run.aspect_ratio):032x}{run.seed:032x}",
-        "seed": run.seed,
-        "command": "smarticles run scene.yaml",
-        "started": "2026-11-21T12:00:00+00:00",
-        "versions": {
-            "smarticles": "0.1.0",
-            "git": "0e4b151",
-            "yade": "2023.02a",
-            "numpy": "2",
-            "python": "3.11",
-        },
-        "threads": 1,
-        "fidelity": run.fidelity,
-        "count": run.count,
-        "aspect_ratio": run.aspect_ratio,
-        "middle_length_m": W,
-        "barb_length_m": run.aspect_ratio * W,
-        "thickness_normal_m": T1,
-        "thickness_in_plane_m": T2,
-        "smarticle_mass_kg": 7850 * run.solid_volume,
-        "solid_volume_m3": run.solid_volume,
-        "container_radius_m": RADIUS,
-        "sphere_diameter_m": T1,
-        "spheres_per_smarticle": 22,
-        "time_step_s": 1e-5,
-        "phases": [{"index": i, "type": kind} for i, kind in enumerate(run.phases)],
-    }
-    (directory / "run.json").write_text(json.dumps(manifest))
+def write_manifest(directory: Path, run: SyntheticRun, **more: Any) -> None:
+    """`run.json`; `more` are further fields of `RunManifest`."""
+    manifest = RunManifest(
+        directory=directory,
+        name=run.name,
+        scene_sha256=f"{round(1000 * run.aspect_ratio):032x}{run.seed:032x}",
+        seed=run.seed,
+        command="smarticles run scene.yaml",
+        started="2026-11-21T12:00:00+00:00",
+        versions={"smarticles": "0.1.0", "git": "0e4b151", "yade": "2023.02a", "numpy": "2", "python": "3.11"},
+        threads=1,
+        fidelity=run.fidelity,
+        count=run.count,
+        aspect_ratio=run.aspect_ratio,
+        middle_length=W,
+        barb_length=run.aspect_ratio * W,
+        thickness_normal=T1,
+        thickness_in_plane=T2,
+        smarticle_mass=7850 * run.solid_volume,
+        solid_volume=run.solid_volume,
+        container_radius=RADIUS,
+        sphere_diameter=T1,
+        spheres_per_smarticle=22,
+        time_step=1e-5,
+        phases=tuple(PhaseRecord(index=k, type=kind, time_step=1e-5) for k, kind in enumerate(run.phases)),
+        status="unfinished",
+    )
+    record.write_manifest(replace(manifest, **more))
 
 
 def _write_scene(directory: Path, run: SyntheticRun) -> None:
@@ -221,17 +220,17 @@ def _write_scene(directory: Path, run: SyntheticRun) -> None:
 
 def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64]) -> None:
     columns = {
-        "time_s": (rows[:, 0], "s"),
-        "phase": (rows[:, 1].astype(np.int64), "-"),
-        "packing_fraction": (rows[:, 2], "-"),
-        "com_height_m": (rows[:, 3], "m"),
+        "time_s": rows[:, 0],
+        "phase": rows[:, 1].astype(np.int64),
+        "packing_fraction": rows[:, 2],
+        "com_height_m": rows[:, 3],
     }
     moved = [kind for kind in run.phases if kind in ACTUATED]
     if moved:
         angle = np.full((len(rows), 2), math.pi / 2)
-        columns |= {"commanded_angle_rad": (angle, "rad"), "angle_rad": (angle, "rad")}
-        columns |= {"tracking_error_rad": (np.full(len(rows), math.nan), "rad")}
+        columns |= {"commanded_angle_rad": angle, "angle_rad": angle}
+        columns |= {"tracking_error_rad": np.full(len(rows), math.nan)}
     if run.work is not None:
-        columns["motor_work_J" if moved else "container_work_J"] = (run.work * rows[:, 4], "J")
-    columns |= {name: (np.full(len(rows), value), unit) for name, value, unit in run.more}
+        columns["motor_work_J" if moved else "container_work_J"] = run.work * rows[:, 4]
+    columns |= {name: np.full(len(rows), value) for name, value in run.more}
     write_series(directory, columns, seed=run.seed)

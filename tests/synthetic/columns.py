@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from synthetic import RADIUS, SyntheticRun, W, u_shape, write_frame, write_manifest
+from dem.record.frames import FrameWriter
+from synthetic import RADIUS, SyntheticRun, W, mesh_of, u_shape, write_ending, write_manifest
 from synthetic.series import write_series
 
 F = 30.0
@@ -40,7 +40,6 @@ class Column:
 def write_column(directory: Path, column: Column) -> Path:
     """A whole run directory; returns it."""
     directory.mkdir(parents=True)
-    (directory / "frames").mkdir()
     known = {"phases": column.phases, "count": column.count, "aspect_ratio": column.aspect_ratio}
     write_manifest(directory, SyntheticRun(seed=column.seed, **known))
     durations = [1.0, 0.5, 0.2, 0.2, column.watched]
@@ -52,7 +51,8 @@ def write_column(directory: Path, column: Column) -> Path:
     _write_series(directory, column, table)
     _write_frames(directory, column, table[19::20])
     _write_scene(directory, column)
-    _write_ending(directory, column, starts, ends)
+    spans = list(zip(starts, ends, strict=True))
+    write_ending(directory, column.phases, spans, status=column.status, wall=1.0)
     return directory
 
 
@@ -71,26 +71,21 @@ def _write_series(directory: Path, column: Column, table: NDArray[np.float64]) -
     # Everything bounces within a period while it is shaken.
     bounce = np.where(phases == len(column.phases) - 1, 0.1 * np.sin(2 * np.pi * F * times), 0.0)
     columns = {
-        "time_s": (times, "s"),
-        "phase": (phases.astype(np.int64), "1"),
-        "com_height_m": (H0 * (sunk + bounce), "m"),
-        "outside_count": (_outside(column, left), "1"),
+        "time_s": times,
+        "phase": phases.astype(np.int64),
+        "com_height_m": H0 * (sunk + bounce),
+        "outside_count": _outside(column, left),
     }
     write_series(directory, columns, seed=column.seed)
 
 
 def _write_frames(directory: Path, column: Column, table: NDArray[np.float64]) -> None:
-    shape, entries = u_shape(column.aspect_ratio * W), []
-    for k, (time, phase, left, height) in enumerate(table):
+    shape, frames = u_shape(column.aspect_ratio * W), FrameWriter(directory)
+    for time, phase, left, height in table:
         centres = np.zeros((column.count, 3))
         centres[:, 2] = H0 * height
         centres[: _outside(column, left), 0] = 2 * RADIUS
-        name = f"frames/frame_{k:06d}.vtu"
-        write_frame(directory / name, centres[:, None] + shape, time=time, phase=int(phase))
-        entries.append(f'<DataSet timestep="{float(time)!r}" file="{name}"/>')
-    (directory / "frames.pvd").write_text(
-        f'<VTKFile type="Collection"><Collection>{"".join(entries)}</Collection></VTKFile>'
-    )
+        frames.write(mesh_of(centres[:, None] + shape, time=float(time), phase=int(phase)), float(time))
 
 
 def _write_scene(directory: Path, column: Column) -> None:
@@ -98,16 +93,3 @@ def _write_scene(directory: Path, column: Column) -> None:
     phases = [dict(shake) if kind == "shake" else {"type": kind} for kind in column.phases]
     phases[-1]["peak_acceleration_g"] = column.gamma
     (directory / "scene.yaml").write_text(yaml.safe_dump({"schema_version": 1, "phases": phases}))
-
-
-def _write_ending(directory: Path, column: Column, starts: NDArray[np.float64], ends: NDArray[np.float64]) -> None:
-    if column.status != "done":
-        failed = {"status": column.status, "cause": "a smarticle escaped", "time_s": 1.0}
-        (directory / "failed.json").write_text(json.dumps(failed))
-        return
-    timed = [
-        {"index": k, "type": kind, "start_s": float(start), "end_s": float(end), "wall_s": 1.0, "cpu_s": 1.0}
-        for k, (kind, start, end) in enumerate(zip(column.phases, starts, ends, strict=True))
-    ]
-    done = {"status": "done", "time_s": float(ends[-1]), "steps": 1000, "wall_s": 5.0, "phases": timed}
-    (directory / "done.json").write_text(json.dumps(done))

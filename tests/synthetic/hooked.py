@@ -58,13 +58,13 @@ def write_hooked_run(
     raised = SPEED * np.minimum(since, stops)
     work = np.cumsum(-upper[:, 2] * np.diff(raised, prepend=0.0))
     columns = {
-        "time_s": (times, "s"),
-        "phase": (phase, "1"),
-        "hook_upper_force_N": (upper, "N"),
-        "hook_lower_force_N": (lower, "N"),
-        "hook_upper_z_m": (UPPER + run.floor_z + raised, "m"),
-        "container_z_m": (np.full(len(times), run.floor_z), "m"),
-        "container_work_J": (work, "J"),
+        "time_s": times,
+        "phase": phase,
+        "hook_upper_force_N": upper,
+        "hook_lower_force_N": lower,
+        "hook_upper_z_m": UPPER + run.floor_z + raised,
+        "container_z_m": np.full(len(times), run.floor_z),
+        "container_work_J": work,
     }
     write_series(directory, columns, seed=run.seed)
     return directory

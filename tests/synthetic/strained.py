@@ -1,6 +1,5 @@
 """Synthetic strain tests of a chain in a plane: the pulled string's force is a given function of the strain."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from synthetic import SyntheticRun, write_run
+from synthetic import SyntheticRun, write_manifest, write_run
 from synthetic.series import write_series
 
 LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
@@ -33,8 +32,7 @@ def write_strained_run(
     """
     run = SyntheticRun(phases=("strain",), **{"count": 2, **changes})
     write_run(directory, run)
-    manifest = json.loads((directory / "run.json").read_text())
-    (directory / "run.json").write_text(json.dumps(manifest | {"planar": True, "channel_width_m": channel}))
+    write_manifest(directory, run, planar=True, channel_width=channel)
     path = directory / "scene.yaml"
     scene = yaml.safe_load(path.read_text())
     scene["phases"][0]["speed_m_per_s"] = SPEED
@@ -44,15 +42,15 @@ def write_strained_run(
     pulled = np.zeros((len(times), 3))
     pulled[:, 0] = force(strains)
     columns = {
-        "time_s": (times, "s"),
-        "phase": (np.zeros(len(times), dtype=np.int64), "1"),
-        "string_pulled_force_N": (pulled, "N"),
-        "string_fixed_force_N": (-pulled, "N"),
-        "channel_lower_force_N": (np.zeros_like(pulled), "N"),
-        "channel_upper_force_N": (np.zeros_like(pulled), "N"),
-        "pulled_m": (SPEED * times, "m"),
-        "chain_length_m": (LENGTH * (1 + strains), "m"),
-        "chain_width_m": (WIDTH * (1 + 0.1 * strains), "m"),
+        "time_s": times,
+        "phase": np.zeros(len(times), dtype=np.int64),
+        "string_pulled_force_N": pulled,
+        "string_fixed_force_N": -pulled,
+        "channel_lower_force_N": np.zeros_like(pulled),
+        "channel_upper_force_N": np.zeros_like(pulled),
+        "pulled_m": SPEED * times,
+        "chain_length_m": LENGTH * (1 + strains),
+        "chain_width_m": WIDTH * (1 + 0.1 * strains),
     }
     write_series(directory, columns, seed=run.seed)
     return directory

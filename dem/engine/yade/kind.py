@@ -7,10 +7,9 @@ from dataclasses import replace
 
 from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
-from dem.engine.yade.adds import ADDS
-from dem.engine.yade.construction import in_order
+from dem.engine.yade.construction import ADDS, in_order
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.hinge_law import DAMPER_TIME, HingeLaw
+from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
 from dem.physics.contact import ContactLaw, contact_law

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
@@ -152,8 +153,9 @@ def late(out: Path) -> list[Check]:
     """A run that goes wrong after a while: the error has the time of the checkpoint before, and the file too."""
     data = scene({"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
 
-    def spoil(engine: YadeEngine) -> None:
+    def spoil(engine: Engine) -> None:
         if engine.time > 0.55:
+            assert isinstance(engine, YadeEngine)  # hands are YADE's
             push(engine, 2, velocity=(0, 0, 100))
 
     run = whole(data, out, spoil=spoil)

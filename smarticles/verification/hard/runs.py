@@ -16,7 +16,7 @@ from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
 from dem.physics.overlaps import Overlaps
 from dem.plan.steps import time_steps
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run import build, run
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
@@ -172,7 +172,7 @@ def whole(
     """
     built: list[tuple[Timing, Noting | None]] = []
 
-    def recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
+    def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
         timing = Timing(**vars(build.build_recorder(scene, out, progress)), spoil=spoil)
         noting = Noting(**vars(timing.watchdog)) if note else None
         timing.watchdog = noting or timing.watchdog

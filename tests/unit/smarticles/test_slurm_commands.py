@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_cases import SWEEP, Smarticles
 
-from templates.slurm import slurm
+from templates.slurm import queue as slurm
 from templates.sweep import folder as folder_module
 
 LARGE = ("--cluster", "example-large")

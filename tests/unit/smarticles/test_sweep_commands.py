@@ -13,7 +13,7 @@ from dem.record.rundir import claimed
 from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.folder import create_folder, open_folder
-from templates.sweep.sweep import load_sweep, with_constants
+from templates.sweep.sweep_file import load_sweep, with_constants
 
 
 def finish(directory: Path) -> None:

@@ -195,9 +195,9 @@ def ladder(tmp_path_factory):
                 fidelity="standard" if setting == "quarter" else "draft",
                 status="failed" if (setting, seed) == ("bouncy", 1) else "done",
                 more=(
-                    ("energy_residual_J", -2e-6, "J"),
-                    ("dissipated_energy_J", 1e-3, "J"),
-                    ("joint_gap_m", 3e-6, "m"),
+                    ("energy_residual_J", -2e-6),
+                    ("dissipated_energy_J", 1e-3),
+                    ("joint_gap_m", 3e-6),
                 ),
             )
             write_run(directories[-1], made)

@@ -8,8 +8,8 @@ import pytest
 from synthetic.released import stack, write_released
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
-from postprocess.scene_file import read_tiers
+from dem.record.manifest import read_run
+from postprocess.measures.mould import read_tiers
 from studies.base.procedures import PROCEDURE
 from studies.casting import figures as casting_figures
 from studies.casting.measure import (

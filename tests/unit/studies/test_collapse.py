@@ -10,7 +10,7 @@ from PIL import Image
 from synthetic.columns import H0, PHASES, Column, F, write_column
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from studies.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
 from studies.collapse.findings import findings

@@ -17,7 +17,7 @@ from dem.phases.shape_change import ShapeChange
 from studies.base.shipped import differences
 from studies.registry import study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 STUDIES = Path(studies.__file__).parent
 W, T2 = 0.0117, 0.5e-3

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from synthetic.released import stack, write_released
 
 from dem.errors import InputError
-from postprocess.manifest import read_run
+from dem.record.manifest import read_run
 from postprocess.measures.spread import centre_of_mass
 from postprocess.statistics.columns import SEED
 from studies.base.procedures import PROCEDURE

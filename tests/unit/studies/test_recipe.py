@@ -11,7 +11,7 @@ import pytest
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from studies.base.references import Reference
 from studies.base.runs import Collected, MeasuredRun
 from studies.base.study import Analysis, Study, Tables

@@ -22,7 +22,7 @@ from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.base.shipped import differences
 from studies.registry import STUDIES, study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 FOLDER = Path(studies.__file__).parent
 
