@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from studies import casting, chain, collapse, fracture, gravish, melting, procedures, sensitivity
 from studies.base.shipped import Shipped
 
@@ -36,8 +36,6 @@ def shipped(name: str) -> Shipped:
         InputError: There is none of this name.
     """
     if name not in STUDIES:
-        from dem.errors import nearest  # noqa: PLC0415
-
         msg = f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}"
         raise InputError(msg)
     return STUDIES[name]
