@@ -52,7 +52,7 @@ PHASES: list[dict[str, Any]] = [
     {"type": "relax", "duration_s": 0.05},
     {"type": "shake", "duration_s": 0.05},
     SWING,
-    {"type": "shape-change", "opening_s": 0.3, "closing_s": 0.3},
+    {"type": "shape-change", "opening_s": 0.27, "closing_s": 0.27},
     {"type": "actuate", "barbs": {"type": "ramp", "to_deg": 80, "duration_s": 0.05}},
     {"type": "remove-container", "duration_s": 0.05},
     {"type": "remove-container", "duration_s": 0.05, "speed_m_per_s": 0.3},
