@@ -40,7 +40,7 @@ def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None
 
 def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, YadeEngine]:
     """One smarticle, welded, without gravity, far from everything."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, gravity=0.0)
     cases.add(engine, (0, 0, 0.05), TILTED)
     cases.push(engine, 0, velocity=velocity, spin=spin)
@@ -182,7 +182,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
 
     The same steps lead up to the change, so that a pile left alone is the answer.
     """
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, radius=scene.container.radius_m)
     rng = np.random.default_rng(scene.seed)
     layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}

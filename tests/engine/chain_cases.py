@@ -7,7 +7,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from cases import add, load
+from cases import add
 from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
@@ -18,6 +18,7 @@ from dem.plan.steps import time_step
 from dem.run.build import build_engine
 from dem.run.run import run_scene
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 
@@ -28,7 +29,7 @@ def build(scene: Scene) -> YadeEngine:
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, YadeEngine]:
     """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     add(engine, (0, -scene.particle.boxes.vertices[0, 1], 0), rotation)
     engine.motors.articulate()
@@ -94,7 +95,7 @@ def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any
 
 def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
     """A chain strained by the phase itself: how far it has left the plane, and its angles."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     scene.phases[0].begin(scene, 0).proceed(engine)
     stage = scene.phases[1].begin(scene, 1)
@@ -115,14 +116,14 @@ def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
 
 def series(data: dict[str, Any], out: str) -> dict[str, Any]:
     """A whole run and its series."""
-    run_scene(load(data), Path(out), command="test", progress=False)
+    run_scene(scene_of(data), Path(out), command="test", progress=False)
     with h5py.File(Path(out) / "series.h5") as file:
         return {name: file[name][()] for name in file}
 
 
 def bodies(data: dict[str, Any]) -> dict[str, int]:
     """What exists of plane and strings in a scene."""
-    engine = build(load(data))
+    engine = build(scene_of(data))
     return {
         "felt": len(engine.fixtures.felt),
         "container": len(engine.fixtures.container),

@@ -123,7 +123,7 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
 
 def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
     """An articulated smarticle hits the floor; its energy from the impact on."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene)
     cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
     cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
@@ -152,7 +152,7 @@ def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) ->
 
 def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
     """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     law, particle = contact_law_of(scene), scene.particle
     dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
     interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
@@ -241,7 +241,7 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
 
 def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
     """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
     engine = upright(scene, gravity=0.0, height=height)

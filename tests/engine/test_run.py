@@ -29,7 +29,8 @@ Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 ROOT = Path(__file__).resolve().parents[2]
 RUN = (
-    "import sys; from pathlib import Path; from dem.run.run import run_scene; from dem.scene.reading import load_scene\n"
+    "import sys; from pathlib import Path\n"
+    "from dem.run.run import run_scene; from dem.scene.reading import load_scene\n"
     "run_scene(load_scene(Path(sys.argv[1])), Path(sys.argv[2]), command='test', progress=False)"
 )
 TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations
@@ -91,7 +92,7 @@ def finished(worker: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
 def test_finished_run_holds_what_made_it_and_what_came_out(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
     scene = load_scene(out / "scene.yaml")
-    assert scene == cases.load(data)
+    assert scene == cases.scene_of(data)
     manifest = read_json(out / "run.json")
     boxes = scene.smarticle.boxes
     expected = {
@@ -158,7 +159,7 @@ def test_frames_are_regular_and_listed(finished: tuple[Path, dict[str, Any]]) ->
 
 def test_series_is_regular_and_agrees_with_the_frames(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
-    rows, scene = series(out), cases.load(data)
+    rows, scene = series(out), cases.scene_of(data)
     end = read_json(out / "done.json")["time_s"]
     assert rows["time_s"] == pytest.approx(0.008 * np.arange(len(rows["time_s"])), rel=1e-9)
     assert rows["time_s"][-1] > end - 0.0081
@@ -175,7 +176,7 @@ def test_series_is_regular_and_agrees_with_the_frames(finished: tuple[Path, dict
 
 def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
-    rows, scene = series(out), cases.load(data)
+    rows, scene = series(out), cases.scene_of(data)
     settle, weight = scene.phases[0].settle, 10 * scene.smarticle.boxes.mass * 9.81
     settled_at = read_json(out / "done.json")["phases"][0]["end_s"]
     # The criterion holds at one look; the pile may stir once more. Later it lies still.
@@ -195,7 +196,7 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
 
 def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
-    rows, mass = series(out), cases.load(data).smarticle.boxes.mass
+    rows, mass = series(out), cases.scene_of(data).smarticle.boxes.mass
     (poured,) = np.flatnonzero(np.diff(rows["count"]) == 5)[1:] + 1
     assert rows["count"][poured - 1 : poured + 1].tolist() == [5, 10]
     # Five lie on the floor; the other five have fallen for less than 8 ms, and start a whole sphere above.

@@ -159,7 +159,7 @@ def test_signals_stop_in_an_orderly_way(number: signal.Signals) -> None:
 
     def action() -> int:
         os.kill(os.getpid(), number)
-        threading.Event().wait(10)
+        threading.Event().wait(300)
         return 0
 
     assert guarded(action) == 130

@@ -1,0 +1,48 @@
+"""The account of energy on the links engine: kernels add up, exactly and in every step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dem.engine.links.stepping import LOST, WORK
+from dem.engine.links.world import World
+
+
+class LinksAccount:
+    """See `dem.engine.interface.Account`.
+
+    Args:
+        world: the simulation.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.added = 0.0
+        """See the interface."""
+
+    @property
+    def container_work(self) -> float:
+        """See the interface."""
+        return float(self._world.totals[WORK])
+
+    @property
+    def dissipated(self) -> float:
+        """See the interface; by contacts only where the scene asks for it, by welding always."""
+        return float(self._world.totals[LOST])
+
+    @property
+    def given(self) -> float:
+        """See the interface."""
+        return self.added + self.container_work
+
+    def elastic(self) -> tuple[float, float]:
+        """See the interface; hinges have no springs."""
+        return self._world.look().elastic_energy, 0.0
+
+    def removed(self, remove: Callable[[], None]) -> None:
+        """Do something that takes contacts away; what their springs held is dissipated."""
+        counted = self._world.ledger is not None
+        stored = self.elastic()[0] if counted else 0.0
+        remove()
+        if counted:
+            self._world.totals[LOST] += stored - self.elastic()[0]

@@ -1,0 +1,37 @@
+"""What each effect adds on the links engine: kernels and arguments by name; what is not called for is not compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dem.engine.effect import Adds, EffectName
+
+ADDS: Mapping[EffectName, Adds] = {
+    EffectName.CONTACT: Adds(
+        engines=("pose", "look_for_neighbours", "push_apart", "kick", "drift"), shapes=("swept segments",)
+    ),
+    EffectName.CONTAINER: Adds(engines=("push_up",), shapes=("floor", "round wall")),
+    EffectName.PLANE: Adds(engines=("push_sideways",), python="two walls instead of the container"),
+    EffectName.STRINGS: Adds(engines=("pull",)),
+    EffectName.CONTAINER_MOTION: Adds(python="a sine per step"),
+    EffectName.ARTICULATION: Adds(python="the plane geometry of every smarticle twice in a step, while articulated"),
+    EffectName.MOTORS: Adds(python="one look of all motors per control period"),
+    EffectName.HOOKS: Adds(engines=("push_hooks",), shapes=("square bars",)),
+    EffectName.WALL_REMOVAL: Adds(engines=("push_rims",), python="the lower edge of a wall, while it is lifted"),
+    EffectName.ENERGY_ACCOUNT: Adds(engines=("settle",), python="every contact's velocity twice in a step"),
+    EffectName.CHECKPOINTS: Adds(python="copies all arrays once per checkpoint"),
+}
+
+ORDER = (
+    "pose",
+    "look_for_neighbours",
+    "push_apart",
+    "push_up",
+    "push_sideways",
+    "push_rims",
+    "push_hooks",
+    "pull",
+    "kick",
+    "settle",
+    "drift",
+)

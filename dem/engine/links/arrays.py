@@ -1,0 +1,318 @@
+"""The arrays that kernels work on, and how they grow. Everything is contiguous; nothing is allocated in a step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
+FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
+SURFACES = 3  # that an end of a link can touch at once: floor, wall, ceiling; or two walls of a channel
+SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
+
+
+class Bodies(NamedTuple):
+    """N smarticles. The first group is their state, the rest follows from it at the beginning of every step.
+
+    Velocities and momenta belong to the middle of the step before, as in all leapfrog schemes.
+
+    Args:
+        position: (N, 3) centres of mass [m].
+        turn: (N, 4) unit quaternions (w, x, y, z), middle link to laboratory [1].
+        velocity: (N, 3) of the centres of mass [m/s].
+        momentum: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s].
+        alpha: (N, 2) angles of the barbs [rad].
+        rate: (N, 2) their rates [rad/s]; 0 while welded.
+        plane: (N, PLANE) plane geometry, see `dem.engine.links.motion.planar.lay_out`.
+        spin: (N, 3) angular velocities of the middle links, laboratory frame [rad/s].
+        axes: (N, 3, 3) rotation matrices, middle link to laboratory [1].
+        segments: (N S, 6) start of each link's axis, at the hinge, and vector to its end [m]; S links and strands.
+        motion: (N, 6) or (3 N, 6) velocity at the centre of mass [m/s] and angular velocity [rad/s] of each rigid
+            body: of whole smarticles while welded, of links while articulated.
+        load: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight.
+        lever: (N, 2) torque of contacts about the hinges on each barb, positive ones raise the angle [N m].
+        deepest: (N,) deepest contact since the last question [m].
+    """
+
+    position: Array
+    turn: Array
+    velocity: Array
+    momentum: Array
+    alpha: Array
+    rate: Array
+    plane: Array
+    spin: Array
+    axes: Array
+    segments: Array
+    motion: Array
+    load: Array
+    lever: Array
+    deepest: Array
+
+
+class Pairs(NamedTuple):
+    """Pairs of links that are near each other, P of them, in rows by the first link.
+
+    Args:
+        first: (P,) the link with the lower number.
+        second: (P,) the other one.
+        slip: (P, SLOTS, 4) stretch of the tangential springs at each point [m], and their energy [J].
+        used: (P,) which of the points touched in the last step, as bits.
+        near: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list.
+        counts: (4,) pairs, near pairs, times the list was built, times the tight one was.
+        wide_marks: (N S, 7) ends of all links when the list was built and their skins [m].
+        near_marks: (N S, 7) the same for the tight list.
+        wide_centres: (N, 3) centres of mass when the list was built [m].
+        near_centres: (N, 3) the same for the tight list [m].
+    """
+
+    first: Indices
+    second: Indices
+    slip: Array
+    used: NDArray[np.uint8]
+    near: Indices
+    counts: NDArray[np.int64]
+    wide_marks: Array
+    near_marks: Array
+    wide_centres: Array
+    near_centres: Array
+
+
+class Cells(NamedTuple):
+    """What the search for neighbours needs for itself. Pieces are parts of links, no longer than half a cell.
+
+    Args:
+        owners: (pieces,) links, by cell, in order within each.
+        cells: (pieces,) cells of each link, by link.
+        begins: (N S + 1,) where each link begins in `cells`.
+        visited: (cells,) the last link that each cell was looked at for.
+        marks: (N S, 7) as in `Pairs`.
+        centres: (N, 3) as in `Pairs`.
+        starts: (cells + 2,) where each cell begins in `owners`, from the second number on.
+        rows: (N S + 1,) where the old list's rows begin.
+        seen: (N S,) the last link that each link was looked at for.
+        first: (P,) the list before.
+        second: (P,) the same.
+        slip: (P, SLOTS, 4) the same.
+        used: (P,) the same.
+    """
+
+    owners: Indices
+    cells: Indices
+    begins: Indices
+    visited: Indices
+    marks: Array
+    centres: Array
+    starts: Indices
+    rows: Indices
+    seen: Indices
+    first: Indices
+    second: Indices
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Law(NamedTuple):
+    """Spring, dashpot and friction of a contact: between links, or of a link and a fixture.
+
+    Args:
+        stiffness: kn [N/m].
+        shear: ks [N/m].
+        damping: cn [N s/m].
+        shear_damping: cs [N s/m], while it sticks.
+        friction: Coulomb coefficient [1].
+    """
+
+    stiffness: float
+    shear: float
+    damping: float
+    shear_damping: float
+    friction: float
+
+
+class Ends(NamedTuple):
+    """What contacts of the ends of links with flat or round surfaces remember.
+
+    Args:
+        slip: (N S, 2, SURFACES, 4) stretch of the tangential springs of start and end [m], and their energy [J].
+        used: (N S, 2) which of the surfaces touched in the last step, as bits.
+    """
+
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Ground(NamedTuple):
+    """Fixtures that ends of links meet, and how they all move. Parts: floor, wall, lower hook, upper hook.
+
+    Args:
+        bottoms: (tiers,) where each tier of the wall begins, from the lowest up, above the wall's place [m].
+        radii: (tiers,) of the tiers [m].
+        top: where the wall ends, above its place [m].
+        flags: (2,) whether the wall is there, and whether it was lifted: then it has an outside.
+        place: (4,) heights of the parts [m].
+        speed: (4,) their velocities [m/s].
+        base: (4,) heights that shaking began at [m].
+        shaken: (4,) whether a part is shaken.
+        wave: (3,) amplitude [m], 2πf [rad/s] and begin [s] of the shaking.
+        force: (6, 3) of the smarticles on the parts and on a channel's lower and upper wall in the last step [N].
+        sums: (6, 3) the same, summed over all steps [N].
+    """
+
+    bottoms: Array
+    radii: Array
+    top: float
+    flags: NDArray[np.int64]
+    place: Array
+    speed: Array
+    base: Array
+    shaken: NDArray[np.int64]
+    wave: Array
+    force: Array
+    sums: Array
+
+
+class Hooks(NamedTuple):
+    """Two hooks of two bars each, lying along x and y; their heights are in `Ground.place`.
+
+    Args:
+        halves: (2, 2, 3) half edges of the bars of the lower and the upper hook [m].
+        slip: (N S, 2, 2, SLOTS, 4) stretch of the tangential springs of links at the bars [m], and their energy [J].
+        used: (N S, 2, 2) which of the points touched in the last step, as bits.
+    """
+
+    halves: Array
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Rims(NamedTuple):
+    """Round edges of the wall that links can bend around: between tiers, and below a wall that is lifted.
+
+    Args:
+        heights: (rims,) above the wall's place [m].
+        radii: (rims,) [m].
+        slip: (N S, rims, 4) stretch of the tangential springs of links at the rims [m], and their energy [J].
+        used: (N S, rims) whether they touched in the last step.
+    """
+
+    heights: Array
+    radii: Array
+    slip: Array
+    used: NDArray[np.uint8]
+
+
+class Cords(NamedTuple):
+    """Strings tied to links, k of them.
+
+    Args:
+        owner: (k, 2) smarticle and link.
+        along: (k,) place of the knot along the link's axis from the link's centre [m].
+        anchor: (k, 3) where the other ends are [m].
+        start: (k, 3) where they were when the strings were tied [m].
+        speed: (k,) of the other ends, along x [m/s].
+        law: (3,) length when slack [m], stiffness [N/m], damping [N s/m].
+        sums: (k, 3) forces on the links, summed over all steps [N].
+        knot: (k, 3) where the strings are tied [m].
+    """
+
+    owner: NDArray[np.int64]
+    along: Array
+    anchor: Array
+    start: Array
+    speed: Array
+    law: Array
+    sums: Array
+    knot: Array
+
+
+class Motoring(NamedTuple):
+    """Two motors on each of N smarticles.
+
+    Args:
+        law: 0 halt, 1 stall, 2 slip, 3 servo.
+        speed: ω, the greatest speed [rad/s].
+        limit: (N, 2) τ_max [N m].
+        stiffness: (N, 2) of the shaft of a slip or servo motor [N m/rad].
+        damping: of a servo [N m s/rad].
+        acceleration: (N, 2) the greatest change of a prescribed rate [rad/s²].
+        command: (N, 2) angles that the motors hold [rad].
+        schedule: (N, 2) angles that they were told [rad].
+        torque: (N, 2) mean torques on the barbs between the last two looks [N m].
+        work: (N, 2) done on the links up to the last look, and for slip and servo up to now [J].
+        halted: (N, 2) whether a motor wanted to advance at the last look and did not.
+        begun: (N, 2) angles at the last look [rad].
+        momentum: (N, 2) p after the last look; for slip and servo p now [kg m²/s].
+        impulse: (N, 2) ∫ of all torques but the motors' since the last look; for slip and servo of the motors' [N m s].
+        elapsed: (1,) time since the last look [s].
+    """
+
+    law: int
+    speed: float
+    limit: Array
+    stiffness: Array
+    damping: float
+    acceleration: Array
+    command: Array
+    schedule: Array
+    torque: Array
+    work: Array
+    halted: NDArray[np.bool_]
+    begun: Array
+    momentum: Array
+    impulse: Array
+    elapsed: Array
+
+
+def no_bodies(links: int) -> Bodies:
+    """Bodies without any smarticle, of S = `links` links and strands each."""
+    f = np.zeros
+    return Bodies(
+        f((0, 3)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 2)), f((0, 2)), f((0, PLANE)), f((0, 3)), f((0, 3, 3)),
+        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 2)), f(0),
+    )  # fmt: skip
+
+
+def joined(one: Bodies, other: Bodies) -> Bodies:
+    """The smarticles of both, those of `one` first."""
+    return Bodies(*(np.concatenate(arrays) for arrays in zip(one, other, strict=True)))
+
+
+def pairs_for(links: int, smarticles: int, capacity: int) -> Pairs:
+    """An empty list with room for `capacity` pairs of `links` links of some smarticles."""
+    return Pairs(
+        np.zeros(capacity, np.int32),
+        np.zeros(capacity, np.int32),
+        np.zeros((capacity, SLOTS, 4)),
+        np.zeros(capacity, np.uint8),
+        np.zeros(capacity, np.int32),
+        np.zeros(4, np.int64),
+        np.zeros((links, 7)),
+        np.zeros((links, 7)),
+        np.zeros((smarticles, 3)),
+        np.zeros((smarticles, 3)),
+    )
+
+
+def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: int) -> Cells:
+    """Room for a search among `links` links of some smarticles in so many pieces, of `capacity` pairs, in so many cells."""
+    return Cells(
+        np.zeros(pieces, np.int32),
+        np.zeros(pieces, np.int32),
+        np.zeros(links + 1, np.int32),
+        np.zeros(cells, np.int32),
+        np.zeros((links, 7)),
+        np.zeros((smarticles, 3)),
+        np.zeros(cells + 2, np.int32),
+        np.zeros(links + 1, np.int32),
+        np.zeros(links, np.int32),
+        np.zeros(capacity, np.int32),
+        np.zeros(capacity, np.int32),
+        np.zeros((capacity, SLOTS, 4)),
+        np.zeros(capacity, np.uint8),
+    )

@@ -1,0 +1,166 @@
+"""How kernels are compiled, and where compiled code is kept.
+
+Numba's own cache lies beside the source, which may be read-only, and does not notice when a kernel's callee in another
+file has changed. This one lies in a folder of the user's, named after everything that the code depends on, so that
+neither an update of the package nor another processor meets code that is not its own; and whatever is wrong with it, a
+run goes on without.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba.core.caching import CompileResultCacheImpl, _CacheLocator
+from numba.core.caching import FunctionCache as NumbaCache
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+LOG = logging.getLogger(__name__)
+FOLDER = "SMARTICLES_CACHE_DIR"  # environment variable: where compiled code is kept, instead of the user's cache folder
+
+# Without reordered arithmetic: with `fastmath`, a process that compiles and one that loads compiled code differ in
+# their last bits. A division by zero gives inf, as in NumPy, and costs no branch. Without reference counts nothing can
+# be allocated in a kernel, and passing arrays around costs nothing.
+OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "_nrt": False}
+
+
+def part(function: F) -> F:
+    """Compile a function as a part of the kernels that call it."""
+    return numba.njit(**OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def kernel(function: F) -> F:
+    """Compile a function at its first call from Python, and keep the code for later processes."""
+    compiled = numba.njit(**OPTIONS)(function)
+    compiled._cache = _Cache(compiled.py_func)
+    return compiled  # type: ignore[no-any-return]
+
+
+@cache
+def stamp() -> str:
+    """Hash of everything that compiled code depends on: these sources, the options, Numba, NumPy."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    digest.update(repr((sorted(OPTIONS.items()), numba.__version__, np.__version__)).encode())
+    return digest.hexdigest()[:16]
+
+
+def _folders() -> Iterator[Path]:
+    """Where compiled code may be kept, best first."""
+    if given := os.environ.get(FOLDER):
+        yield Path(given)
+        return
+    home = os.environ.get("XDG_CACHE_HOME")
+    yield (Path(home) if home else Path.home() / ".cache") / "smarticles"
+    yield Path(tempfile.gettempdir()) / f"smarticles-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+
+
+@cache
+def folder() -> Path | None:
+    """The folder of compiled code, made if need be; None where nothing can be written."""
+    causes = []
+    for base in _folders():
+        path = base / f"links-{stamp()}"
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=path):
+                return path
+        except (OSError, RuntimeError) as error:
+            causes.append(f"{path} ({getattr(error, 'strerror', None) or error})")
+    LOG.warning(
+        "compiled code cannot be kept in %s; every run compiles for about half a minute; set %s to a writable folder",
+        " or ".join(causes),
+        FOLDER,
+    )
+    return None
+
+
+@cache
+def _announce() -> None:
+    where = folder()
+    kept = "" if where is None else f", kept in {where}"
+    LOG.warning("compiling the links engine, about half a minute for each kind of phase%s", kept)
+
+
+class _Locator(_CacheLocator):  # type: ignore[misc] # Numba has no types
+    """Tells Numba's cache where to keep what."""
+
+    def __init__(self, line: int) -> None:
+        self._line = line
+
+    def get_cache_path(self) -> str:
+        return str(folder())
+
+    def get_source_stamp(self) -> str:
+        return stamp()
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> _Locator:
+        return cls(py_func.__code__.co_firstlineno)
+
+
+class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_Locator,)
+
+
+class _Cache(NumbaCache):  # type: ignore[misc]
+    """Numba's cache, in our folder, and never a reason to fail."""
+
+    _impl_class = _Implementation
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._ready = False
+        self._enabled = True
+
+    def _prepare(self) -> bool:
+        # At the first call, not at import: that must not touch the disk.
+        if not self._ready and self._enabled:
+            if folder() is None:
+                self._enabled = False
+            else:
+                super().__init__(self._function)
+                self._ready = True
+        return self._ready and self._enabled
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Compiled code for a signature; None where there is none, or none that can be read."""
+        found = None
+        try:
+            if self._prepare():
+                found = super().load_overload(sig, target_context)
+        except Exception as error:
+            self._give_up("read", error)
+        if found is None:
+            _announce()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep compiled code."""
+        try:
+            if self._prepare():
+                super().save_overload(sig, data)
+        except Exception as error:
+            self._give_up("written", error)
+
+    def _give_up(self, done: str, error: Exception) -> None:
+        self._enabled = False
+        LOG.warning(
+            "%s: compiled code cannot be %s (%s); compiling instead; remove the folder to have it made anew",
+            folder(),
+            done,
+            " ".join(str(error).split()) or type(error).__name__,
+        )

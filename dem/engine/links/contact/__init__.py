@@ -1,0 +1,1 @@
+"""Kernels of forces: links on links, fixtures and strings on links."""

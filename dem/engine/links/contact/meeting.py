@@ -1,0 +1,192 @@
+"""How two links push each other apart: where, and with what springs, derived from one energy.
+
+For two swept segments with the greatest overlap δ0, at their nearest points, and overlaps δ1 and δ2 at the two ends of
+the stretch over which they lie along each other (at the end of one link and the nearest point of the other; 0 where
+these do not touch), of length ℓ,
+
+    E = kn/2 (δ0² + g(ℓ) (δ1 δ2 / δ0)²),   g from 0 to 1 as ℓ grows from 0 to a diameter.
+
+Links that cross have δ1 δ2 = 0 and one contact. Links that lie on each other have δ0 = δ1 = δ2 and two contacts, at the
+ends; tilted ones have δ0 = δ1 and again two, of δ1 and δ2, so that a bar rests on a bar and resists tilting. Between
+these the energy is smooth: there is no angle at which links change from one to two contacts, and nothing jumps. The
+forces are its derivatives. Nearest points and ends are extremal or fixed, so that forces act along the normals of the
+three pairs of points alone, and along the first link where ℓ changes:
+
+    f0 = kn δ0 (1 - g x1² x2²),  f1 = kn g δ1 x2²,  f2 = kn g δ2 x1²,  x = δ/δ0,  f_ℓ = kn/2 (δ1 δ2/δ0)² g'.
+
+A barb begins at a hinge, where the middle link ends: what overlaps there would count twice. E of a barb is therefore
+less by kn/2 δ_h², δ_h the overlap of the hinge itself with the other link, which the middle link's own E has; for two
+barbs less by both hinges' and more by that of hinge against hinge. What remains goes to zero as the point of contact
+moves to the hinge, and a bend is as stiff as a bar.
+"""
+
+from __future__ import annotations
+
+import math
+
+from dem.engine.links.arrays import Array
+from dem.engine.links.compiler import part
+from dem.engine.links.contact.nearest import nearest_on_segments
+
+# Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
+POINTS, BARE = 3, 6
+ENERGY = POINTS + BARE  # row whose first number is E
+ROWS = ENERGY + 1
+PX, NX, LOAD, CARRIED, WEIGHT = 0, 3, 6, 7, 8
+COLUMNS = 9
+
+
+@part
+def _clamp(value: float) -> float:
+    return min(1.0, max(0.0, value))
+
+
+@part
+def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool, out: Array) -> int:
+    """Points of contact of two links, and the springs there.
+
+    Args:
+        p: (6,) start of the first link's axis and vector to its end [m].
+        q: (6,) the same of the second one.
+        diameter: of both [m].
+        stiffness: kn [N/m].
+        bend_p: whether the first link is a barb, which starts at a hinge.
+        bend_q: the same of the second one.
+        out: (ROWS, COLUMNS) written. Rows below POINTS: place [m], normal from the second to the first [1],
+            load of the spring [N], the part of it that friction and dashpot go with [N], share of a whole contact [1];
+            weight 0: none. Further rows: place [m], force on the first link [N].
+            Row ENERGY: E [J].
+
+    Returns:
+        0 where the links are apart, otherwise 1 + the number of rows with bare forces.
+    """
+    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    ux, uy, uz, vx, vy, vz = p[3], p[4], p[5], q[3], q[4], q[5]
+    a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+    d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+    s, t = nearest_on_segments(a, b, c, d, e)
+    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+    squared = x * x + y * y + z * z
+    if squared >= diameter * diameter:
+        return 0
+    distance = math.sqrt(squared)
+    deepest = diameter - distance
+    _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * deepest, 1.0)
+    out[1, WEIGHT] = out[2, WEIGHT] = 0.0
+    out[ENERGY, 0] = 0.5 * stiffness * deepest * deepest
+    bare = _lie_along(p, q, a, b, c, d, e, deepest, diameter, stiffness, out)
+    if bend_p:
+        bare = _hinge(p, q, diameter, stiffness, True, _clamp(e / c), -1.0, bare, out)
+        if bend_q:
+            bare = _hinge(p, q, diameter, stiffness, True, 0.0, 1.0, bare, out)
+    if bend_q:
+        bare = _hinge(p, q, diameter, stiffness, False, _clamp(-d / a), -1.0, bare, out)
+    return 1 + bare
+
+
+@part
+def _note(
+    out: Array, k: int, p: Array, q: Array, s: float, t: float,
+    x: float, y: float, z: float, distance: float, load: float, weight: float,
+) -> None:  # fmt: skip
+    """Write a point: half way between the two axes."""
+    row = out[k]
+    row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
+    row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
+    row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
+    row[3], row[4], row[5] = x / distance, y / distance, z / distance
+    row[6] = row[7] = load
+    row[8] = weight
+
+
+@part
+def _lie_along(
+    p: Array, q: Array, a: float, b: float, c: float, d: float, e: float,
+    deepest: float, diameter: float, stiffness: float, out: Array,
+) -> int:  # fmt: skip
+    """Add what the two ends of the stretch carry over which links lie along each other; the number of bare forces."""
+    # Where on the first link, in its lengths, are the second one's ends?
+    start, end = -d / a, (b - d) / a
+    lower, upper, lower_t, upper_t = start, end, 0.0, 1.0
+    if b < 0.0:
+        lower, upper, lower_t, upper_t = end, start, 1.0, 0.0
+    if upper <= 0.0 or lower >= 1.0:
+        return 0
+    own_lower, own_upper = lower <= 0.0, upper >= 1.0
+    s1, s2, t1, t2 = lower, upper, lower_t, upper_t
+    if own_lower:
+        s1, t1 = 0.0, _clamp(e / c)
+    if own_upper:
+        s2, t2 = 1.0, _clamp((b + e) / c)
+    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    x1, y1, z1 = wx + s1 * p[3] - t1 * q[3], wy + s1 * p[4] - t1 * q[4], wz + s1 * p[5] - t1 * q[5]
+    first = x1 * x1 + y1 * y1 + z1 * z1
+    x2, y2, z2 = wx + s2 * p[3] - t2 * q[3], wy + s2 * p[4] - t2 * q[4], wz + s2 * p[5] - t2 * q[5]
+    second = x2 * x2 + y2 * y2 + z2 * z2
+    if max(first, second) >= diameter * diameter:
+        return 0
+    first, second = math.sqrt(first), math.sqrt(second)
+    # No deeper than the deepest, whatever the rounding.
+    depth1, depth2 = min(diameter - first, deepest), min(diameter - second, deepest)
+    length = math.sqrt(a)
+    along = (s2 - s1) * length / diameter
+    grown, growth = 1.0, 0.0
+    if along < 1.0:
+        grown, growth = along * along * (3 - 2 * along), 6 * along * (1 - along) / diameter
+    x, y = (depth1 / deepest) ** 2, (depth2 / deepest) ** 2
+    share = 1 - grown * x * y
+    out[0, 6] = out[0, 7] = stiffness * deepest * share
+    out[ENERGY, 0] *= 2 - share
+    out[0, 8] = share
+    _note(out, 1, p, q, s1, t1, x1, y1, z1, first, stiffness * grown * depth1 * y, grown * y)
+    _note(out, 2, p, q, s2, t2, x2, y2, z2, second, stiffness * grown * depth2 * x, grown * x)
+    if growth == 0.0:
+        return 0
+    bare, push = 0, 0.5 * stiffness * (depth1 * depth2 / deepest) ** 2 * growth / length
+    for upper_end in range(2):
+        own, t, sign = (own_upper, t2, 1.0) if upper_end else (own_lower, t1, -1.0)
+        if not own:
+            # Only ends of the second link count: an end of the first one moves with the direction that ℓ is along.
+            row = out[POINTS + bare]
+            for k in range(3):
+                row[k], row[3 + k] = q[k] + t * q[3 + k], sign * push * p[3 + k]
+            bare += 1
+    return bare
+
+
+@part
+def _hinge(
+    p: Array, q: Array, diameter: float, stiffness: float, of_first: bool, other: float, sign: float,
+    bare: int, out: Array,
+) -> int:  # fmt: skip
+    """Take off (sign -1) or add the contact of a hinge with a point of the other link; the number of bare forces."""
+    s, t = (0.0, other) if of_first else (other, 0.0)
+    x, y, z = p[0] + s * p[3] - q[0] - t * q[3], p[1] + s * p[4] - q[1] - t * q[4], p[2] + s * p[5] - q[2] - t * q[5]
+    squared = x * x + y * y + z * z
+    if squared >= diameter * diameter:
+        return bare
+    distance = math.sqrt(squared)
+    load = sign * stiffness * (diameter - distance)
+    out[ENERGY, 0] += 0.5 * load * (diameter - distance)
+    row = out[POINTS + bare]
+    row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
+    row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
+    row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
+    row[3], row[4], row[5] = load * x / distance, load * y / distance, load * z / distance
+    # Friction and dashpots go with what is left: taken from the point that is nearest, and added to the same.
+    rest = -load
+    for _ in range(POINTS):
+        best, least = -1, math.inf
+        for k in range(POINTS):
+            if out[k, WEIGHT] > 0.0 and out[k, CARRIED] > 0.0:
+                away = (out[k, 0] - row[0]) ** 2 + (out[k, 1] - row[1]) ** 2 + (out[k, 2] - row[2]) ** 2
+                if away < least:
+                    best, least = k, away
+        if best < 0:
+            break
+        taken = min(rest, out[best, CARRIED])
+        out[best, CARRIED] -= taken
+        rest -= taken
+        if rest <= 0.0:
+            break
+    return bare + 1

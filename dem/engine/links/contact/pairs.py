@@ -1,0 +1,193 @@
+"""Forces of smarticles on each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dem.engine.links.arrays import Array, Bodies, Law, Pairs
+from dem.engine.links.compiler import part
+from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.meeting import BARE, POINTS, meet
+from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links.shape import Shape
+
+
+@part
+def push(
+    shape: Shape, bodies: Bodies, i: int, kind: int, hinged: Any,
+    x: float, y: float, z: float, fx: float, fy: float, fz: float,
+) -> None:  # fmt: skip
+    """Let a force act on a point of a smarticle.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `load` and, while articulated, `lever` are added to.
+        i: the smarticle.
+        kind: the link.
+        hinged: None while welded.
+        x: the point [m].
+        y: the same.
+        z: the same.
+        fx: the force [N].
+        fy: the same.
+        fz: the same.
+    """
+    load, position = bodies.load, bodies.position
+    rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
+    mx, my, mz = ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
+    load[i, 0] += fx
+    load[i, 1] += fy
+    load[i, 2] += fz
+    load[i, 3] += mx
+    load[i, 4] += my
+    load[i, 5] += mz
+    if hinged is not None and kind != 1:
+        axes, row = bodies.axes, bodies.plane[i]
+        k, sign, hx = (0, -1.0, -shape.half - row[0]) if kind == 0 else (1, 1.0, shape.half - row[0])
+        hy = -row[1]
+        ax = axes[i, 0, 0] * hx + axes[i, 0, 1] * hy
+        ay = axes[i, 1, 0] * hx + axes[i, 1, 1] * hy
+        az = axes[i, 2, 0] * hx + axes[i, 2, 1] * hy
+        mx, my, mz = mx - (ay * fz - az * fy), my - (az * fx - ax * fz), mz - (ax * fy - ay * fx)
+        bodies.lever[i, k] += sign * (axes[i, 0, 2] * mx + axes[i, 1, 2] * my + axes[i, 2, 2] * mz)
+
+
+@part
+def put_down(
+    ledger: Array, rows: tuple[int, int], owners: tuple[int, int],
+    x: float, y: float, z: float, fx: float, fy: float, fz: float, known: float,
+) -> None:  # fmt: skip
+    """Note a force that is not a normal spring's, to work out what it dissipates when velocities after it are known.
+
+    Args:
+        ledger: (n, 11); row 0 begins with the number of rows in use.
+        rows: of the two bodies in `Bodies.motion`; -1 for a fixture.
+        owners: the two smarticles; -1 for a fixture.
+        x: point of contact [m].
+        y: the same.
+        z: the same.
+        fx: force on the first one [N].
+        fy: the same.
+        fz: the same.
+        known: what its work with the velocities before gives, and what its spring took up [J].
+    """
+    n = int(ledger[0, 0]) + 1
+    ledger[0, 0] = n
+    row = ledger[n]
+    row[0], row[1], row[2], row[3] = rows[0], rows[1], owners[0], owners[1]
+    row[4], row[5], row[6], row[7], row[8], row[9], row[10] = x, y, z, fx, fy, fz, known
+
+
+@part
+def push_apart(
+    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array
+) -> float:
+    """Add the forces of all pairs that touch.
+
+    Args:
+        shape: what all smarticles have in common.
+        law: of their contacts.
+        bodies: the smarticles; `load`, `lever` and `deepest` are written.
+        pairs: pairs that may touch; `slip` and `used` are brought up to date.
+        hinged: None while welded.
+        ledger: of forces that dissipate; None where nobody asks.
+        dt: time step [s].
+        out: (ROWS, COLUMNS) scratch.
+
+    Returns:
+        Energy of tangential springs whose contacts have ended [J].
+    """
+    segments, position, motion = bodies.segments, bodies.position, bodies.motion
+    links = shape.kinds.shape[0]
+    each = links * shape.offsets.shape[0]
+    diameter = 2 * shape.radius
+    reach = diameter * diameter
+    lost = 0.0
+    for k in range(pairs.counts[1]):
+        pair = pairs.near[k]
+        p, q = pairs.first[pair], pairs.second[pair]
+        ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
+        vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
+        wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+        s, t = nearest_on_segments(
+            ux * ux + uy * uy + uz * uz,
+            ux * vx + uy * vy + uz * vz,
+            vx * vx + vy * vy + vz * vz,
+            ux * wx + uy * wy + uz * wz,
+            vx * wx + vy * wy + vz * wz,
+        )
+        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+        if x * x + y * y + z * z >= reach:
+            if pairs.used[pair]:
+                lost += _forget(pairs, pair, 7)
+            continue
+        kind_p, kind_q = shape.kinds[p % links], shape.kinds[q % links]
+        found = meet(segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
+        if found == 0:  # by rounding
+            continue
+        i, j = p // each, q // each
+        row_i, row_j = i, j
+        if hinged is not None:
+            row_i, row_j = 3 * i + kind_p, 3 * j + kind_q
+        used = 0
+        for slot in range(POINTS):
+            weight = out[slot, 8]
+            if weight <= 0.0:
+                continue
+            used |= 1 << slot
+            px, py, pz = out[slot, 0], out[slot, 1], out[slot, 2]
+            nx, ny, nz = out[slot, 3], out[slot, 4], out[slot, 5]
+            load, carried = out[slot, 6], out[slot, 7]
+            rx, ry, rz = px - position[i, 0], py - position[i, 1], pz - position[i, 2]
+            gx, gy, gz = px - position[j, 0], py - position[j, 1], pz - position[j, 2]
+            ax, ay, az = motion[row_i, 3], motion[row_i, 4], motion[row_i, 5]
+            bx, by, bz = motion[row_j, 3], motion[row_j, 4], motion[row_j, 5]
+            mx = motion[row_i, 0] + ay * rz - az * ry - (motion[row_j, 0] + by * gz - bz * gy)
+            my = motion[row_i, 1] + az * rx - ax * rz - (motion[row_j, 1] + bz * gx - bx * gz)
+            mz = motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx)
+            twist = 0.5 * dt * ((ax + bx) * nx + (ay + by) * ny + (az + bz) * nz)
+            fx, fy, fz = 0.0, 0.0, 0.0
+            stored = pairs.slip[pair, slot, 3]
+            if carried > 0.0:
+                fx, fy, fz = resist(
+                    law, carried, weight * carried / load, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot]
+                )
+            else:
+                lost += _forget(pairs, pair, 1 << slot)
+            if ledger is not None:
+                known = 0.5 * dt * (fx * mx + fy * my + fz * mz) + pairs.slip[pair, slot, 3] - stored
+                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, known)
+            fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
+            push(shape, bodies, i, kind_p, hinged, px, py, pz, fx, fy, fz)
+            push(shape, bodies, j, kind_q, hinged, px, py, pz, -fx, -fy, -fz)
+        for row in range(POINTS, POINTS + found - 1):
+            px, py, pz, fx, fy, fz = out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4], out[row, 5]
+            push(shape, bodies, i, kind_p, hinged, px, py, pz, fx, fy, fz)
+            push(shape, bodies, j, kind_q, hinged, px, py, pz, -fx, -fy, -fz)
+        if pairs.used[pair] & ~used:
+            lost += _forget(pairs, pair, pairs.used[pair] & ~used)
+        pairs.used[pair] = used
+        depth = diameter - (x * x + y * y + z * z) ** 0.5
+        bodies.deepest[i] = max(bodies.deepest[i], depth)
+        bodies.deepest[j] = max(bodies.deepest[j], depth)
+    return lost
+
+
+@part
+def _forget(pairs: Pairs, pair: int, points: int) -> float:
+    """Contacts at some points of a pair have ended.
+
+    Returns:
+        What their tangential springs held [J].
+    """
+    energy = 0.0
+    for slot in range(POINTS):
+        if points & (1 << slot):
+            energy += pairs.slip[pair, slot, 3]
+            for d in range(4):
+                pairs.slip[pair, slot, d] = 0.0
+    pairs.used[pair] &= ~points & 7
+    return energy
+
+
+assert BARE >= 5  # two ends of a stretch, three pairs of hinges

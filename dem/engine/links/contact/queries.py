@@ -1,0 +1,162 @@
+"""What is asked of the contacts at one instant: who touches whom, and what their springs hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dem.engine.links.arrays import LOWER, WALL, Array, Bodies, Ground, Indices, Pairs
+from dem.engine.links.compiler import kernel, part
+from dem.engine.links.contact.bars import meet_bar
+from dem.engine.links.contact.meeting import ENERGY, POINTS, meet
+from dem.engine.links.contact.rims import nearest_to_circle
+from dem.engine.links.shape import Shape
+
+
+@kernel
+def look_at_pairs(
+    shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, met: Indices, touches: Any, depth: Array, out: Array
+) -> tuple[int, float]:
+    """Look at all pairs of links that the wide list holds, which must be good for this instant.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles, posed.
+        pairs: the list.
+        stiffness: kn [N/m].
+        met: (P, 2) written: numbers of the smarticles whose links touch, in order.
+        touches: (N,) points of contact of each smarticle; added to.
+        depth: (N,) deepest contact of each smarticle [m]; brought up to date.
+        out: scratch of `meet`.
+
+    Returns:
+        Rows of `met` that were written, and the energy of all normal springs [J].
+    """
+    links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
+    diameter, count, energy = 2 * shape.radius, 0, 0.0
+    for k in range(pairs.counts[0]):
+        p, q = pairs.first[k], pairs.second[k]
+        bend_p, bend_q = shape.kinds[p % links] != 1, shape.kinds[q % links] != 1
+        if meet(bodies.segments[p], bodies.segments[q], diameter, stiffness, bend_p, bend_q, out) == 0:
+            continue
+        energy += out[ENERGY, 0]
+        i, j, points = p // each, q // each, 0
+        for slot in range(POINTS):
+            if out[slot, 8] > 0.0 and out[slot, 7] > 0.0:
+                points += 1
+        if points == 0:
+            continue
+        met[count, 0], met[count, 1] = i, j
+        count += 1
+        for body in (i, j):
+            touches[body] += points
+        overlap = _overlap(bodies.segments[p], bodies.segments[q], diameter, stiffness, out)
+        depth[i], depth[j] = max(depth[i], overlap), max(depth[j], overlap)
+    return count, energy
+
+
+@part
+def _overlap(p: Array, q: Array, diameter: float, stiffness: float, out: Array) -> float:
+    """Overlap of two links that touch [m], from the energy of the contact at their nearest points."""
+    meet(p, q, diameter, stiffness, False, False, out)
+    share = out[0, 8]
+    return (2 * out[ENERGY, 0] / (stiffness * (2 - share))) ** 0.5
+
+
+@kernel
+def look_at_fixtures(
+    shape: Shape, bodies: Bodies, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float,
+    touches: Any, held: Any, depth: Array, out: Array,
+) -> float:  # fmt: skip
+    """Look at all contacts with fixtures.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles, posed.
+        ground: the fixtures.
+        channel: (1,) half the distance of the walls of a channel [m]; None for a container.
+        hooks: None where there are none.
+        rims: None where the wall has none.
+        stiffness: kn [N/m].
+        touches: (N,) points of contact of each smarticle; added to.
+        held: (N, 6) whether each smarticle touches each part; written.
+        depth: (N,) deepest contact of each smarticle [m]; brought up to date.
+        out: scratch.
+
+    Returns:
+        Energy of all normal springs [J].
+    """
+    segments, radius = bodies.segments, shape.radius
+    links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
+    squares = 0.0
+    for p in range(segments.shape[0]):
+        i = p // each
+        for end in range(0 if shape.kinds[p % links] == 1 else 1, 2):
+            x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
+            if end == 1:
+                x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]
+            for surface in range(3):
+                part_of, found = depth_at(ground, channel, radius, surface, x, y, z)
+                if found > 0.0:
+                    touches[i] += 1
+                    held[i, part_of] = True
+                    depth[i] = max(depth[i], found)
+                    squares += found * found
+        if rims is not None and ground.flags[0] != 0:
+            for rim in range(rims.radii.shape[0]):
+                height = ground.place[WALL] + rims.heights[rim]
+                s = nearest_to_circle(segments[p], rims.radii[rim], height)
+                x, y = segments[p, 0] + s * segments[p, 3], segments[p, 1] + s * segments[p, 4]
+                up, away = segments[p, 2] + s * segments[p, 5] - height, (x * x + y * y) ** 0.5 - rims.radii[rim]
+                found = radius - (up * up + away * away) ** 0.5
+                if found > 0.0 and 1e-6 < s < 1 - 1e-6:
+                    touches[i] += 1
+                    held[i, WALL] = True
+                    depth[i] = max(depth[i], found)
+                    squares += found * found
+        if hooks is not None:
+            for hook in range(2):
+                for bar in range(2):
+                    x, y, z = segments[p, 0], segments[p, 1], segments[p, 2] - ground.place[LOWER + hook]
+                    points = meet_bar(x, y, z, segments[p], hooks.halves[hook, bar], radius, stiffness, out)
+                    if points:
+                        touches[i] += points
+                        held[i, LOWER + hook] = True
+                        depth[i] = max(depth[i], out[0, 7])
+                        squares += out[0, 7] ** 2 * (2 - out[0, 8])
+    return 0.5 * stiffness * squares
+
+
+@part
+def depth_at(
+    ground: Ground, channel: Any, radius: float, surface: int, x: float, y: float, z: float
+) -> tuple[int, float]:
+    """How deep an end of a link is in one of the surfaces that it can touch.
+
+    The same geometry as in `dem.engine.links.contact.walls`, which adds forces.
+
+    Returns:
+        The part, and the depth [m]; not positive where they are apart.
+    """
+    if channel is not None:
+        if surface < 2:
+            return 4 + surface, radius - channel[0] + (-y if surface == 0 else y)
+        return 0, 0.0
+    if surface == 0:
+        return 0, radius - (z - ground.place[0])
+    height, r, tiers = z - ground.place[1], (x * x + y * y) ** 0.5, ground.radii.shape[0]
+    lifted = ground.flags[1] != 0
+    if ground.flags[0] == 0 or height > ground.top:
+        return 1, 0.0
+    if lifted and height < ground.bottoms[0]:
+        under = ((r - ground.radii[0]) ** 2 + (height - ground.bottoms[0]) ** 2) ** 0.5
+        return 1, radius - under if surface == 1 else 0.0
+    tier = 0
+    while tier + 1 < tiers and height > ground.bottoms[tier + 1]:
+        tier += 1
+    if surface == 1:
+        gap = ground.radii[tier] - r
+        return 1, radius - (abs(gap) if lifted else gap)
+    if tier + 1 == tiers or height <= ground.bottoms[tier + 1] - radius:
+        return 1, 0.0
+    up, away = height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
+    return 1, radius + up if away >= 0.0 else radius - (up * up + away * away) ** 0.5

@@ -1,0 +1,229 @@
+"""The links engine behind the interface."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import Particle
+from dem.body.placement import Poses
+from dem.body.state import State
+from dem.engine.interface import Saved
+from dem.engine.links.account import LinksAccount
+from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
+from dem.engine.links.motors import LinksMotors
+from dem.engine.links.strings import LinksStrings
+from dem.engine.links.world import World
+from dem.errors import InputError
+from dem.physics.contact import ContactLaw
+from dem.physics.motor import MotorLaw
+from dem.physics.overlaps import APART, Held, Overlaps
+from dem.setting.container import Cylinder
+from dem.setting.hooks import Cross
+from dem.setting.plane import Channel
+
+Array = NDArray[np.float64]
+
+FORMAT = "links-1"
+
+
+class LinksEngine:
+    """See `dem.engine.interface.Engine`.
+
+    Args:
+        particle: one smarticle.
+        cylinder: the container; its floor is at z = 0 at the start.
+        law: contact law.
+        gravity: g, downwards [m/s²].
+        time_step: dt [s], until another is set.
+        shaken: whether the container will move.
+        motor_law: what all motors have in common; None where smarticles stay welded.
+        account: whether to add up what contacts dissipate.
+        hooks: the lower and the upper hook; None: nothing of a hook exists.
+        channel: table and walls instead of the container; all motion is then confined to a plane.
+        strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
+    """
+
+    def __init__(
+        self,
+        *,
+        particle: Particle,
+        cylinder: Cylinder,
+        law: ContactLaw,
+        gravity: float,
+        time_step: float,
+        shaken: bool,
+        motor_law: MotorLaw | None = None,
+        account: bool = False,
+        hooks: tuple[Cross, Cross] | None = None,
+        channel: Channel | None = None,
+        strengths: Array | None = None,
+    ) -> None:
+        self.particle = particle
+        """See the interface."""
+        self.cylinder = cylinder
+        """See the interface."""
+        self.gravity = gravity
+        """See the interface."""
+        self._world = World(
+            particle=particle,
+            contact=law,
+            ground=ground_for(cylinder, hooks, channel),
+            gravity=gravity,
+            planar=channel is not None,
+            account=account,
+        )
+        self._world.rims = tier_rims(cylinder, channel)
+        if hooks is not None:
+            self._world.add_hooks(np.array([cross.half_extents for cross in hooks]))
+        if channel is not None:
+            self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
+        self.account = LinksAccount(self._world)
+        """See the interface."""
+        self.fixtures = LinksFixtures(self._world, cylinder, shaken=shaken, removed=self.account.removed)
+        """See the interface."""
+        self.motors = LinksMotors(self._world, motor_law, strengths)
+        """See the interface."""
+        self.strings = LinksStrings(self._world)
+        """See the interface."""
+        self._smarticle_seconds = 0.0
+        self._world.set_time_step(time_step)
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """See the interface."""
+        return self._world.time
+
+    @property
+    def steps(self) -> int:
+        """See the interface."""
+        return self._world.steps
+
+    @property
+    def time_step(self) -> float:
+        """See the interface."""
+        return self._world.time_step
+
+    def set_time_step(self, time_step: float) -> None:
+        """See the interface.
+
+        Velocities belong to the middles of steps: a change of the length by Δ puts them in error by Δ/2 times the
+        acceleration at this moment, next to nothing in a pile at rest.
+        """
+        if time_step != self.time_step:
+            self._world.set_time_step(time_step)
+
+    def advance(self, steps: int) -> None:
+        """See the interface."""
+        if steps > 0:
+            self.motors.advance(steps)
+            self._smarticle_seconds += steps * self.time_step * self.count
+
+    # -- smarticles --------------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """See the interface."""
+        return self._world.count
+
+    def add(self, poses: Poses) -> None:
+        """See the interface."""
+        self._world.add(poses)
+        self.account.added += self.particle.boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
+
+    def state(self) -> State:
+        """See the interface."""
+        return self._world.state()
+
+    @property
+    def gravity_impulse(self) -> float:
+        """See the interface."""
+        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity
+
+    def unbalanced_force(self) -> float:
+        """See the interface."""
+        if not self.count or not self.gravity:
+            return math.inf
+        weight = self.particle.boxes.mass * self.gravity
+        forces = self._world.bodies.load[:, :3] - [0.0, 0.0, weight]
+        return float(np.linalg.norm(forces, axis=1).mean() / weight)
+
+    def neighbours(self) -> NDArray[np.int64]:
+        """See the interface."""
+        pairs = np.unique(self._world.look().pairs, axis=0)
+        return np.bincount(pairs.ravel(), minlength=self.count).astype(np.int64)
+
+    def touches(self) -> NDArray[np.int64]:
+        """See the interface."""
+        return self._world.look().touches
+
+    def overlaps(self, limit: float) -> Overlaps:
+        """See the interface; the deepest contact is that of all steps since the last question."""
+        found, world = self._world.look(), self._world
+        depths = np.maximum(found.depths, world.bodies.deepest)
+        world.bodies.deepest[:] = 0.0
+        deep = ~(depths <= limit)
+        return Overlaps(
+            float(depths.max(initial=0.0)), deep, found.elastic_energy, self._held(found.held, deep, APART * limit)
+        )
+
+    def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
+        """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m]."""
+        parts = self.fixtures.parts() if deep.any() else {}
+        found = []
+        for k in np.flatnonzero(deep):
+            touched = [name for name, (part, _) in parts.items() if held[k, part]]
+            for first, second in combinations(touched, 2):
+                apart = abs(parts[first][1] - parts[second][1])
+                if apart > least:
+                    found.append(Held(int(k), (first, second), apart))
+        return tuple(found)
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    def save(self, scratch: Path) -> Saved:
+        """See the interface; needs no files."""
+        content = io.BytesIO()
+        motors = {f"motors.{name}": array for name, array in self.motors.arrays.items()}
+        np.savez(content, **self._world.arrays, **motors)  # type: ignore[arg-type] # the stubs take any keyword for allow_pickle
+        memory: dict[str, Any] = {
+            "format": FORMAT,
+            "world": self._world.memory,
+            "added": self.account.added,
+            "smarticle_seconds": self._smarticle_seconds,
+        }
+        return Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
+
+    def load(self, saved: Saved, scratch: Path) -> None:
+        """See the interface.
+
+        Raises:
+            InputError: it was not saved by this engine.
+        """
+        if saved.memory.get("format") != FORMAT:
+            msg = (
+                f"checkpoint: format {saved.memory.get('format')!r}, here is {FORMAT!r}; it was made by another engine "
+                "or version: resume with that, or start anew"
+            )
+            raise InputError(msg)
+        try:
+            with np.load(io.BytesIO(saved.content)) as file:
+                arrays = {name: file[name] for name in file.files}
+        except (zipfile.BadZipFile, ValueError, OSError) as error:
+            msg = f"checkpoint: not readable by the links engine ({error}); start the run anew"
+            raise InputError(msg) from error
+        self._world.restore(arrays, saved.memory["world"])
+        prefix = "motors."
+        self.motors.restore({name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)})
+        self.account.added = saved.memory["added"]
+        self._smarticle_seconds = saved.memory["smarticle_seconds"]

@@ -1,0 +1,189 @@
+"""What does not give way to smarticles on the links engine: an exact cylinder or its tiers, hooks, or a channel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, UPPER, WALL, Ground, Rims
+from dem.engine.links.world import World
+from dem.errors import RunError
+from dem.setting.container import Cylinder
+from dem.setting.hooks import Cross
+from dem.setting.plane import Channel
+
+Array = NDArray[np.float64]
+
+
+def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None) -> Ground:
+    """The fixtures at the start: floor at z = 0, or the table of a plane."""
+    place = np.zeros(4)
+    if channel is not None:
+        place[FLOOR] = channel.table
+    if hooks is not None:
+        place[[LOWER, UPPER]] = [cross.height for cross in hooks]
+    return Ground(
+        bottoms=np.array([cylinder.bottom, *(bottom for bottom, _ in cylinder.upper)]),
+        radii=np.array([cylinder.radius, *(radius for _, radius in cylinder.upper)]),
+        top=cylinder.height,
+        flags=np.array([int(channel is None), 0]),
+        place=place,
+        speed=np.zeros(4),
+        base=np.zeros(4),
+        shaken=np.zeros(4, dtype=np.int64),
+        wave=np.zeros(3),
+        force=np.zeros((6, 3)),
+        sums=np.zeros((6, 3)),
+    )
+
+
+def tier_rims(cylinder: Cylinder, channel: Channel | None) -> Rims | None:
+    """Edges between the tiers of a wall; None where there are none."""
+    if channel is not None or not cylinder.upper:
+        return None
+    heights, radii = np.array(cylinder.upper).T.copy()
+    return Rims(heights, radii, np.zeros((0, len(radii), 4)), np.zeros((0, len(radii)), np.uint8))
+
+
+class LinksFixtures:
+    """See `dem.engine.interface.Fixtures`.
+
+    Args:
+        world: the simulation.
+        cylinder: the container.
+        shaken: whether the scene shakes it.
+        removed: called with what takes contacts away, to keep the account.
+    """
+
+    def __init__(
+        self, world: World, cylinder: Cylinder, *, shaken: bool, removed: Callable[[Callable[[], None]], None]
+    ) -> None:
+        self._world = world
+        self._top = cylinder.height
+        self._shaken = shaken
+        self._removed = removed
+        self._starts = world.ground.place.copy()
+
+    @property
+    def _ground(self) -> Ground:
+        return self._world.ground
+
+    # -- how they stand ----------------------------------------------------------------------------------------
+
+    @property
+    def floor(self) -> float:
+        """See the interface."""
+        return float(self._ground.place[FLOOR])
+
+    @property
+    def velocity(self) -> float:
+        """See the interface."""
+        return float(self._ground.speed[FLOOR])
+
+    @property
+    def walled(self) -> bool:
+        """See the interface; true between the walls of a channel as well."""
+        channel = self._world.channel
+        return bool(self._ground.flags[0]) or (channel is not None and math.isfinite(channel[0]))
+
+    @property
+    def wall_bottom(self) -> float:
+        """See the interface."""
+        return float(self._ground.place[WALL] + self._ground.bottoms[0]) if self._ground.flags[0] else math.inf
+
+    @property
+    def enclosed(self) -> bool:
+        """See the interface."""
+        return bool(self._ground.flags[0]) and self.wall_bottom < self.floor
+
+    @property
+    def raised(self) -> float | None:
+        """See the interface."""
+        if not self.enclosed:
+            return None
+        if self._world.hooks is None:
+            return 0.0
+        height = self.upper_height - self.floor
+        return None if height > self._top else max(0.0, height - float(self._starts[UPPER]))
+
+    @property
+    def upper_height(self) -> float:
+        """See the interface."""
+        return float(self._ground.place[UPPER])
+
+    # -- how they move -----------------------------------------------------------------------------------------
+
+    def shake(self, *, amplitude: float, frequency: float) -> None:
+        """See the interface."""
+        if not self._shaken:
+            msg = "the engine was built without a shaker"
+            raise RunError(msg)
+        ground, hooked = self._ground, self._world.hooks is not None
+        ground.base[:] = ground.place
+        ground.speed[:] = 0.0
+        ground.shaken[:] = [1, ground.flags[0], hooked, hooked]
+        ground.wave[:] = amplitude, 2 * math.pi * frequency, self._world.time
+
+    def lift_wall(self, speed: float) -> None:
+        """See the interface."""
+        self._ground.speed[WALL] = speed
+        if not self._ground.flags[1]:
+            self._ground.flags[1] = 1
+            self._world.add_rim(float(self._ground.bottoms[0]), float(self._ground.radii[0]))
+
+    def raise_upper(self, speed: float) -> None:
+        """See the interface."""
+        self._ground.speed[UPPER] = speed
+
+    def stop(self) -> None:
+        """See the interface."""
+        self._ground.speed[:] = 0.0
+        self._ground.shaken[:] = 0
+        self._ground.wave[:] = 0.0
+
+    def remove_wall(self) -> None:
+        """See the interface."""
+        self._removed(self._remove_wall)
+
+    def _remove_wall(self) -> None:
+        ground, world = self._ground, self._world
+        ground.flags[0] = 0
+        ground.speed[WALL] = 0.0
+        ground.shaken[WALL] = 0
+        world.ends.slip[:, :, 1:] = 0.0
+        world.ends.used[:] &= 1
+        world.rims = None
+
+    # -- what they feel ----------------------------------------------------------------------------------------
+
+    @property
+    def hook_sums(self) -> Array:
+        """See the interface."""
+        return self._ground.sums[LOWER : UPPER + 1].copy() if self._world.hooks is not None else np.zeros((0, 3))
+
+    @property
+    def channel_sums(self) -> Array:
+        """See the interface."""
+        channel = self._world.channel
+        there = channel is not None and math.isfinite(channel[0])
+        return self._ground.sums[CHANNEL:].copy() if there else np.zeros((0, 3))
+
+    @property
+    def container_force(self) -> Array:
+        """(3,) force of the smarticles on floor and wall in the last step [N]."""
+        force: Array = self._ground.force[: WALL + 1].sum(axis=0)
+        return force
+
+    def parts(self) -> dict[str, tuple[int, float]]:
+        """What smarticles can hold on to, in scenes with hooks: its part, and how far it was raised [m].
+
+        Raised against the floor, since the start.
+        """
+        if self._world.hooks is None:
+            return {}
+        place = self._ground.place - self._starts - (self.floor - self._starts[FLOOR])
+        found = {"the lower hook": (LOWER, 0.0), "the upper hook": (UPPER, float(place[UPPER]))}
+        return found | ({"the wall": (WALL, float(place[WALL]))} if self._ground.flags[0] else {})

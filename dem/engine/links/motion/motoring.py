@@ -1,0 +1,255 @@
+"""Motors in the kernels: what they measure, what they prescribe, and what they exert.
+
+Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The mean
+torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle: τ = dp/dt
+- ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look the rate
+jumps at once, to no more than what τ_max alone would give to a free barb in the period (`acceleration`): a motor turns
+round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the motor. What a jump
+takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
+
+Slip and servo let the angle be free: p is a state of its own, and τ a spring to the command, capped, and for a servo
+damped. It is taken at the middle of the step that begins, so that no stiffness is unstable.
+
+Work and kinetic energy agree to the second order in the time step, in kicks and in jumps exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+from dem.engine.links.arrays import Array, Bodies, Motoring
+from dem.engine.links.compiler import kernel, part
+from dem.engine.links.motion.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
+from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
+from dem.engine.links.shape import Shape
+
+HALT, STALL = range(2)
+BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
+ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the turn in a step
+
+
+@kernel
+def engage(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+    """Take hold of the barbs where they are, without torque; `motors` and `rate` are written."""
+    for i in range(bodies.position.shape[0]):
+        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
+        turn_axes(bodies, i)
+        p1, p2 = momenta(bodies.plane[i], along_normal(bodies, i), 0.0, 0.0)
+        motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
+        for k in range(2):
+            alpha = bodies.alpha[i, k]
+            bodies.rate[i, k] = 0.0
+            motors.command[i, k] = motors.schedule[i, k] = motors.begun[i, k] = alpha
+            motors.torque[i, k] = motors.impulse[i, k] = 0.0
+            motors.halted[i, k] = False
+    motors.elapsed[0] = 0.0
+
+
+@kernel
+def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
+    """Stop all barbs at once: smarticles become rigid. `rate` is written, work up to now is counted.
+
+    Returns:
+        Kinetic energy of the links' motion against each other [J], which is lost.
+    """
+    lost = 0.0
+    note(shape, bodies, motors)
+    for i in range(bodies.position.shape[0]):
+        row, normal = bodies.plane[i], along_normal(bodies, i)
+        p1, p2 = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+        q1, q2 = momenta(row, normal, 0.0, 0.0)
+        lost += 0.5 * (bodies.rate[i, 0] * (p1 - q1) + bodies.rate[i, 1] * (p2 - q2))
+        bodies.rate[i, 0] = bodies.rate[i, 1] = 0.0
+    return lost
+
+
+@kernel
+def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+    """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
+    for i in range(bodies.position.shape[0]):
+        row = bodies.plane[i]
+        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], row)
+        turn_axes(bodies, i)
+        normal = along_normal(bodies, i)
+        if motors.law >= SLIP:
+            bodies.rate[i, 0], bodies.rate[i, 1] = rates(row, normal, motors.momentum[i, 0], motors.momentum[i, 1])
+        p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+        for k in range(2):
+            if motors.elapsed[0] > 0.0:
+                impulse = motors.impulse[i, k]
+                if motors.law < SLIP:
+                    impulse = p[k] - motors.momentum[i, k] - impulse
+                    motors.work[i, k] += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / motors.elapsed[0]
+                motors.torque[i, k] = impulse / motors.elapsed[0]
+            motors.impulse[i, k] = 0.0
+            motors.begun[i, k] = bodies.alpha[i, k]
+            if motors.law < SLIP:
+                motors.momentum[i, k] = p[k]
+    motors.elapsed[0] = 0.0
+
+
+@kernel
+def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
+    """Work of all motors up to now [J]; poses are brought up, nothing else is written."""
+    total = 0.0
+    for i in range(bodies.position.shape[0]):
+        row = bodies.plane[i]
+        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], row)
+        turn_axes(bodies, i)
+        p = momenta(row, along_normal(bodies, i), bodies.rate[i, 0], bodies.rate[i, 1])
+        for k in range(2):
+            total += motors.work[i, k]
+            if motors.law < SLIP and motors.elapsed[0] > 0.0:
+                impulse = p[k] - motors.momentum[i, k] - motors.impulse[i, k]
+                total += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / motors.elapsed[0]
+    return total
+
+
+@kernel
+def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interval: float) -> None:
+    """What the motors do in the control period that begins now.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `rate` is written.
+        motors: written.
+        targets: (N, 2) or (1, 2) angles at the end of the period according to the schedule [rad].
+        interval: length of the period [s].
+    """
+    note(shape, bodies, motors)
+    shared = targets.shape[0] == 1
+    for i in range(bodies.position.shape[0]):
+        r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
+        for k in range(2):
+            target = targets[0 if shared else i, k]
+            if motors.law >= SLIP:
+                most = motors.speed * interval
+                motors.command[i, k] += min(most, max(-most, target - motors.command[i, k]))
+                motors.halted[i, k] = abs(motors.torque[i, k]) >= motors.limit[i, k] * (1 - 1e-9)
+            else:
+                bodies.rate[i, k] = _prescribed(bodies, motors, i, k, target, interval)
+                motors.command[i, k] = bodies.alpha[i, k] + bodies.rate[i, k] * interval
+            motors.schedule[i, k] = target
+        if motors.law < SLIP:
+            row, normal = bodies.plane[i], along_normal(bodies, i)
+            p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+            motors.work[i, 0] += 0.5 * (r1 + bodies.rate[i, 0]) * (p[0] - motors.momentum[i, 0])
+            motors.work[i, 1] += 0.5 * (r2 + bodies.rate[i, 1]) * (p[1] - motors.momentum[i, 1])
+            motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]
+
+
+@part
+def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
+    """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
+    before, most = bodies.rate[i, k], motors.acceleration[i, k]
+    behind = motors.schedule[i, k] - bodies.alpha[i, k]
+    # Catch up as fast as can be braked in time; what the schedule does meanwhile comes on top.
+    catch_up = min(abs(behind) / interval, math.sqrt(2 * BRAKING * most * abs(behind)))
+    rate = (target - motors.schedule[i, k]) / interval + math.copysign(catch_up, behind)
+    rate = min(motors.speed, max(-motors.speed, rate))
+    rate = min(before + most * interval, max(before - most * interval, rate))
+    torque = motors.torque[i, k]
+    halted = abs(torque) >= motors.limit[i, k] and (motors.law == STALL or rate * torque > 0.0)
+    motors.halted[i, k] = halted
+    return 0.0 if halted else rate
+
+
+@part
+def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
+    """Generalised forces of contacts on the angles [N m]: all points move as an angle turns, as the centre of mass
+    does not.
+    """
+    axes, load, row = bodies.axes, bodies.load, bodies.plane[i]
+    share = shape.barb_mass / shape.mass
+    fx = axes[i, 0, 0] * load[i, 0] + axes[i, 1, 0] * load[i, 1] + axes[i, 2, 0] * load[i, 2]
+    fy = axes[i, 0, 1] * load[i, 0] + axes[i, 1, 1] * load[i, 1] + axes[i, 2, 1] * load[i, 2]
+    return (
+        bodies.lever[i, 0] - share * (row[6] * fx + row[7] * fy),
+        bodies.lever[i, 1] - share * (row[8] * fx + row[9] * fy),
+    )
+
+
+@part
+def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float, dt: float) -> tuple[float, float]:
+    """Torques of slipping motors [N m], with what they do to the rates in the step taken into account.
+
+    Args:
+        bodies: the smarticles.
+        motors: the motors.
+        i: the smarticle.
+        r1: rate of angle 1 after the step without the motors [rad/s].
+        r2: the same of angle 2.
+        dt: time step [s].
+    """
+    m1, m2, m12 = mobility(bodies.plane[i])
+    gain1 = 0.5 * dt * motors.stiffness[i, 0] + motors.damping
+    gain2 = 0.5 * dt * motors.stiffness[i, 1] + motors.damping
+    free1 = motors.stiffness[i, 0] * (motors.command[i, 0] - bodies.alpha[i, 0]) - gain1 * r1
+    free2 = motors.stiffness[i, 1] * (motors.command[i, 1] - bodies.alpha[i, 1]) - gain2 * r2
+    # τ = free - gain dt M τ: 2 × 2, then one at its cap, then both.
+    a, b, c, d = 1 + gain1 * dt * m1, gain1 * dt * m12, gain2 * dt * m12, 1 + gain2 * dt * m2
+    determinant = a * d - b * c
+    most1, most2 = motors.limit[i, 0], motors.limit[i, 1]
+    t1, t2 = (d * free1 - b * free2) / determinant, (a * free2 - c * free1) / determinant
+    over1, over2 = abs(t1) > most1, abs(t2) > most2
+    if over1:
+        t1 = math.copysign(most1, t1)
+        t2 = (free2 - c * t1) / d
+    if over2 or abs(t2) > most2:
+        t2 = math.copysign(most2, t2)
+        if not over1:
+            t1 = (free1 - b * t2) / a
+            t1 = min(most1, max(-most1, t1))
+    return t1, t2
+
+
+@part
+def middle_of_step(
+    shape: Shape, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
+) -> tuple[float, float, float]:
+    """Let a smarticle turn and its angles change for a step, its momentum constant; the implicit midpoint rule.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `alpha` is written, and `rate` of free angles.
+        motors: `impulse`, or `momentum` of free angles, is written.
+        i: the smarticle.
+        dt: time step [s].
+        row: (PLANE,) scratch.
+
+    Returns:
+        ω at the middle of the step, in the middle link's axes [rad/s].
+    """
+    axes, momentum = bodies.axes, bodies.momentum
+    m0, m1, m2 = momentum[i, 0], momentum[i, 1], momentum[i, 2]
+    l0 = axes[i, 0, 0] * m0 + axes[i, 1, 0] * m1 + axes[i, 2, 0] * m2
+    l1 = axes[i, 0, 1] * m0 + axes[i, 1, 1] * m1 + axes[i, 2, 1] * m2
+    l2 = axes[i, 0, 2] * m0 + axes[i, 1, 2] * m1 + axes[i, 2, 2] * m2
+    free = motors.law >= SLIP
+    r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
+    p1, p2 = motors.momentum[i, 0], motors.momentum[i, 1]
+    half, x, y, z, g1, g2 = 0.5 * dt, l0, l1, l2, 0.0, 0.0
+    wx, wy, wz = 0.0, 0.0, 0.0
+    for turn in range(ITERATIONS):
+        if turn == 0 or free:
+            lay_out(shape, bodies.alpha[i, 0] + half * r1, bodies.alpha[i, 1] + half * r2, row)
+        if free:
+            r1, r2 = rates(row, z, p1 + half * g1, p2 + half * g2)
+        wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
+        if free:
+            g1, g2 = (
+                lagrange_force(shape, row, 0, wx, wy, wz, r1, r2),
+                lagrange_force(shape, row, 1, wx, wy, wz, r1, r2),
+            )
+        x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
+    wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
+    if free:
+        bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
+        motors.momentum[i, 0] = p1 + dt * g1
+        motors.momentum[i, 1] = p2 + dt * g2
+    else:
+        motors.impulse[i, 0] += dt * lagrange_force(shape, row, 0, wx, wy, wz, r1, r2)
+        motors.impulse[i, 1] += dt * lagrange_force(shape, row, 1, wx, wy, wz, r1, r2)
+    bodies.alpha[i, 0] += dt * r1
+    bodies.alpha[i, 1] += dt * r2
+    return wx, wy, wz

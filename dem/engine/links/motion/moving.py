@@ -1,0 +1,112 @@
+"""One step of the smarticles: momenta change by the forces of this instant, then everything moves.
+
+Leapfrog: momenta of the middle of a step, positions of its ends. Between kicks a smarticle keeps its angular momentum
+in the laboratory exactly; it turns by the implicit midpoint rule for L' = L × ω, which keeps L² and the kinetic energy
+L·I⁻¹L/2 as well, both being quadratic: free spins keep their energy for ever. The turn is Cayley's, which moves L in
+the body frame by just that rule.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from dem.engine.links.arrays import Array, Bodies
+from dem.engine.links.compiler import part
+from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
+from dem.engine.links.motion.planar import rates, spin_of
+from dem.engine.links.motion.poses import SLIP, along_normal
+from dem.engine.links.shape import Shape
+
+
+@part
+def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
+    """Change momenta by the forces in `load` and `lever`, by weight and by motors.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `velocity`, `momentum` and `deepest` are written.
+        motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
+        gravity: g, downwards [m/s²].
+        planar: whether all motion is confined to a horizontal plane.
+        dt: time step [s].
+    """
+    velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
+    share, across = dt / shape.mass, 0.0 if planar else 1.0
+    for i in range(bodies.position.shape[0]):
+        velocity[i, 0] += share * load[i, 0]
+        velocity[i, 1] += share * load[i, 1]
+        velocity[i, 2] += across * (share * load[i, 2] - dt * gravity)
+        momentum[i, 0] += across * dt * load[i, 3]
+        momentum[i, 1] += across * dt * load[i, 4]
+        momentum[i, 2] += dt * load[i, 5]
+        # Who moves by more than a radius in a step may pass through a link unseen: counted as that deep a contact.
+        squared = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
+        turning = bodies.spin[i, 0] ** 2 + bodies.spin[i, 1] ** 2 + bodies.spin[i, 2] ** 2
+        stride = dt * (math.sqrt(squared) + shape.reach * math.sqrt(turning))
+        if stride > shape.radius:
+            bodies.deepest[i] = max(bodies.deepest[i], stride)
+        if motors is not None:
+            q1, q2 = contact_torques(shape, bodies, i)
+            if motors.law < SLIP:
+                motors.impulse[i, 0] += dt * q1
+                motors.impulse[i, 1] += dt * q2
+            else:
+                row, normal = bodies.plane[i], along_normal(bodies, i)
+                p1, p2 = motors.momentum[i, 0] + dt * q1, motors.momentum[i, 1] + dt * q2
+                r1, r2 = rates(row, normal, p1, p2)
+                t1, t2 = free_torques(bodies, motors, i, r1, r2, dt)
+                p1, p2 = p1 + dt * t1, p2 + dt * t2
+                r1, r2 = rates(row, normal, p1, p2)
+                motors.work[i, 0] += 0.5 * dt * t1 * (bodies.rate[i, 0] + r1)
+                motors.work[i, 1] += 0.5 * dt * t2 * (bodies.rate[i, 1] + r2)
+                motors.impulse[i, 0] += dt * t1
+                motors.impulse[i, 1] += dt * t2
+                motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
+                bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
+    if motors is not None:
+        motors.elapsed[0] += dt
+
+
+@part
+def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
+    """Move and turn everything by a step.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles; `position`, `turn` and, while articulated, `alpha` are written.
+        motors: None while welded.
+        dt: time step [s].
+        row: (PLANE,) scratch.
+    """
+    position, velocity, turn = bodies.position, bodies.velocity, bodies.turn
+    for i in range(position.shape[0]):
+        for d in range(3):
+            position[i, d] += dt * velocity[i, d]
+        if motors is not None:
+            wx, wy, wz = middle_of_step(shape, bodies, motors, i, dt, row)
+        else:
+            wx, wy, wz = _rigid(bodies, i, dt)
+        a, b, c, d = turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3]
+        h = 0.5 * dt
+        e = a - h * (b * wx + c * wy + d * wz)
+        f = b + h * (a * wx + c * wz - d * wy)
+        g = c + h * (a * wy - b * wz + d * wx)
+        k = d + h * (a * wz + b * wy - c * wx)
+        norm = 1 / math.sqrt(e * e + f * f + g * g + k * k)
+        turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3] = e * norm, f * norm, g * norm, k * norm
+
+
+@part
+def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
+    """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
+    axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]
+    m0, m1, m2 = momentum[i, 0], momentum[i, 1], momentum[i, 2]
+    l0 = axes[i, 0, 0] * m0 + axes[i, 1, 0] * m1 + axes[i, 2, 0] * m2
+    l1 = axes[i, 0, 1] * m0 + axes[i, 1, 1] * m1 + axes[i, 2, 1] * m2
+    l2 = axes[i, 0, 2] * m0 + axes[i, 1, 2] * m1 + axes[i, 2, 2] * m2
+    x, y, z, half = l0, l1, l2, 0.5 * dt
+    for _ in range(ITERATIONS):
+        wx, wy, wz = spin_of(row, x, y, z, 0.0)
+        x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
+    return spin_of(row, x, y, z, 0.0)

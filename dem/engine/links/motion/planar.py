@@ -1,0 +1,140 @@
+"""Three hinged links in their plane: centre of mass, inertia and generalised momenta in closed form.
+
+Frame: origin at the centre of mass, x along the middle link from hinge 1 to hinge 2, y towards the mouth, z along the
+normal: the middle link's axes. With the angular velocity ω of the middle link and the rates α̇ of the two angles
+
+    T = M V²/2 + ω·I(α)ω/2 + ω_z b(α)·α̇ + α̇·A(α)α̇/2
+
+is the kinetic energy, L = I ω + (b·α̇) z the angular momentum about the centre of mass, and p = ∂T/∂α̇ = b ω_z + A α̇
+the momentum that belongs to the angles. All three follow from Σ m c = 0 about the centre of mass; with f = m_b/M, c_k
+the barbs' centres and u_k = ∂(c_k - c_middle)/∂α_k:
+
+    b_k = s_k I_n + m_b (c_k × u_k),   A_kk = I_n + m_b (1 - f) u_k²,   A_12 = -f m_b u_1·u_2.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.engine.links.compiler import kernel, part
+from dem.engine.links.shape import Shape
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
+    """Work out the plane geometry of one smarticle.
+
+    Args:
+        shape: what all have in common.
+        alpha1: angle of barb 1 [rad]; 0: straight, π/2: the U.
+        alpha2: angle of barb 2 [rad].
+        row: (PLANE,) written: centre of mass from the middle link's centre; then about the centre of mass the
+            centres of the barbs, u_k, the barbs' directions [m, m, 1]; inertia xx, yy, zz, xy [kg m²]; b [kg m²]; A_11
+            (= A_22) and A_12 [kg m²].
+    """
+    c1, s1, c2, s2 = math.cos(alpha1), math.sin(alpha1), math.cos(alpha2), math.sin(alpha2)
+    _lay_out(shape, c1, s1, c2, s2, row)
+
+
+@part
+def _lay_out(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
+    arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
+    share = mb / shape.mass
+    x1, y1, x2, y2 = -shape.half - c1 * arm, s1 * arm, shape.half + c2 * arm, s2 * arm
+    rx, ry = share * (x1 + x2), share * (y1 + y2)
+    x1, y1, x2, y2 = x1 - rx, y1 - ry, x2 - rx, y2 - ry
+    u1x, u1y, u2x, u2y = s1 * arm, c1 * arm, -s2 * arm, c2 * arm
+    middle, barb = shape.middle_inertia, shape.barb_inertia
+    own = barb[0] - barb[1]
+    row[0], row[1], row[2], row[3], row[4], row[5] = rx, ry, x1, y1, x2, y2
+    row[6], row[7], row[8], row[9] = u1x, u1y, u2x, u2y
+    row[10], row[11], row[12], row[13] = -c1, s1, c2, s2
+    row[14] = middle[0] + mm * ry * ry + mb * (y1 * y1 + y2 * y2) + 2 * barb[1] + own * (c1 * c1 + c2 * c2)
+    row[15] = middle[1] + mm * rx * rx + mb * (x1 * x1 + x2 * x2) + 2 * barb[1] + own * (s1 * s1 + s2 * s2)
+    row[16] = middle[2] + mm * (rx * rx + ry * ry) + mb * (x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2) + 2 * barb[2]
+    row[17] = -mm * rx * ry - mb * (x1 * y1 + x2 * y2) + own * (c2 * s2 - c1 * s1)
+    row[18] = -barb[2] + mb * (x1 * u1y - y1 * u1x)
+    row[19] = barb[2] + mb * (x2 * u2y - y2 * u2x)
+    row[20] = barb[2] + mb * (1 - share) * arm * arm
+    row[21] = -share * mb * (u1x * u2x + u1y * u2y)
+
+
+@part
+def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tuple[float, float, float]:
+    """ω = I⁻¹(L - h z) [rad/s], all in the middle link's axes.
+
+    Args:
+        row: plane geometry, see `lay_out`.
+        lx: angular momentum [kg m²/s].
+        ly: the same.
+        lz: the same.
+        internal: h = b·α̇ [kg m²/s].
+    """
+    xx, yy, xy = row[14], row[15], row[17]
+    determinant = xx * yy - xy * xy
+    return (yy * lx - xy * ly) / determinant, (xx * ly - xy * lx) / determinant, (lz - internal) / row[16]
+
+
+@part
+def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
+    """P = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
+    wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
+    return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
+
+
+@part
+def mobility(row: Array) -> tuple[float, float, float]:
+    """(A - b bᵀ/I_zz)⁻¹: 11, 22, 12 [1/(kg m²)]: how impulses of the motors change the rates of a free smarticle."""
+    a, b, c = row[20] - row[18] ** 2 / row[16], row[20] - row[19] ** 2 / row[16], row[21] - row[18] * row[19] / row[16]
+    determinant = a * b - c * c
+    return b / determinant, a / determinant, -c / determinant
+
+
+@part
+def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
+    """α̇ [rad/s] that belongs to p [kg m²/s], the inverse of `momenta`."""
+    m1, m2, m12 = mobility(row)
+    q1, q2 = p1 - row[18] * normal / row[16], p2 - row[19] * normal / row[16]
+    return m1 * q1 + m12 * q2, m12 * q1 + m2 * q2
+
+
+@part
+def lagrange_force(
+    shape: Shape, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
+) -> float:
+    """∂T/∂α_k at fixed ω and α̇ [N m]: centrifugal and Coriolis torque on a barb.
+
+    Args:
+        shape: what all smarticles have in common.
+        row: plane geometry, see `lay_out`.
+        k: 0 for barb 1, 1 for barb 2.
+        wx: ω in the middle link's axes [rad/s].
+        wy: the same.
+        wz: the same.
+        rate1: α̇_1 [rad/s].
+        rate2: α̇_2 [rad/s].
+    """
+    mb, own, share = shape.barb_mass, shape.barb_inertia[0] - shape.barb_inertia[1], shape.barb_mass / shape.mass
+    sign = -1.0 if k == 0 else 1.0
+    cx, cy, ux, uy = row[2 + 2 * k], row[3 + 2 * k], row[6 + 2 * k], row[7 + 2 * k]
+    dx, dy = row[10 + 2 * k], row[11 + 2 * k]
+    # The direction's own derivative is s z × d.
+    ex, ey = -sign * dy, sign * dx
+    turned = 2 * own * dx * ex
+    ixx = 2 * mb * cy * uy + turned
+    iyy = 2 * mb * cx * ux - turned
+    izz = 2 * mb * (cx * ux + cy * uy)
+    ixy = -mb * (cx * uy + cy * ux) + own * (ex * dy + dx * ey)
+    force = 0.5 * (ixx * wx * wx + iyy * wy * wy + izz * wz * wz) + ixy * wx * wy
+    # u_k turns with the barb: its derivative is -arm d.
+    vx, vy = row[8 - 2 * k], row[9 - 2 * k]
+    mine, other = (rate1, rate2) if k == 0 else (rate2, rate1)
+    b_mine = -mb * shape.arm * (cx * dy - cy * dx)
+    b_other = -mb * share * (ux * vy - uy * vx)
+    a_both = share * mb * shape.arm * (dx * vx + dy * vy)
+    return force + wz * (b_mine * mine + b_other * other) + mine * other * a_both

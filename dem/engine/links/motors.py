@@ -1,0 +1,167 @@
+"""The barbs' motors on the links engine: prescribed rates, or free angles; see `dem.engine.links.motion.motoring`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.engine.interface import MotorReadings
+from dem.engine.links.arrays import Motoring
+from dem.engine.links.motion.motoring import engage, look, release, work_so_far
+from dem.engine.links.world import World
+from dem.errors import InputError
+from dem.physics.motor import MotorLaw
+
+Array = NDArray[np.float64]
+
+LAWS = ("halt", "stall", "slip", "servo")
+
+
+class LinksMotors:
+    """See `dem.engine.interface.Motors`.
+
+    Args:
+        world: the simulation.
+        law: what all motors have in common; None in scenes without.
+        strengths: (N, 2) factors on what each can do [1]; None: all are alike.
+
+    Raises:
+        InputError: the engine does not know the law.
+    """
+
+    def __init__(self, world: World, law: MotorLaw | None, strengths: Array | None) -> None:
+        self._world = world
+        self._law = law
+        self._strengths = strengths
+        self._targets: Array | None = None
+        self._interval, self._left = 0.0, 0
+        if law is not None and law.law not in LAWS:
+            msg = f"motor.law: {law.law!r} is not known to the links engine; use {', '.join(LAWS)}, or engine: yade"
+            raise InputError(msg)
+
+    @property
+    def present(self) -> bool:
+        """See the interface."""
+        return self._law is not None
+
+    @property
+    def articulated(self) -> bool:
+        """See the interface."""
+        return self._world.articulated
+
+    def articulate(self) -> None:
+        """See the interface."""
+        world = self._world
+        if world.articulated:
+            return
+        assert self._law is not None  # the engine was built for scenes that never articulate
+        if world.motors is None:
+            world.motors = self._made(self._law)
+        world.set_articulated(True)
+        engage(world.shape, world.bodies, world.motors)
+        self._left = 0
+
+    def weld(self) -> None:
+        """See the interface."""
+        world = self._world
+        if world.articulated:
+            assert world.motors is not None
+            world.totals[0] += release(world.shape, world.bodies, world.motors)
+            world.set_articulated(False)
+            self._left = 0
+
+    def actuate(self, targets: Array, interval: float) -> None:
+        """See the interface."""
+        world = self._world
+        assert world.motors is not None  # only articulated smarticles are actuated
+        self._targets = np.ascontiguousarray(targets, dtype=np.float64)
+        self._interval = interval
+        look(world.shape, world.bodies, world.motors, self._targets, interval)
+        self._left = max(1, round(interval / world.time_step))
+
+    def advance(self, steps: int) -> None:
+        """Make steps; where nobody asks motors to look when their period is over, they look at the old targets."""
+        while steps > 0:
+            if not self._world.articulated or self._targets is None:
+                self._world.advance(steps)
+                return
+            if not self._left:
+                self.actuate(self._targets, self._interval)
+            now = min(steps, self._left)
+            self._world.advance(now)
+            self._left -= now
+            steps -= now
+
+    @property
+    def readings(self) -> MotorReadings | None:
+        """See the interface."""
+        motors = self._world.motors
+        if motors is None:
+            return None
+        return MotorReadings(
+            schedule=motors.schedule.copy(),
+            commands=motors.command.copy(),
+            torques=motors.torque.copy(),
+            work=motors.work.copy(),
+            halted=motors.halted.copy(),
+        )
+
+    @property
+    def work(self) -> float:
+        """See the interface."""
+        world = self._world
+        if world.motors is None:
+            return 0.0
+        if not world.articulated:
+            return float(world.motors.work.sum())
+        return float(work_so_far(world.shape, world.bodies, world.motors))
+
+    def gaps(self) -> Array:
+        """See the interface: hinges do not give way."""
+        return np.zeros((self._world.count, 2))
+
+    def _made(self, law: MotorLaw) -> Motoring:
+        n, shape = self._world.count, self._world.shape
+        factors = np.ones((n, 2)) if self._strengths is None else np.asarray(self._strengths, dtype=np.float64)
+        # What τ_max gives to a barb about a hinge that is held.
+        inertia = shape.barb_inertia[2] + shape.barb_mass * shape.arm**2
+        return Motoring(
+            law=LAWS.index(law.law),
+            speed=float(law.speed_limit),
+            limit=law.torque_limit * factors,
+            stiffness=law.stiffness * factors,
+            damping=float(law.damping),
+            acceleration=law.torque_limit * factors / inertia,
+            command=np.zeros((n, 2)),
+            schedule=np.zeros((n, 2)),
+            torque=np.zeros((n, 2)),
+            work=np.zeros((n, 2)),
+            halted=np.zeros((n, 2), dtype=np.bool_),
+            begun=np.zeros((n, 2)),
+            momentum=np.zeros((n, 2)),
+            impulse=np.zeros((n, 2)),
+            elapsed=np.zeros(1),
+        )
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What `restore` needs."""
+        motors, found = self._world.motors, {}
+        if motors is not None:
+            found = {name: value for name, value in motors._asdict().items() if isinstance(value, np.ndarray)}
+        if self._targets is not None:
+            found["targets"] = self._targets
+        found["period"] = np.array([self._interval, self._left])
+        return found
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Go on from where `arrays` were taken; the smarticles are there already."""
+        world = self._world
+        world.motors, self._targets = None, arrays.get("targets")
+        self._interval, self._left = float(arrays["period"][0]), int(arrays["period"][1])
+        if "command" in arrays:
+            assert self._law is not None  # a checkpoint belongs to its scene
+            made = self._made(self._law)
+            world.motors = made._replace(**{name: arrays[name] for name in arrays if name in made._fields})

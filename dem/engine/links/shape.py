@@ -1,0 +1,78 @@
+"""A smarticle as this engine sees it: masses, lengths, and the strands that its links are made of.
+
+Every link is swept by one sphere along one segment, or along several parallel ones: its strands. That is the limit of
+the sphere chains of `dem.body.particle` as their pitch goes to zero: same section, same tips.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import Particle
+
+Array = NDArray[np.float64]
+
+
+class Shape(NamedTuple):
+    """What all smarticles have in common, for the kernels. Lengths in m, masses in kg, inertias in kg m².
+
+    Args:
+        mass: of a smarticle.
+        middle_mass: of the middle link.
+        barb_mass: of one barb.
+        half: half the length of the middle link: the hinges are this far from its centre.
+        arm: half the length of a barb: its centre of mass is this far from the hinge.
+        middle_inertia: (3,) of the middle link about its centre: along it, in the plane, along the normal.
+        barb_inertia: (3,) the same of a barb.
+        end: how far the middle link's axis reaches from its centre: the hinges, but for a bar without barbs.
+        tip: how far a barb's axis reaches from the hinge: its tip less the radius.
+        radius: of the sphere that sweeps the links.
+        offsets: (strands,) of the strands along the normal.
+        kinds: (links,) which links carry contact: 0 barb 1, 1 the middle link, 2 barb 2.
+        reach: no point of a smarticle is farther from its centre of mass, whatever its angles.
+    """
+
+    mass: float
+    middle_mass: float
+    barb_mass: float
+    half: float
+    arm: float
+    middle_inertia: Array
+    barb_inertia: Array
+    end: float
+    tip: float
+    radius: float
+    offsets: Array
+    kinds: NDArray[np.int64]
+    reach: float
+
+
+def shape_of(particle: Particle) -> Shape:
+    """The shape of a particle.
+
+    Sources: tips pulled in by the radius, hinges inside the middle link: as spheres are put in `dem.body.particle`.
+    """
+    boxes, radius = particle.boxes, particle.radius
+    masses, inertias = boxes.link_masses, boxes.link_inertias
+    length, barb = boxes.middle_length, boxes.barb_length
+    rows = particle.chain.rows
+    reach = (boxes.thickness_normal - particle.chain.diameter) / 2
+    barbed = barb > radius  # the tip of a shorter one is inside the sphere at the hinge
+    return Shape(
+        mass=boxes.mass,
+        middle_mass=float(masses[1]),
+        barb_mass=float(masses[0]),
+        half=length / 2,
+        arm=barb / 2,
+        middle_inertia=np.ascontiguousarray(inertias[1]),
+        barb_inertia=np.ascontiguousarray(inertias[0]),
+        end=length / 2 if barb > 0 else length / 2 - radius,
+        tip=max(0.0, barb - radius),
+        radius=radius,
+        offsets=np.zeros(1) if rows == 1 else np.linspace(-reach, reach, rows),
+        kinds=np.array([0, 1, 2] if barbed else [1], dtype=np.int64),
+        reach=length / 2 + barb + boxes.thickness_normal + radius,
+    )

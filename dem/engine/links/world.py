@@ -1,0 +1,379 @@
+"""All arrays of one simulation, and how they change between calls of the kernels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import Particle
+from dem.body.placement import Poses
+from dem.body.state import State
+from dem.engine.links.arrays import (
+    PLANE,
+    SLOTS,
+    SURFACES,
+    Bodies,
+    Cells,
+    Cords,
+    Ends,
+    Ground,
+    Hooks,
+    Law,
+    Motoring,
+    Pairs,
+    Rims,
+    cells_for,
+    joined,
+    no_bodies,
+    pairs_for,
+)
+from dem.engine.links.contact.meeting import COLUMNS, ROWS
+from dem.engine.links.contact.queries import look_at_fixtures, look_at_pairs
+from dem.engine.links.motion.planar import lay_out
+from dem.engine.links.motion.poses import pose
+from dem.engine.links.shape import shape_of
+from dem.engine.links.stepping import advance
+from dem.errors import refuse
+from dem.physics.contact import ContactLaw
+
+Array = NDArray[np.float64]
+
+# Skins and the longest piece of a link, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
+NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.8), 1.0
+NEAR_STEPS, WIDE_STEPS = 6, 80  # that they are to last, about
+FAR = 1e30  # m; where a link is marked that was not there when the list was built
+GROWTH = 1.5  # of a list that is full
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """All contacts at one instant.
+
+    Args:
+        pairs: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once.
+        touches: (N,) points of contact of each smarticle.
+        depths: (N,) deepest contact of each [m].
+        held: (N, 6) whether each touches each part of the fixtures, see `Ground`.
+        elastic_energy: in all springs [J].
+    """
+
+    pairs: NDArray[np.int64]
+    touches: NDArray[np.int64]
+    depths: Array
+    held: NDArray[np.bool_]
+    elastic_energy: float
+
+
+@dataclass
+class World:
+    """The simulation: what kernels get.
+
+    Args:
+        particle: one smarticle.
+        contact: the contact law.
+        ground: the fixtures.
+        gravity: g, downwards [m/s²].
+        planar: whether all motion is confined to the plane z = 0.
+        account: whether to add up what contacts dissipate.
+    """
+
+    particle: Particle
+    contact: ContactLaw
+    ground: Ground
+    gravity: float
+    planar: bool
+    account: bool
+    steps: int = 0
+    time_step: float = math.nan
+    motors: Motoring | None = None
+    articulated: bool = False
+    begin: float = 0.0
+    """When steps of the present length began [s]."""
+    made: int = 0
+    """Steps of the present length so far."""
+    totals: Array = field(default_factory=lambda: np.zeros(2))
+    hooks: Hooks | None = None
+    rims: Rims | None = None
+    channel: Array | None = None
+    cords: Cords | None = None
+
+    def __post_init__(self) -> None:
+        law = self.contact
+        self.shape = shape_of(self.particle)
+        self.laws = tuple(
+            Law(law.normal_stiffness, law.tangential_stiffness, damping, damping * law.tangential_damping, friction)
+            for damping, friction in ((law.normal_damping, law.friction), (law.wall_damping, law.wall_friction))
+        )
+        self.each = len(self.shape.kinds) * len(self.shape.offsets)
+        self.bodies: Bodies = no_bodies(self.each)
+        self.pairs: Pairs = pairs_for(0, 0, 256)
+        self.cells: Cells = cells_for(0, 0, 0, 256, 64)
+        self.ends = Ends(np.zeros((0, 2, SURFACES, 4)), np.zeros((0, 2), np.uint8))
+        self.ledger: Array | None = np.zeros((256, 11)) if self.account else None
+        self.out, self.row = np.zeros((ROWS, COLUMNS)), np.zeros(PLANE)
+        diameter = 2 * self.shape.radius
+        self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, PIECE])
+
+    @property
+    def count(self) -> int:
+        """Smarticles."""
+        return len(self.bodies.position)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.begin + self.made * self.time_step
+
+    @property
+    def hinged(self) -> Motoring | None:
+        """The motors while smarticles are articulated, None while they are welded: as kernels want it."""
+        return self.motors if self.articulated else None
+
+    def set_time_step(self, time_step: float) -> None:
+        """Take steps of another length [s] from now on."""
+        if self.made:
+            self.begin, self.made = self.time, 0
+        self.time_step = time_step
+        self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
+
+    def add(self, poses: Poses) -> None:
+        """Add smarticles of the particle's own shape, at rest."""
+        new, boxes = len(poses.positions), self.particle.boxes
+        fresh = no_bodies(self.each)
+        rigid = 3 if self.articulated else 1
+        sizes = {"segments": new * self.each, "motion": new * rigid}
+        fresh = Bodies(
+            *(
+                np.zeros((sizes.get(name, new), *array.shape[1:]), array.dtype)
+                for name, array in zip(Bodies._fields, fresh, strict=True)
+            )
+        )
+        fresh.position[:] = poses.positions
+        # Poses are those of the principal axes; here the axes are the middle link's.
+        for i, rotation in enumerate(poses.rotations):
+            fresh.turn[i] = quaternion_of(rotation.as_matrix() @ boxes.link_rotations[1])
+        fresh.alpha[:] = boxes.angles
+        for i in range(new):
+            lay_out(self.shape, *boxes.angles, fresh.plane[i])
+        self.bodies = joined(self.bodies, fresh)
+        links = self.count * self.each
+        old = self.pairs
+        self.pairs = pairs_for(links, self.count, len(old.first))._replace(
+            first=old.first, second=old.second, slip=old.slip, used=old.used, near=old.near, counts=old.counts
+        )
+        self.forget_places()
+        self._make_room_at_fixtures()
+        self.make_room()
+
+    def _make_room_at_fixtures(self) -> None:
+        links = self.count * self.each
+        self.ends = Ends(*(longer(array, links) for array in self.ends))
+        if self.hooks is not None:
+            self.hooks = self.hooks._replace(slip=longer(self.hooks.slip, links), used=longer(self.hooks.used, links))
+        if self.rims is not None:
+            self.rims = self.rims._replace(slip=longer(self.rims.slip, links), used=longer(self.rims.used, links))
+
+    def add_hooks(self, halves: Array) -> None:
+        """Add the two hooks, with (2, 2, 3) half edges of their bars [m]."""
+        self.hooks = Hooks(halves, np.zeros((0, 2, 2, SLOTS, 4)), np.zeros((0, 2, 2), np.uint8))
+        self._make_room_at_fixtures()
+
+    def add_rim(self, height: float, radius: float) -> None:
+        """Add an edge of the wall at a height above its place [m], of a radius [m]."""
+        links = self.count * self.each
+        old = self.rims or Rims(np.zeros(0), np.zeros(0), np.zeros((links, 0, 4)), np.zeros((links, 0), np.uint8))
+        self.rims = Rims(
+            np.append(old.heights, height),
+            np.append(old.radii, radius),
+            np.concatenate([old.slip, np.zeros((links, 1, 4))], axis=1),
+            np.concatenate([old.used, np.zeros((links, 1), np.uint8)], axis=1),
+        )
+
+    def set_articulated(self, articulated: bool) -> None:
+        """Have velocities for each link, or for whole smarticles."""
+        self.articulated = articulated
+        self.bodies = self.bodies._replace(motion=np.zeros(((3 if articulated else 1) * self.count, 6)))
+
+    def forget_places(self) -> None:
+        """Have neighbours looked for anew at the next step."""
+        for marks in (self.pairs.wide_marks, self.pairs.near_marks):
+            marks[:, :6], marks[:, 6] = FAR, 0.0
+
+    def make_room(self, capacity: int = 0) -> None:
+        """Make the lists as long as so many smarticles need, or for `capacity` pairs at least."""
+        links = self.count * self.each
+        capacity = max(capacity, 12 * links + 256, len(self.pairs.first))
+        if capacity > len(self.pairs.first):
+            grown = (
+                longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near")
+            )
+            first, second, slip, used, near = grown
+            self.pairs = self.pairs._replace(first=first, second=second, slip=slip, used=used, near=near)
+        longest = [self.shape.tip, 2 * self.shape.end, self.shape.tip]
+        piece = self.skins[-1]
+        pieces = sum(math.ceil(longest[kind] / piece + 1e-9) for kind in self.shape.kinds) * len(self.shape.offsets)
+        if len(self.cells.rows) != links + 1 or len(self.cells.first) != capacity:
+            self.cells = cells_for(links, self.count, pieces * self.count, capacity, 4 * pieces * self.count + 64)
+        if self.ledger is not None:
+            rows = 3 * capacity // 2 + 6 * links
+            if len(self.ledger) < rows:
+                self.ledger = np.zeros((rows, 11))
+
+    def advance(self, steps: int) -> None:
+        """Make whole steps, however many calls that takes."""
+        target = self.made + steps
+        while self.made < target:
+            made = self._call(target - self.made)
+            self.made += made
+            self.steps += made
+            if self.made < target:
+                self.make_room(int(GROWTH * len(self.pairs.first)))
+
+    def _call(self, steps: int) -> int:
+        made: int = advance(
+            steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
+            self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
+            self.hooks, self.rims, self.channel, self.cords, self.ledger, self.out, self.row, self.totals,
+        )  # fmt: skip
+        return made
+
+    def posed(self) -> Bodies:
+        """The smarticles with everything brought up to this instant that follows from their state."""
+        pose(self.shape, self.bodies, self.hinged)
+        return self.bodies
+
+    def state(self) -> State:
+        """Poses and velocities of all links.
+
+        Raises:
+            RunError: the simulation has blown up.
+        """
+        bodies, boxes, n = self.posed(), self.particle.boxes, self.count
+        broken = ~(np.isfinite(bodies.position).all(axis=1) & np.isfinite(bodies.spin).all(axis=1))
+        refuse(
+            broken,
+            self.time,
+            "positions or velocities are no numbers, the simulation has blown up",
+            "lower fidelity.time_step_fraction",
+        )
+        plane, axes = bodies.plane, bodies.axes
+        # Centres and directions of the links in the middle link's frame, about the centre of mass.
+        centres = np.stack([plane[:, 2:4], -plane[:, 0:2], plane[:, 4:6]], axis=1)
+        middle = np.tile([1.0, 0.0], (n, 1))
+        along = np.stack([plane[:, 10:12], middle, plane[:, 12:14]], axis=1)
+        across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+        arms = np.einsum("nij,nkj->nki", axes[:, :, :2], centres)
+        frames = np.empty((n, 3, 3, 3))
+        frames[..., 0] = np.einsum("nij,nkj->nki", axes[:, :, :2], along)
+        frames[..., 1] = np.einsum("nij,nkj->nki", axes[:, :, :2], across)
+        frames[..., 2] = axes[:, None, :, 2]
+        motion = (
+            np.repeat(bodies.motion[:, None], 3, axis=1) if not self.articulated else bodies.motion.reshape(n, 3, 6)
+        )
+        velocities = motion[..., :3] + np.cross(motion[..., 3:], arms)
+        return State(boxes, bodies.position[:, None] + arms, frames, velocities, motion[..., 3:].copy())
+
+    def look(self) -> Contacts:
+        """All contacts at this instant; nothing of the simulation is changed.
+
+        The wide list tells who is near whom. It has room for what the last step has moved, but does not know of
+        smarticles that were added since.
+        """
+        bodies, n = self.posed(), self.count
+        touches, depths, held = np.zeros(n, np.int64), np.zeros(n), np.zeros((n, 6), np.bool_)
+        met = np.zeros((self.pairs.counts[0], 2), np.int32)
+        stiffness = self.laws[0].stiffness
+        count, energy = look_at_pairs(self.shape, bodies, self.pairs, stiffness, met, touches, depths, self.out)
+        energy += look_at_fixtures(
+            self.shape, bodies, self.ground, self.channel, self.hooks, self.rims, self.laws[1].stiffness,
+            touches, held, depths, self.out,
+        )  # fmt: skip
+        sheared = [self.pairs.slip[: self.pairs.counts[0]], self.ends.slip]
+        sheared += [more.slip for more in (self.hooks, self.rims) if more is not None]
+        energy += sum(float(slip[..., 3].sum()) for slip in sheared)
+        return Contacts(met[:count].astype(np.int64), touches, depths, held, energy)
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All arrays that `restore` needs."""
+        found: dict[str, NDArray[Any]] = {"totals": self.totals, "fast": self.skins}
+        pairs, near = int(self.pairs.counts[0]), int(self.pairs.counts[1])
+        for group, values in self._groups().items():
+            for name, array in values._asdict().items():
+                if isinstance(array, np.ndarray):
+                    found[f"{group}.{name}"] = array
+        for name in ("first", "second", "slip", "used"):
+            found[f"pairs.{name}"] = getattr(self.pairs, name)[:pairs]
+        found["pairs.near"] = self.pairs.near[:near]
+        return found
+
+    def _groups(self) -> dict[str, Any]:
+        groups = {
+            "bodies": self.bodies,
+            "pairs": self.pairs,
+            "ends": self.ends,
+            "ground": self.ground,
+            "hooks": self.hooks,
+            "rims": self.rims,
+            "cords": self.cords,
+        }
+        return {name: group for name, group in groups.items() if group is not None}
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Plain data that `restore` needs besides the arrays."""
+        return {
+            "steps": self.steps,
+            "time_step": self.time_step,
+            "begin": self.begin,
+            "made": self.made,
+            "articulated": self.articulated,
+        }
+
+    def restore(self, arrays: dict[str, NDArray[Any]], memory: Mapping[str, Any]) -> None:
+        """Go on from where `arrays` and `memory` were taken."""
+
+        def group(kind: Any, name: str) -> Any:
+            return kind(**{field: arrays[f"{name}.{field}"] for field in kind._fields})
+
+        self.steps, self.time_step, self.begin, self.made, self.articulated = (
+            memory[name] for name in ("steps", "time_step", "begin", "made", "articulated")
+        )
+        self.totals, self.skins = arrays["totals"], arrays["fast"]
+        self.bodies, self.pairs, self.ends = group(Bodies, "bodies"), group(Pairs, "pairs"), group(Ends, "ends")
+        fixed = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
+        self.ground = self.ground._replace(**fixed)
+        self.hooks = group(Hooks, "hooks") if "hooks.slip" in arrays else None
+        self.rims = group(Rims, "rims") if "rims.slip" in arrays else None
+        self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
+        self.make_room()
+
+
+def quaternion_of(matrix: Array) -> Array:
+    """(4,) unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
+    m = matrix
+    squares = np.array([m.trace(), *np.diag(m)])
+    k = int(squares.argmax())
+    if k == 0:
+        q = np.array([1 + m.trace(), m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    elif k == 1:
+        q = np.array([m[2, 1] - m[1, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]])
+    elif k == 2:
+        q = np.array([m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1 + m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]])
+    else:
+        q = np.array([m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1 + m[2, 2] - m[0, 0] - m[1, 1]])
+    unit: Array = q / np.linalg.norm(q)
+    return unit
+
+
+def longer(array: NDArray[Any], length: int) -> NDArray[Any]:
+    """The array with zeros appended up to a length."""
+    more = np.zeros((length - len(array), *array.shape[1:]), array.dtype)
+    return np.concatenate([array, more])
