@@ -357,6 +357,7 @@ class KindDouble:
 
     name = "double"
     damps_once_per_look = False
+    actuated_share = 1.0
     built: list[EngineDouble]
 
     def __init__(self) -> None:
@@ -377,7 +378,7 @@ class KindDouble:
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+    def seconds_per_step(self, scene: Demand) -> float:
         return 1e-6
 
     def build(self, scene: Demand, time_step: float) -> EngineDouble:

@@ -98,7 +98,7 @@ class Stuck:
 
 def stopping(data: dict[str, Any]) -> dict[str, Any]:
     """What is said when YADE stops, and steps after advances by none."""
-    engine = build(load(data))
+    engine = build(scene_of(data))
     engine.advance(7)
     for none in (0, -3):
         engine.advance(none)

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.errors import RunError
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.recorder import WATCH_STEPS, Recorder
 from dem.scene.scene import Scene
@@ -30,7 +30,7 @@ def start(out: Path, heights: Sequence[float] = (0.02, 0.03), **changes: Any) ->
     engine = EngineDouble.of(scene, DT)
     positions = np.array([[0.0, 0.0, height] for height in heights]).reshape(-1, 3)
     engine.add(Poses(positions, (Rotation.identity(),) * len(heights)))
-    return scene, engine, build_recorder(scene, out, Progress(out, scene.count, show=False))
+    return scene, engine, build_recorder(scene, out, ProgressWriter(out, scene.count, show=False))
 
 
 def take(engine: EngineDouble, recorder: Recorder, samples: int) -> None:
@@ -79,7 +79,7 @@ def test_it_goes_on_from_its_memory_and_takes_away_what_came_after(tmp_path: Pat
     memory, columns, saved = json.loads(json.dumps(recorder.memory)), recorder.series.columns, engine.save(tmp_path)
     take(engine, recorder, 8)
     ends = files(tmp_path), recorder.series.columns
-    again = build_recorder(scene, tmp_path, Progress(tmp_path, scene.count, show=False))
+    again = build_recorder(scene, tmp_path, ProgressWriter(tmp_path, scene.count, show=False))
     engine = EngineDouble.of(scene, DT)
     engine.load(saved, tmp_path)
     again.restore(memory, columns)
