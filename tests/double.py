@@ -260,19 +260,22 @@ class EngineDouble:
             self._step()
 
     def _step(self) -> None:
-        dt, carried = self.time_step, self._standing
-        before = self._energy(carried)
+        dt, carried, floor = self.time_step, self._standing, self.fixtures.floor
+        falling = ~carried
         self.fixtures.step(dt)
         self.strings.step(dt)
         self.time, self.steps = self.time + dt, self.steps + 1
         self._seconds += dt * self.count
         if self.planar:
+            self.velocities[:] = 0.0
             for k, velocity in self.strings.velocities.items():
                 self.velocities[k, 0] = velocity
-            self.positions += dt * self.velocities
-            self.strings.places = self.state().link_positions
+                self.positions[k, 0] += dt * velocity
+                self.strings.places[k, :, 0] += dt * velocity
             return
-        ground, falling = self.fixtures.floor + self.stands, ~carried
+        if self.fixtures.floor == floor and not (self.drift or self.velocities.any() or falling.any()):
+            return
+        ground, before = self.fixtures.floor + self.stands, self._energy(carried)
         along = [self.drift, 0.0, self.fixtures.velocity]
         self.positions[carried, 0] += self.drift * dt
         self.positions[carried, 2], self.velocities[carried] = ground[carried], along
@@ -354,6 +357,7 @@ class KindDouble:
 
     name = "double"
     damps_once_per_look = False
+    actuated_share = 1.0
     built: list[EngineDouble]
 
     def __init__(self) -> None:
@@ -374,7 +378,7 @@ class KindDouble:
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+    def seconds_per_step(self, scene: Demand) -> float:
         return 1e-6
 
     def build(self, scene: Demand, time_step: float) -> EngineDouble:

@@ -1,13 +1,18 @@
-"""Plain data of small scenes that are valid until a test breaks them, and how to change it."""
+"""What tests are about: small scenes, valid until a test breaks them, and the paper's smarticle."""
 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from typing import Any
 
+from dem.body.particle import Boxes, Particle, SphereChain
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
+
+W, T1, T2, RHO = 0.0117, 1.27e-3, 0.5e-3, 7850.0  # the paper's smarticle
+U = (90.0, 90.0)
 
 SMALL: dict[str, Any] = {
     "schema_version": 1,
@@ -67,3 +72,22 @@ def small(changes: Mapping[str, Any] | None = None) -> Scene:
 def chain(changes: Mapping[str, Any] | None = None) -> Scene:
     """A chain."""
     return parse_scene(changed(CHAIN, changes or {}), source="chain.yaml")
+
+
+def make_boxes(ratio: float = 0.7, angles: tuple[float, float] = U, scale: float = 1.0) -> Boxes:
+    """The paper's smarticle with barbs of l/w and angles [deg], all lengths scaled."""
+    return Boxes(
+        middle_length=W * scale,
+        barb_length=ratio * W * scale,
+        thickness_normal=T1 * scale,
+        thickness_in_plane=T2 * scale,
+        density=RHO,
+        angles=(math.radians(angles[0]), math.radians(angles[1])),
+    )
+
+
+def make_particle(
+    ratio: float = 0.7, angles: tuple[float, float] = U, *, rows: int = 1, diameter: float = 1.2e-3, pitch: float = 1.0
+) -> Particle:
+    """The same with its spheres, a pitch in diameters."""
+    return Particle(make_boxes(ratio, angles), SphereChain(rows=rows, diameter=diameter, pitch=pitch * diameter))

@@ -16,26 +16,17 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
-from dem.plan.steps import time_step
+from dem.engine.yade.kind import hinge_law, motor_law
 from dem.scene.scene import Scene
-from dem.setting.container import Cylinder
 from smarticles.verification.bench import bodies, drive
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
-def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> YadeEngine:
-    """A wide container, so that nothing but the floor is near."""
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=Cylinder(radius=radius, height=scene.cylinder.height, facets=16),
-        law=contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
-        time_step=dt or time_step(scene),
-        shaken=False,
-        hinges=(hinge_law(scene), motor_law(scene)),
-    )
+def build(scene: Scene, *, dt: float | None = None, radius: float = 0.5, **instead: Any) -> YadeEngine:
+    """An engine for smarticles that are articulated."""
+    hinges = (hinge_law(scene), motor_law(scene))
+    return cases.build(scene, dt=dt, radius=radius, facets=16, hinges=hinges, **instead)
 
 
 def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, YadeEngine]:

@@ -19,7 +19,6 @@ from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
 from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
-from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.run.run import run_scene
 from dem.run.sampler import Sampler
@@ -30,22 +29,18 @@ from smarticles.verification.known.floor import resting
 
 
 def build(
-    scene: Scene,
-    *,
-    law: ContactLaw | None = None,
-    gravity: float | None = None,
-    dt: float | None = None,
-    radius: float | None = None,
-    shaken: bool = False,
+    scene: Scene, *, dt: float | None = None, radius: float | None = None, facets: int = 64, **instead: Any
 ) -> YadeEngine:
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=64),
-        law=law or contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
-        time_step=dt or time_step(scene),
-        shaken=shaken,
-    )
+    """An engine of a scene, welded and at rest, or of what `instead` says."""
+    made = {
+        "particle": scene.particle,
+        "cylinder": Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=facets),
+        "law": contact_law_of(scene),
+        "gravity": scene.gravity_m_per_s2,
+        "time_step": dt or time_step(scene),
+        "shaken": False,
+    }
+    return YadeEngine(**(made | instead))
 
 
 def version() -> str:
@@ -98,7 +93,7 @@ class Stuck:
 
 def stopping(data: dict[str, Any]) -> dict[str, Any]:
     """What is said when YADE stops, and steps after advances by none."""
-    engine = build(load(data))
+    engine = build(scene_of(data))
     engine.advance(7)
     for none in (0, -3):
         engine.advance(none)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from cases import add
 from scipy.spatial.transform import Rotation
@@ -16,7 +14,6 @@ from dem.phases.arrange import chain_of
 from dem.physics.strings import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
-from dem.run.run import run_scene
 from dem.scene.scene import Scene
 from smarticles.verification.bench import scene_of
 
@@ -112,13 +109,6 @@ def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
         "angles": state.angles,
         "steps": engine.steps,
     }
-
-
-def series(data: dict[str, Any], out: str) -> dict[str, Any]:
-    """A whole run and its series."""
-    run_scene(scene_of(data), Path(out), command="test", progress=False)
-    with h5py.File(Path(out) / "series.h5") as file:
-        return {name: file[name][()] for name in file}
 
 
 def bodies(data: dict[str, Any]) -> dict[str, int]:

@@ -6,15 +6,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+import cases
 import numpy as np
 from cases import pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine.effect import EffectName
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
-from dem.plan.steps import time_step
 from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
@@ -28,15 +27,9 @@ def build(scene: Scene, *, radius: float | None = None) -> YadeEngine:
     cylinder = scene.cylinder
     if radius is not None:
         cylinder = type(cylinder)(radius=radius, height=cylinder.height, facets=cylinder.facets)
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=cylinder,
-        law=contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2,
-        time_step=time_step(scene),
-        shaken=any(phase.type == "shake" for phase in scene.phases),
-        hooks=None if scene.hooks is None else scene.hooks.crosses,
-    )
+    hooks = None if scene.hooks is None else scene.hooks.crosses
+    shaken = any(phase.type == "shake" for phase in scene.phases)
+    return cases.build(scene, cylinder=cylinder, shaken=shaken, hooks=hooks)
 
 
 def damped(engine: YadeEngine, damping: float) -> None:

@@ -206,62 +206,6 @@ def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, 
     assert force == pytest.approx(-5 * mass * 9.81, rel=0.1)
 
 
-@pytest.mark.parametrize(("speed", "unbalanced"), [("1e-18", "1e+09"), ("1e+09", "1e-18")])
-def test_impossible_settle_criterion_fails_with_the_residuals(
-    simulate: Simulate, scene_data: SceneData, tmp_path: Path, speed: str, unbalanced: str
-) -> None:
-    # Each of the two by itself keeps a pile from counting as settled.
-    settle = {"speed_m_per_s": float(speed), "unbalanced_force": float(unbalanced), "timeout_s": 0.05}
-    out = tmp_path / "run"
-    answer = simulate(cases.run, scene_data({"phases.0.settle": settle}), str(out))
-    assert answer["error"] == "RunError"
-    found = re.fullmatch(
-        r"the pile has not settled after 0\.05 s: speed (\S+) m/s \(limit (\S+) m/s\), unbalanced force (\S+) "
-        r"\(limit (\S+)\); raise phases\.0\.settle\.timeout_s or its limits.*",
-        answer["text"],
-    )
-    assert found
-    assert (found[2], found[4]) == (speed, unbalanced)
-    assert 0 < float(found[1]) < 1
-    assert float(found[3]) > 0
-    failed = read_json(out / "failed.json")
-    assert (failed["status"], failed["cause"]) == ("failed", answer["text"])
-    assert not (out / "done.json").exists()
-    assert failed["time_s"] >= 0.05
-    assert len(meshio.read(frame_files(out)[0]).points) > 0
-    assert series(out)["time_s"][-1] == pytest.approx(failed["time_s"], abs=0.005)
-    assert answer["text"] in (out / "log.txt").read_text()
-
-
-@pytest.mark.parametrize(
-    ("held", "what"),
-    [
-        ({"run.json": "{}", "frames.pvd": "x"}, "a run and is left as it is; go on with it by --resume, or choose"),
-        ({"notes.txt": "mine"}, "files (notes.txt, …) and is left as it is; choose"),
-    ],
-)
-def test_directory_that_holds_something_is_left_as_it_is(
-    simulate: Simulate, scene_data: SceneData, tmp_path: Path, held: dict[str, str], what: str
-) -> None:
-    for name, text in held.items():
-        (tmp_path / name).write_text(text)
-    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    answer = simulate(cases.run, scene_data(), str(tmp_path))
-    assert answer["error"] == "InputError"
-    assert answer["text"] == f"--out {tmp_path}: holds {what} another directory"
-    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
-
-
-def test_out_that_is_a_file_is_refused(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:
-    out = tmp_path / "taken"
-    out.write_text("mine")
-    answer = simulate(cases.run, scene_data(), str(out))
-    assert answer["error"] == "InputError"
-    assert answer["text"] == f"--out {out}: cannot be made (File exists); choose another directory"
-    assert out.read_text() == "mine"
-
-
 def test_bars_without_barbs_settle(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:
     # l/w = 0 is in the range that must work.
     data = scene_data({"smarticle.aspect_ratio": 0, "count": 20, "phases": [{"type": "deposit"}]})

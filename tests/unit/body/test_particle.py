@@ -10,33 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import RHO, T1, T2, U, W, make_boxes, make_particle
 from scipy.stats import qmc
 
-from dem.body.particle import Boxes, Particle, SphereChain, chain_mean_width, mean_width
+from dem.body.particle import Boxes, Particle, chain_mean_width, mean_width
 from dem.errors import InputError
 
-W, T1, T2, RHO = 0.0117, 1.27e-3, 0.5e-3, 7850.0
-U = (90.0, 90.0)
 SHAPES = [(0.0, U), (0.05, U), (0.4, U), (0.7, U), (1.0, U), (2.0, U)]
 BENT = [(0.7, (0.0, 0.0)), (0.7, (90.0, 0.0)), (0.4, (30.0, 105.0)), (1.0, (-15.0, 60.0)), (2.0, (10.0, 95.0))]
-
-
-def make_boxes(ratio: float, angles: tuple[float, float] = U, scale: float = 1.0) -> Boxes:
-    a1, a2 = angles
-    return Boxes(
-        middle_length=W * scale,
-        barb_length=ratio * W * scale,
-        thickness_normal=T1 * scale,
-        thickness_in_plane=T2 * scale,
-        density=RHO,
-        angles=(math.radians(a1), math.radians(a2)),
-    )
-
-
-def make_particle(
-    ratio: float, angles: tuple[float, float] = U, *, rows: int = 1, diameter: float = 1.2e-3, pitch: float = 1.0
-) -> Particle:
-    return Particle(make_boxes(ratio, angles), SphereChain(rows=rows, diameter=diameter, pitch=pitch * diameter))
 
 
 def own_vertices(ratio: float, angles: tuple[float, float]) -> np.ndarray:

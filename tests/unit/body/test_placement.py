@@ -4,26 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import make_particle
 from scipy.stats import chi2, kstest
 
-from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.particle import Particle
 from dem.body.placement import Poses, place_layer
 from dem.errors import RunError
 from dem.setting.container import Cylinder
 
 RADIUS, BOTTOM, HEIGHT = 0.0234, 0.01, 0.0117
 NOTHING = np.empty((0, 3))
-
-
-def make_particle(ratio: float = 0.7) -> Particle:
-    boxes = Boxes(
-        middle_length=0.0117,
-        barb_length=ratio * 0.0117,
-        thickness_normal=1.27e-3,
-        thickness_in_plane=0.5e-3,
-        density=7850,
-    )
-    return Particle(boxes, SphereChain(rows=1, diameter=1.2e-3, pitch=1.2e-3))
 
 
 def place(particle: Particle, *, count: int, seed: int = 1, obstacles: np.ndarray = NOTHING, **changes: float) -> Poses:

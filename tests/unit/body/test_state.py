@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import make_boxes
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
@@ -15,17 +16,6 @@ from dem.body.state import State
 
 ANGLE = st.floats(-15, 105)
 SEED = st.integers(0, 2**32 - 1)
-
-
-def boxes_at(degrees: tuple[float, float], aspect_ratio: float = 0.7) -> Boxes:
-    return Boxes(
-        middle_length=0.0117,
-        barb_length=aspect_ratio * 0.0117,
-        thickness_normal=1.27e-3,
-        thickness_in_plane=0.5e-3,
-        density=7850.0,
-        angles=(math.radians(degrees[0]), math.radians(degrees[1])),
-    )
 
 
 def cloud(boxes: Boxes) -> np.ndarray:
@@ -51,7 +41,7 @@ def loose(seed: int, count: int = 3) -> State:
     rng = np.random.default_rng(seed)
     rotations = Rotation.random(3 * count, random_state=rng).as_matrix().reshape(count, 3, 3, 3)
     positions, velocities = rng.normal(size=(2, count, 3, 3)) * [[[[0.02]]], [[[0.3]]]]
-    return State(boxes_at((90, 90)), positions, rotations, velocities, rng.normal(size=(count, 3, 3)) * 40)
+    return State(make_boxes(), positions, rotations, velocities, rng.normal(size=(count, 3, 3)) * 40)
 
 
 def flying(boxes: Boxes, seed: int, count: int = 3) -> tuple[State, dict[str, np.ndarray]]:
@@ -84,7 +74,7 @@ def test_sums_over_loose_links_are_those_of_their_points(seed: int) -> None:
 
 @given(ANGLE, ANGLE, st.sampled_from([0.4, 0.7, 1.0]), SEED)
 def test_rigid_smarticles_move_as_one_body(first: float, second: float, aspect_ratio: float, seed: int) -> None:
-    boxes = boxes_at((first, second), aspect_ratio)
+    boxes = make_boxes(aspect_ratio, (first, second))
     state, made = flying(boxes, seed)
     turn = made["rotations"]
     assert state.count == 3
@@ -110,7 +100,7 @@ def test_rigid_smarticles_move_as_one_body(first: float, second: float, aspect_r
 @given(ANGLE, ANGLE, SEED)
 def test_angles_and_vertices_of_hinged_links(first: float, second: float, seed: int) -> None:
     # Built link by link from what the angles mean: 0 straight on, 90 towards the mouth (y of the middle link).
-    boxes, rng = boxes_at((90, 90)), np.random.default_rng(seed)
+    boxes, rng = make_boxes(), np.random.default_rng(seed)
     turn, place = Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3) * 0.02
     a1, a2 = math.radians(first), math.radians(second)
     along = np.array([[-math.cos(a1), math.sin(a1), 0], [1, 0, 0], [math.cos(a2), math.sin(a2), 0]])
@@ -130,7 +120,7 @@ def test_angles_and_vertices_of_hinged_links(first: float, second: float, seed: 
 def test_spheres_follow_their_links(first: float, second: float, seed: int) -> None:
     # Spheres of the U, carried to other angles by its links, are those of a smarticle made at these angles.
     chain = SphereChain(rows=2, diameter=5e-4, pitch=5e-4)
-    made, exact = (Particle(boxes_at(angles), chain) for angles in ((90.0, 90.0), (first, second)))
+    made, exact = (Particle(make_boxes(0.7, angles), chain) for angles in ((90.0, 90.0), (first, second)))
     rigid, _ = flying(exact.boxes, seed)
     carried = State(made.boxes, rigid.link_positions, rigid.link_rotations, rigid.link_velocities, rigid.link_spins)
     assert carried.spheres(made) == pytest.approx(rigid.spheres(exact), abs=1e-15)
@@ -138,7 +128,7 @@ def test_spheres_follow_their_links(first: float, second: float, seed: int) -> N
 
 def test_no_smarticles_have_no_momentum() -> None:
     none = np.empty((0, 3, 3))
-    state = State(boxes_at((90, 90)), none, np.empty((0, 3, 3, 3)), none, none)
+    state = State(make_boxes(), none, np.empty((0, 3, 3, 3)), none, none)
     assert state.count == 0
     assert state.momentum.tolist() == [0, 0, 0]
     assert state.kinetic_energy == 0

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scenes import small
 
 from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.stable_step import CONTACTS_AT_A_TIP, stable_time_step
 from dem.scene.scene import Scene
-
-MakeScene = Callable[..., Scene]
 
 
 def limit_by_iteration(stiffness: float, damping: float, mass: float) -> float:
@@ -82,10 +80,8 @@ CHANGES: list[dict[str, object]] = [
 
 
 @pytest.mark.parametrize("changes", CHANGES)
-def test_stable_step_equals_the_limit_of_the_iterated_schemes(
-    make_scene: MakeScene, changes: dict[str, object]
-) -> None:
-    scene = make_scene(changes)
+def test_stable_step_equals_the_limit_of_the_iterated_schemes(changes: dict[str, object]) -> None:
+    scene = small(changes)
     particle, law = scene.particle, contact_law_of(scene)
     light, contacts = particle.smallest_effective_mass, CONTACTS_AT_A_TIP
     limits = [
@@ -99,15 +95,13 @@ def test_stable_step_equals_the_limit_of_the_iterated_schemes(
 
 @pytest.mark.parametrize("layers", [1, 2, 3, 10])
 @pytest.mark.parametrize("changes", CHANGES)
-def test_stable_step_is_stable_for_piles_lying_flat(
-    make_scene: MakeScene, changes: dict[str, object], layers: int
-) -> None:
-    scene = make_scene(changes)
+def test_stable_step_is_stable_for_piles_lying_flat(changes: dict[str, object], layers: int) -> None:
+    scene = small(changes)
     assert stable_time_step(scene.particle, contact_law_of(scene)) <= limit_of_a_flat_pile(scene, layers) * (1 + 1e-3)
 
 
-def test_softer_or_heavier_allows_larger_steps(make_scene: MakeScene) -> None:
-    scene = make_scene({"contact.restitution": 1})
+def test_softer_or_heavier_allows_larger_steps() -> None:
+    scene = small({"contact.restitution": 1})
     law = contact_law_of(scene)
     softer = dataclasses.replace(law, normal_stiffness=law.normal_stiffness / 4)
     assert stable_time_step(scene.particle, softer) == pytest.approx(2 * stable_time_step(scene.particle, law))

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from scenes import small
 
 from dem.engine.yade.library import import_yade
 from dem.errors import RunError
 from dem.run.run import run_scene
-from dem.scene.scene import Scene
-
-MakeScene = Callable[..., Scene]
 
 
 @pytest.fixture
@@ -35,10 +32,10 @@ def test_missing_yade_says_how_to_get_it() -> None:
 
 
 @pytest.mark.usefixtures("no_yade")
-def test_missing_yade_leaves_no_directory(make_scene: MakeScene, tmp_path: Path) -> None:
+def test_missing_yade_leaves_no_directory(tmp_path: Path) -> None:
     out = tmp_path / "run"
     with pytest.raises(RunError, match=r"^YADE cannot be imported .* `make setup`"):
-        run_scene(make_scene(), out, command="test", progress=False)
+        run_scene(small(), out, command="test", progress=False)
     assert not out.exists()
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
+from scenes import small
 
 from dem.phases.actuate import Actuate
 from dem.phases.drive import Drive, actuated, drive
@@ -24,7 +25,6 @@ from dem.setting.fidelity import FIDELITIES
 from dem.setting.motion import Triangle
 from dem.setting.motor import Motor
 
-MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]
 Active = Callable[..., Scene]
 
@@ -33,12 +33,12 @@ OSCILLATION = {"type": "internal-oscillation", "theta_deg": 10}
 
 
 @pytest.fixture
-def active(make_scene: MakeScene) -> Active:
+def active() -> Active:
     """A scene of a pour and the given phases."""
 
     def make(*phases: dict[str, Any], **changes: Any) -> Scene:
         dotted = {key.replace("__", "."): value for key, value in changes.items()}
-        return make_scene({"phases": [{"type": "deposit"}, *phases], **dotted})
+        return small({"phases": [{"type": "deposit"}, *phases], **dotted})
 
     return make
 
@@ -60,8 +60,8 @@ def same(one: Drive, other: Drive) -> bool:
 # -- motor and fidelity --------------------------------------------------------------------------------------------
 
 
-def test_motor_defaults_are_the_papers(make_scene: MakeScene) -> None:
-    scene = make_scene()
+def test_motor_defaults_are_the_papers() -> None:
+    scene = small()
     assert scene.motor == Motor()
     assert (scene.motor.speed_limit_rad_per_s, scene.motor.law, scene.motor.stiffness_N_m_per_rad) == (6, "halt", 3e-3)
     assert scene.motor.torque_limit_N_m is None
@@ -69,22 +69,20 @@ def test_motor_defaults_are_the_papers(make_scene: MakeScene) -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.4, 1.4])
-def test_default_torque_is_the_weight_of_the_papers_smarticle_at_the_lever_w(
-    make_scene: MakeScene, ratio: float
-) -> None:
-    scene = make_scene({"smarticle.aspect_ratio": ratio, "smarticle.density_kg_per_m3": 1000, "gravity_m_per_s2": 1.62})
+def test_default_torque_is_the_weight_of_the_papers_smarticle_at_the_lever_w(ratio: float) -> None:
+    scene = small({"smarticle.aspect_ratio": ratio, "smarticle.density_kg_per_m3": 1000, "gravity_m_per_s2": 1.62})
     assert scene.torque_limit == pytest.approx(1000 * 1.27e-3 * 0.5e-3 * 0.0117 * 2.4 * 1.62 * 0.0117)
 
 
-def test_torque_by_hand(make_scene: MakeScene) -> None:
-    scene = make_scene({"motor": {"torque_limit_N_m": 2e-5, "law": "slip"}})
+def test_torque_by_hand() -> None:
+    scene = small({"motor": {"torque_limit_N_m": 2e-5, "law": "slip"}})
     assert scene.torque_limit == 2e-5
     assert scene.motor.law == "slip"
 
 
-def test_fidelity_knobs_of_actuation(make_scene: MakeScene) -> None:
+def test_fidelity_knobs_of_actuation() -> None:
     for name in FIDELITIES:
-        fidelity = make_scene({"fidelity": name}).fidelity
+        fidelity = small({"fidelity": name}).fidelity
         assert fidelity.control_interval_s == 2e-4
         assert fidelity.hinge_stiffness_N_per_m == (5000 if name == "draft" else 14500)
 

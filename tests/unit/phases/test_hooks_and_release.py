@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import small
 
 from dem.errors import InputError
 from dem.phases.pull_hook import PullHook
 from dem.phases.remove_container import RemoveContainer
 from dem.plan.outlook import plan
 from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
-from dem.scene.scene import Scene
 from dem.setting.hooks import Cross
 
-MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]
 W, T2 = 0.0117, 0.5e-3
 DEPOSIT = {"type": "deposit"}
@@ -29,8 +28,8 @@ SHAKE = {"type": "shake", "duration_s": 0.1}
 TIERS = [{"radius_m": 0.0234, "height_m": 0.012}, {"radius_m": 0.018, "height_m": 0.012}]
 
 
-def test_hooks_follow_from_the_smarticle_by_default(make_scene: MakeScene) -> None:
-    scene = make_scene({"hooks": {}, "phases": [DEPOSIT, PULL]})
+def test_hooks_follow_from_the_smarticle_by_default() -> None:
+    scene = small({"hooks": {}, "phases": [DEPOSIT, PULL]})
     assert scene.hooks is not None
     lower, upper = scene.hooks.crosses
     assert lower == Cross(height=10 * T2, side=T2, length=W)
@@ -38,20 +37,20 @@ def test_hooks_follow_from_the_smarticle_by_default(make_scene: MakeScene) -> No
     pull = scene.phases[1]
     assert isinstance(pull, PullHook)
     assert (pull.which, pull.distance_m, pull.speed_m_per_s, pull.duration_s) == ("upper", 2 * W, W, 2.0)
-    other = make_scene({"smarticle.middle_length_m": 0.02, "hooks": {"side_m": 1e-3}, "phases": [DEPOSIT, PULL]})
+    other = small({"smarticle.middle_length_m": 0.02, "hooks": {"side_m": 1e-3}, "phases": [DEPOSIT, PULL]})
     assert other.hooks is not None
     assert (other.hooks.side_m, other.hooks.length_m, other.hooks.upper_height_m) == (1e-3, 0.02, 20 * T2)
     assert other.phases[1].model_dump()["distance_m"] == 0.04
 
 
-def test_duration_follows_from_distance_and_speed(make_scene: MakeScene) -> None:
+def test_duration_follows_from_distance_and_speed() -> None:
     pull = {**PULL, "distance_m": 0.01, "speed_m_per_s": 0.02}
-    scene = make_scene({"hooks": {}, "phases": [DEPOSIT, pull, {**pull, "duration_s": 3}]})
+    scene = small({"hooks": {}, "phases": [DEPOSIT, pull, {**pull, "duration_s": 3}]})
     assert [phase.model_dump().get("duration_s") for phase in scene.phases] == [None, 0.5, 3.0]
 
 
-def test_a_plain_scene_has_none_of_it(make_scene: MakeScene) -> None:
-    scene = make_scene()
+def test_a_plain_scene_has_none_of_it() -> None:
+    scene = small()
     assert scene.hooks is None
     assert scene.container.tiers is None
     assert scene.cylinder.upper == ()
@@ -60,8 +59,8 @@ def test_a_plain_scene_has_none_of_it(make_scene: MakeScene) -> None:
     assert (effects["wall removal"].on, effects["wall removal"].why) == (False, "no phase of type remove-container")
 
 
-def test_plan_says_why_hooks_and_removal_are_on(make_scene: MakeScene) -> None:
-    scene = make_scene({"hooks": {}, "phases": [DEPOSIT, PULL, {**REMOVE, "speed_m_per_s": 0.05}]})
+def test_plan_says_why_hooks_and_removal_are_on() -> None:
+    scene = small({"hooks": {}, "phases": [DEPOSIT, PULL, {**REMOVE, "speed_m_per_s": 0.05}]})
     planned = plan(scene)
     effects = {effect.name: effect for effect in planned.effects}
     assert effects["hooks"].on
@@ -74,17 +73,17 @@ def test_plan_says_why_hooks_and_removal_are_on(make_scene: MakeScene) -> None:
     assert [phase.duration_s for phase in planned.phases] == [None, 2.0, 1.0]
 
 
-def test_plan_tells_a_shaken_floor_from_a_shaken_container(make_scene: MakeScene) -> None:
-    effects = {e.name: e for e in plan(make_scene({"phases": [DEPOSIT, SHAKE, REMOVE, SHAKE]})).effects}
+def test_plan_tells_a_shaken_floor_from_a_shaken_container() -> None:
+    effects = {e.name: e for e in plan(small({"phases": [DEPOSIT, SHAKE, REMOVE, SHAKE]})).effects}
     assert effects["container motion"].why == (
         "phase 1: Γ = 2, f = 30 Hz, A = 0.552 mm, phase 3: Γ = 2, f = 30 Hz, A = 0.552 mm, the floor alone"
     )
 
 
-def test_resolved_scene_reads_back_the_same(make_scene: MakeScene, tmp_path: Any) -> None:
+def test_resolved_scene_reads_back_the_same(tmp_path: Any) -> None:
     phases = [DEPOSIT, PULL, REMOVE]
     for changes in ({"hooks": {}, "phases": phases}, {"container": {"tiers": TIERS}}):
-        scene = make_scene(changes)
+        scene = small(changes)
         path = tmp_path / "scene.yaml"
         path.write_text(dump_scene(scene))
         again = load_scene(path)
@@ -92,8 +91,8 @@ def test_resolved_scene_reads_back_the_same(make_scene: MakeScene, tmp_path: Any
         assert scene_hash(again) == scene_hash(scene)
 
 
-def test_tiers_give_the_widest_radius_and_the_whole_height(make_scene: MakeScene) -> None:
-    scene = make_scene({"container": {"tiers": [*TIERS, {"radius_m": 0.018, "height_m": 0.1}]}})
+def test_tiers_give_the_widest_radius_and_the_whole_height() -> None:
+    scene = small({"container": {"tiers": [*TIERS, {"radius_m": 0.018, "height_m": 0.1}]}})
     assert (scene.container.radius_m, scene.container.height_m) == (0.0234, pytest.approx(0.124))
     # Two tiers of one radius are one wall: no ceiling of no width between them.
     assert scene.cylinder.upper == ((0.012, 0.018),)
@@ -119,28 +118,28 @@ def test_an_error_in_the_smarticle_is_one_error(scene_data: SceneData) -> None:
     assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: -1 m is out of range; use more than 0 m"
 
 
-def test_a_hook_may_be_pulled_out_over_the_wall(make_scene: MakeScene) -> None:
-    make_scene({"hooks": {}, "container.height_m": 0.03, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
+def test_a_hook_may_be_pulled_out_over_the_wall() -> None:
+    small({"hooks": {}, "container.height_m": 0.03, "phases": [DEPOSIT, {**PULL, "distance_m": 0.5}]})
 
 
-def test_the_wall_is_high_enough_for_the_hooks(make_scene: MakeScene) -> None:
-    assert make_scene({"hooks": {"upper_height_m": 0.3}}).cylinder.height > 0.3 + W
+def test_the_wall_is_high_enough_for_the_hooks() -> None:
+    assert small({"hooks": {"upper_height_m": 0.3}}).cylinder.height > 0.3 + W
     # A pile that stands higher than the hooks needs no more than without them.
     many = {"count": 300}
-    assert make_scene({"hooks": {}, **many}).cylinder.height == make_scene(many).cylinder.height
+    assert small({"hooks": {}, **many}).cylinder.height == small(many).cylinder.height
 
 
-def test_removal_has_defaults(make_scene: MakeScene) -> None:
-    removal = make_scene({"phases": [DEPOSIT, REMOVE]}).phases[1]
+def test_removal_has_defaults() -> None:
+    removal = small({"phases": [DEPOSIT, REMOVE]}).phases[1]
     assert isinstance(removal, RemoveContainer)
     assert (removal.parts, removal.speed_m_per_s, removal.duration_s) == ("wall", None, 1.0)
 
 
-def test_a_layer_that_fits_by_either_way_out_is_let_pass(make_scene: MakeScene) -> None:
-    make_scene({"container.height_m": 0.02193})
-    make_scene({"container.height_m": 0.02, "phases.0.layer_height_w": 0.8})
+def test_a_layer_that_fits_by_either_way_out_is_let_pass() -> None:
+    small({"container.height_m": 0.02193})
+    small({"container.height_m": 0.02, "phases.0.layer_height_w": 0.8})
 
 
-def test_a_high_hook_that_nobody_pulls_is_let_pass(make_scene: MakeScene) -> None:
-    make_scene({"hooks": {"upper_height_m": 0.3}})
-    make_scene({"hooks": {"upper_height_m": 0.1}, "phases": [DEPOSIT, RELAX, PULL]})
+def test_a_high_hook_that_nobody_pulls_is_let_pass() -> None:
+    small({"hooks": {"upper_height_m": 0.3}})
+    small({"hooks": {"upper_height_m": 0.1}, "phases": [DEPOSIT, RELAX, PULL]})

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import small
 from scipy.integrate import solve_ivp
 
 from dem.engine.yade.kind import contact_law_of
 from dem.physics.contact import damping_ratio, restitution_of, typical_effective_mass
-from dem.scene.scene import Scene
-
-MakeScene = Callable[..., Scene]
 
 
 def rebound(zeta: float) -> float:
@@ -47,14 +44,14 @@ def test_less_damping_rebounds_faster() -> None:
     assert ratios[2] == pytest.approx(0.2565, abs=5e-3)  # a contact that pulled would need 0.2155
 
 
-def test_elastic_contact_has_no_damping(make_scene: MakeScene) -> None:
+def test_elastic_contact_has_no_damping() -> None:
     assert damping_ratio(1.0) == 0
-    law = contact_law_of(make_scene({"contact.restitution": 1}))
+    law = contact_law_of(small({"contact.restitution": 1}))
     assert (law.normal_damping, law.wall_damping) == (0, 0)
 
 
-def test_typical_mass_by_random_pushes(make_scene: MakeScene) -> None:
-    particle = make_scene().particle
+def test_typical_mass_by_random_pushes() -> None:
+    particle = small().particle
     pushes = np.random.default_rng(4).normal(size=(4000, 3))
     pushes /= np.linalg.norm(pushes, axis=1)[:, None]
     arms = np.cross(particle.centres[:, None], pushes[None])
@@ -64,8 +61,8 @@ def test_typical_mass_by_random_pushes(make_scene: MakeScene) -> None:
     assert typical_effective_mass(particle) < 0.7 * particle.boxes.mass
 
 
-def test_law_carries_the_scenes_numbers(make_scene: MakeScene) -> None:
-    scene = make_scene(
+def test_law_carries_the_scenes_numbers() -> None:
+    scene = small(
         {
             "contact.friction_smarticle": 0.3,
             "contact.friction_wall": 0.2,

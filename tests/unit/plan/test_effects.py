@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any
 
 import pytest
-from scenes import chain
+from scenes import chain, small
 
 from dem.engine.effect import Adds
 from dem.engine.yade.construction import ORDER
@@ -24,7 +23,6 @@ from dem.record.columns import (
 )
 from dem.scene.scene import Scene
 
-MakeScene = Callable[..., Scene]
 DEPOSIT = {"type": "deposit"}
 ACTUATED = [DEPOSIT, {"type": "relax"}, {"type": "shape-change"}, {"type": "internal-oscillation", "theta_deg": 5}]
 PLAIN = {"phases": [DEPOSIT, {"type": "relax"}], "recording.checkpoint_interval_s": None}
@@ -73,8 +71,8 @@ def on(scene: Scene) -> set[str]:
     return {decision.name for decision in decide(scene) if decision.on}
 
 
-def test_a_plain_scene_calls_for_the_plain_effects(make_scene: MakeScene) -> None:
-    scene = make_scene(PLAIN)
+def test_a_plain_scene_calls_for_the_plain_effects() -> None:
+    scene = small(PLAIN)
     assert on(scene) == ALWAYS
     assert plan(scene).engines == ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
     for decision in decide(scene):
@@ -84,13 +82,13 @@ def test_a_plain_scene_calls_for_the_plain_effects(make_scene: MakeScene) -> Non
 
 @pytest.mark.parametrize(("changes", "called", "why"), CALLS)
 def test_each_effect_is_called_for_by_its_own_part_of_the_scene(
-    make_scene: MakeScene, changes: dict[str, Any], called: set[str], why: str
+    changes: dict[str, Any], called: set[str], why: str
 ) -> None:
-    scene = make_scene(PLAIN | changes)
+    scene = small(PLAIN | changes)
     assert on(scene) == ALWAYS | called
     planned = plan(scene)
     assert why in [effect.why for effect in planned.effects if effect.name in called]
-    plain = Adds.together(effect.adds for effect in plan(make_scene(PLAIN)).effects)
+    plain = Adds.together(effect.adds for effect in plan(small(PLAIN)).effects)
     added = Adds.together(effect.adds for effect in planned.effects)
     assert added != plain  # an effect without any trace would need no declaration
     assert set(plain.engines) <= set(added.engines)
@@ -106,14 +104,12 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(
         ({"restitution": 1}, "restitution"),
     ],
 )
-def test_numbers_of_the_contact_law_that_are_nothing_are_said_to_be_off(
-    make_scene: MakeScene, contact: dict[str, Any], off: str
-) -> None:
-    assert on(make_scene(PLAIN | {"contact": contact})) == ALWAYS - {off}
+def test_numbers_of_the_contact_law_that_are_nothing_are_said_to_be_off(contact: dict[str, Any], off: str) -> None:
+    assert on(small(PLAIN | {"contact": contact})) == ALWAYS - {off}
 
 
-def test_shaking_comes_before_the_motion_that_it_drives(make_scene: MakeScene) -> None:
-    engines = plan(make_scene({"phases": [DEPOSIT, {"type": "shake"}]})).engines
+def test_shaking_comes_before_the_motion_that_it_drives() -> None:
+    engines = plan(small({"phases": [DEPOSIT, {"type": "shake"}]})).engines
     assert engines == ORDER
     assert engines.index("HarmonicMotionEngine") == engines.index("NewtonIntegrator") - 1
 

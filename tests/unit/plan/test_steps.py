@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from typing import Any
 
 import pytest
-from scenes import chain
+from scenes import chain, small
 
 from dem.errors import InputError
 from dem.plan.steps import MOST_PER_STEP, stable_step, time_step, time_steps
 from dem.scene.scene import Scene
 
-MakeScene = Callable[..., Scene]
 DEPOSIT = {"type": "deposit"}
 
 
@@ -29,10 +27,10 @@ def fastest(scene: Scene) -> float:
 
 
 @pytest.mark.parametrize("kind", ["remove-container", "pull-hook"])
-def test_what_is_lifted_or_pulled_too_fast_is_refused(make_scene: MakeScene, kind: str) -> None:
+def test_what_is_lifted_or_pulled_too_fast_is_refused(kind: str) -> None:
     def moved_at(speed: float, fidelity: Any = "draft") -> Scene:
         phases = [DEPOSIT, {"type": kind, "speed_m_per_s": speed, "duration_s": 3.0}]
-        return make_scene({"hooks": {}, "phases": phases, "fidelity": fidelity})
+        return small({"hooks": {}, "phases": phases, "fidelity": fidelity})
 
     most = fastest(moved_at(0.01))
     assert 0.3 < most < 1
@@ -63,10 +61,10 @@ def test_a_chain_is_strained_by_the_same_rule() -> None:
 
 @pytest.mark.parametrize("fidelity", ["draft", "standard", "reference"])
 @pytest.mark.parametrize("series", [0.004, 0.0033, 1e-5])
-def test_time_step_divides_the_recording_intervals(make_scene: MakeScene, fidelity: str, series: float) -> None:
+def test_time_step_divides_the_recording_intervals(fidelity: str, series: float) -> None:
     changes = {"fidelity": fidelity, "recording": {"series_interval_s": series}}
     changes["recording"] |= {"frame_interval_s": 10 * series, "checkpoint_interval_s": None}
-    scene = make_scene(changes)
+    scene = small(changes)
     dt = time_step(scene)
     steps = series / dt
     assert steps == pytest.approx(round(steps), abs=1e-9)
@@ -76,13 +74,13 @@ def test_time_step_divides_the_recording_intervals(make_scene: MakeScene, fideli
         assert dt > 0.9 * wanted  # no smaller than needed
 
 
-def test_given_time_step_is_taken_exactly_where_it_divides(make_scene: MakeScene) -> None:
-    assert time_step(make_scene({"fidelity": {"time_step_s": 1e-5}})) == pytest.approx(1e-5, rel=1e-12)
-    assert time_step(make_scene({"fidelity": {"time_step_s": 3e-5}})) == pytest.approx(0.004 / 134, rel=1e-12)
+def test_given_time_step_is_taken_exactly_where_it_divides() -> None:
+    assert time_step(small({"fidelity": {"time_step_s": 1e-5}})) == pytest.approx(1e-5, rel=1e-12)
+    assert time_step(small({"fidelity": {"time_step_s": 3e-5}})) == pytest.approx(0.004 / 134, rel=1e-12)
 
 
-def test_given_time_step_above_the_stable_one_is_refused_with_both(make_scene: MakeScene) -> None:
-    scene = make_scene({"fidelity": {"time_step_s": 0.001}})
+def test_given_time_step_above_the_stable_one_is_refused_with_both() -> None:
+    scene = small({"fidelity": {"time_step_s": 0.001}})
     stable = stable_step(scene)
     with pytest.raises(InputError) as caught:
         time_step(scene)
@@ -91,15 +89,15 @@ def test_given_time_step_above_the_stable_one_is_refused_with_both(make_scene: M
         f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
     )
     least = float(str(caught.value).split("use at most ")[1].split(" s")[0])
-    assert 0.98 * stable < time_step(make_scene({"fidelity": {"time_step_s": least}})) <= stable
+    assert 0.98 * stable < time_step(small({"fidelity": {"time_step_s": least}})) <= stable
 
 
 @pytest.mark.parametrize(("key", "value"), [("hinge_stiffness_N_per_m", 1e6), ("stiffness", 10.0)])
-def test_stiff_hinges_and_shafts_shorten_the_step(make_scene: MakeScene, key: str, value: float) -> None:
+def test_stiff_hinges_and_shafts_shorten_the_step(key: str, value: float) -> None:
     phases = [{"type": "deposit"}, {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}]
-    usual = make_scene({"phases": phases})
+    usual = small({"phases": phases})
     changed = {"fidelity": {key: value}} if key.startswith("hinge") else {"motor": {"stiffness_N_m_per_rad": value}}
-    stiff = make_scene({"phases": phases, **changed})
+    stiff = small({"phases": phases, **changed})
     # A shaft of 3e-3 N m/rad is far from ruling the step, one of 10 blew up before it was counted.
     assert time_step(stiff) < 0.5 * time_step(usual)
     barb = stiff.smarticle.boxes
@@ -113,9 +111,9 @@ def test_stiff_hinges_and_shafts_shorten_the_step(make_scene: MakeScene, key: st
 SWING: dict[str, object] = {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}
 
 
-def test_phases_before_the_motors_have_the_step_of_a_scene_without(make_scene: MakeScene) -> None:
+def test_phases_before_the_motors_have_the_step_of_a_scene_without() -> None:
     rest: list[dict[str, object]] = [{"type": "deposit"}, {"type": "relax", "duration_s": 1}]
-    scene, without = make_scene({"phases": [*rest, SWING, *rest[1:]]}), make_scene({"phases": rest})
+    scene, without = small({"phases": [*rest, SWING, *rest[1:]]}), small({"phases": rest})
     shortest = time_step(scene)
     assert time_steps(scene) == (*time_steps(without), shortest, shortest)
     assert time_steps(without) == (time_step(without),) * 2
@@ -123,8 +121,8 @@ def test_phases_before_the_motors_have_the_step_of_a_scene_without(make_scene: M
 
 
 @pytest.mark.parametrize("changes", [{"fidelity": {"time_step_s": 1e-5}}, {"phases": [{"type": "deposit"}]}])
-def test_a_step_by_hand_or_no_motors_make_all_phases_alike(make_scene: MakeScene, changes: dict[str, object]) -> None:
-    scene = make_scene({"phases": [{"type": "deposit"}, SWING], **changes})
+def test_a_step_by_hand_or_no_motors_make_all_phases_alike(changes: dict[str, object]) -> None:
+    scene = small({"phases": [{"type": "deposit"}, SWING], **changes})
     assert set(time_steps(scene)) == {time_step(scene)}
 
 

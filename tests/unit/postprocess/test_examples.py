@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from synthetic import write_run
 
-PACKAGES = ("dem.record", "postprocess", "studies")
+PACKAGES = ("dem", "postprocess", "studies")
 
 
 def modules_with_examples() -> list[str]:

@@ -115,14 +115,14 @@ def test_a_run_that_is_gone_on_with_gives_the_same_bits(
 ) -> None:
     scene = scene_of(name)
     run(scene, tmp_path / "straight")
-    for _ in range(3):
+    for _ in range(2):
         interrupted(1)
         with pytest.raises(KeyboardInterrupt):
             run(scene, tmp_path / "resumed", resume=(tmp_path / "resumed").exists())
     assert json.loads((tmp_path / "resumed" / "failed.json").read_text())["status"] == "interrupted"
     interrupted(10_000)
     run(scene, tmp_path / "resumed", resume=True)
-    assert len(kind.built) == 5
+    assert len(kind.built) == 4
     assert kind.built[-1].steps == kind.built[0].steps
     assert series(tmp_path / "straight") == series(tmp_path / "resumed")
     assert frames(tmp_path / "straight") == frames(tmp_path / "resumed")
@@ -205,3 +205,37 @@ def test_the_same_scene_is_the_same_run(kind: KindDouble, tmp_path: Path) -> Non
         run(scene_of("actuated"), tmp_path / out)
     assert series(tmp_path / "one") == series(tmp_path / "other")
     assert kind.built[0].told == kind.built[1].told
+
+
+# -- directories that are not a run's ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("held", "what"),
+    [
+        ({"run.json": "{}", "frames.pvd": "x"}, "a run and is left as it is; go on with it by --resume, or choose"),
+        ({"notes.txt": "mine"}, "files (notes.txt, …) and is left as it is; choose"),
+    ],
+)
+def test_a_directory_that_holds_something_is_left_as_it_is(
+    kind: KindDouble, tmp_path: Path, held: dict[str, str], what: str
+) -> None:
+    for name, text in held.items():
+        (tmp_path / name).write_text(text)
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    with pytest.raises(InputError) as caught:
+        run(scene_of("rested"), tmp_path)
+    assert str(caught.value) == f"--out {tmp_path}: holds {what} another directory"
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
+    assert not kind.built
+
+
+@pytest.mark.usefixtures("kind")
+def test_out_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    out = tmp_path / "taken"
+    out.write_text("mine")
+    with pytest.raises(InputError) as caught:
+        run(scene_of("rested"), out)
+    assert str(caught.value) == f"--out {out}: cannot be made (File exists); choose another directory"
+    assert out.read_text() == "mine"

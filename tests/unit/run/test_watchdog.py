@@ -7,17 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scenes import make_boxes
 
-from dem.body.particle import Boxes
 from dem.body.state import State
 from dem.errors import RunError
 from dem.physics.overlaps import Held, Overlaps
 from dem.run.watchdog import Watchdog
 from dem.setting.container import Cylinder
 
-BOXES = Boxes(
-    middle_length=0.0117, barb_length=0.00819, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850
-)
+BOXES = make_boxes()
 WATCHDOG = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed=5.0)
 
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenes import small
 
 from dem.errors import InputError
 from dem.scene.reading import load_scene, parse_scene
-from dem.scene.scene import Scene
 
-MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]
 
 GOOD = "schema_version: 1\nseed: 1\ncount: 10\nphases: [{type: deposit}]\n"
@@ -23,15 +22,15 @@ W_IN_MM = (
 )
 
 
-def test_container_narrower_than_a_smarticle(make_scene: MakeScene, scene_data: SceneData) -> None:
-    reach = make_scene().particle.reach
+def test_container_narrower_than_a_smarticle(scene_data: SceneData) -> None:
+    reach = small().particle.reach
     with pytest.raises(InputError) as caught:
         parse_scene(scene_data({"container.radius_m": 0.005}), source="bad.yaml")
     assert str(caught.value) == (
         f"bad.yaml: container.radius_m: 0.005 m is narrower than a smarticle, whose farthest point is {reach:.4g} m "
         f"from its centre of mass; use at least {reach:.4g} m"
     )
-    make_scene({"container.radius_m": 1.01 * reach})
+    small({"container.radius_m": 1.01 * reach})
 
 
 def test_several_errors_show_the_first_and_how_many_more(scene_data: SceneData) -> None:

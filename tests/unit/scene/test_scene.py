@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 import yaml
 from pydantic import BaseModel, ValidationError
-from scenes import chain
+from scenes import chain, small
 
 from dem.plan.steps import time_step
 from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene, derive_seed
 
-MakeScene = Callable[..., Scene]
 SceneData = Callable[..., dict[str, Any]]
 
 # Of the small scene, as it was before scenes named an engine. It changes with every default of a scene: whoever changes
@@ -52,8 +51,8 @@ def test_defaults_are_the_papers(tmp_path: Path) -> None:
     assert (scene.seed, scene.count) == (3, 12)
 
 
-def test_boxes_carry_the_scenes_numbers(make_scene: MakeScene) -> None:
-    scene = make_scene({"smarticle.aspect_ratio": 0.4, "smarticle.density_kg_per_m3": 2700})
+def test_boxes_carry_the_scenes_numbers() -> None:
+    scene = small({"smarticle.aspect_ratio": 0.4, "smarticle.density_kg_per_m3": 2700})
     boxes = scene.smarticle.boxes
     assert boxes.barb_length == pytest.approx(0.4 * 0.0117)
     assert boxes.mass == pytest.approx(2700 * 1.27e-3 * 0.5e-3 * 0.0117 * 1.8)
@@ -84,15 +83,15 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
     assert scene.smarticle.angles_deg == (80, 85)
 
 
-def test_fidelity_by_name_and_by_mapping(make_scene: MakeScene) -> None:
-    named = make_scene({"fidelity": "reference"})
-    mapped = make_scene({"fidelity": {"base": "reference"}})
+def test_fidelity_by_name_and_by_mapping() -> None:
+    named = small({"fidelity": "reference"})
+    mapped = small({"fidelity": {"base": "reference"}})
     assert named == mapped
-    knob = make_scene({"fidelity": {"base": "reference", "stiffness_N_per_m": 123.0}}).fidelity
+    knob = small({"fidelity": {"base": "reference", "stiffness_N_per_m": 123.0}}).fidelity
     assert knob.stiffness_N_per_m == 123
     assert knob.rows == named.fidelity.rows
-    assert make_scene({"fidelity": {"rows": 2}}).fidelity.base == "standard"
-    scenes = [make_scene({"fidelity": name}) for name in ("draft", "standard", "reference")]
+    assert small({"fidelity": {"rows": 2}}).fidelity.base == "standard"
+    scenes = [small({"fidelity": name}) for name in ("draft", "standard", "reference")]
     counts = [len(scene.particle.centres) for scene in scenes]
     steps = [time_step(scene) for scene in scenes]
     assert counts == sorted(set(counts))  # three settings that differ, each finer than the one before
@@ -105,8 +104,8 @@ def test_numbers_in_yaml_are_read_as_people_write_them(tmp_path: Path, text: str
 
 
 @pytest.mark.parametrize("fidelity", ["draft", {"base": "reference", "time_step_s": 1e-6}])
-def test_dump_and_parse_come_back_to_the_same_scene(make_scene: MakeScene, fidelity: Any) -> None:
-    scene = make_scene({"fidelity": fidelity, "name": "μ = 0.4: «a, b» #1", "smarticle.aspect_ratio": 1 / 3})
+def test_dump_and_parse_come_back_to_the_same_scene(fidelity: Any) -> None:
+    scene = small({"fidelity": fidelity, "name": "μ = 0.4: «a, b» #1", "smarticle.aspect_ratio": 1 / 3})
     text = dump_scene(scene)
     again = parse_scene(yaml.safe_load(text), source="dump")
     assert again == scene
@@ -117,10 +116,10 @@ def test_dump_and_parse_come_back_to_the_same_scene(make_scene: MakeScene, fidel
     assert yaml.safe_load(text)["smarticle"]["aspect_ratio"] == 1 / 3
 
 
-def test_the_default_engine_is_neither_written_nor_hashed_and_another_is_both(make_scene: MakeScene) -> None:
+def test_the_default_engine_is_neither_written_nor_hashed_and_another_is_both() -> None:
     # Scenes and runs from before there was a choice have no such key: they keep their text and their hash.
-    assert make_scene().engine == "yade"
-    plain, named, other = make_scene(), make_scene({"engine": "yade"}), make_scene({"engine": "links"})
+    assert small().engine == "yade"
+    plain, named, other = small(), small({"engine": "yade"}), small({"engine": "links"})
     assert named == plain
     assert dump_scene(named) == dump_scene(plain)
     assert scene_hash(named) == scene_hash(plain) == PLAIN_HASH
@@ -129,17 +128,17 @@ def test_the_default_engine_is_neither_written_nor_hashed_and_another_is_both(ma
     assert parse_scene(yaml.safe_load(dump_scene(other)), source="dump") == other
 
 
-def test_dump_survives_the_file(make_scene: MakeScene, tmp_path: Path) -> None:
-    scene = make_scene({"fidelity": {"time_step_s": 1e-6}, "recording.series_interval_s": 1e-3})
+def test_dump_survives_the_file(tmp_path: Path) -> None:
+    scene = small({"fidelity": {"time_step_s": 1e-6}, "recording.series_interval_s": 1e-3})
     assert load_scene(write(tmp_path, dump_scene(scene))) == scene
 
 
-def test_hash_is_stable_over_notation_and_sensitive_to_everything(make_scene: MakeScene, scene_data: SceneData) -> None:
-    scene = make_scene()
+def test_hash_is_stable_over_notation_and_sensitive_to_everything(scene_data: SceneData) -> None:
+    scene = small()
     assert re.fullmatch(r"[0-9a-f]{64}", scene_hash(scene))
     same = parse_scene(dict(reversed(scene_data().items())), source="x")
     assert scene_hash(same) == scene_hash(scene)
-    assert scene_hash(make_scene({"smarticle.density_kg_per_m3": 7850})) == scene_hash(scene)
+    assert scene_hash(small({"smarticle.density_kg_per_m3": 7850})) == scene_hash(scene)
     changes: list[dict[str, Any]] = [
         {"seed": 2},
         {"count": 11},
@@ -152,7 +151,7 @@ def test_hash_is_stable_over_notation_and_sensitive_to_everything(make_scene: Ma
         {"container.radius_m": 0.03},
         {"motor.speed_limit_rad_per_s": 5.0},
     ]
-    hashes = {scene_hash(make_scene(change)) for change in changes}
+    hashes = {scene_hash(small(change)) for change in changes}
     assert len(hashes | {scene_hash(scene)}) == len(changes) + 1
 
 
@@ -163,8 +162,8 @@ def test_seeds_for_purposes_come_from_the_seed_alone() -> None:
     assert max(drawn) > 2**63  # all 64 bits are used: seeds of a sweep do not collide
 
 
-def test_scene_and_its_parts_are_frozen(make_scene: MakeScene) -> None:
-    scene = make_scene()
+def test_scene_and_its_parts_are_frozen() -> None:
+    scene = small()
     for part, name in ((scene, "count"), (scene.smarticle, "aspect_ratio"), (scene.phases[1], "duration_s")):
         with pytest.raises(ValidationError, match="frozen"):
             setattr(part, name, 1)
