@@ -1,7 +1,7 @@
 """An engine in memory: what `dem.engine.interface` asks for, with physics that can be worked out by hand.
 
-Smarticles fall freely, without turning, through each other, until they stand on the floor; there they stay and go with
-it. Barbs do not turn whatever motors are told, and whoever a string is tied to goes where the string goes. What the
+Smarticles fall freely, without turning, through each other, until they stand on the floor; there they stay and go
+with it. Barbs do not turn whatever motors are told, and whom a string is tied to goes where the string goes. What the
 double was told is in `told`; what it shall tell may be set.
 """
 
@@ -206,6 +206,8 @@ class EngineDouble:
     planar: bool = False
     stops_at: int | None = None
     """Step at which it stops by itself."""
+    drift: float = 0.0
+    """Speed at which those that stand slide along x [m/s]."""
     deepest: float = 0.0
     """Depth of the deepest contact of each smarticle that stands [m]."""
     time: float = 0.0
@@ -222,6 +224,8 @@ class EngineDouble:
         self._rotations = np.zeros((0, 3, 3))
         self._standing = np.zeros(0, dtype=np.bool_)
         self._seconds = 0.0
+        self.stands = np.zeros(0)
+        """(N,) heights above the floor at which centres of mass come to rest: the lowest sphere touches it [m]."""
 
     @classmethod
     def of(cls, scene: Demand, time_step: float) -> EngineDouble:
@@ -268,8 +272,10 @@ class EngineDouble:
             self.positions += dt * self.velocities
             self.strings.places = self.state().link_positions
             return
-        ground, falling = self.fixtures.floor + self.stand, ~carried
-        self.positions[carried, 2], self.velocities[carried] = ground, [0.0, 0.0, self.fixtures.velocity]
+        ground, falling = self.fixtures.floor + self.stands, ~carried
+        along = [self.drift, 0.0, self.fixtures.velocity]
+        self.positions[carried, 0] += self.drift * dt
+        self.positions[carried, 2], self.velocities[carried] = ground[carried], along
         self.account.container_work += self._energy(carried) - before
         if not falling.any():
             return
@@ -278,7 +284,7 @@ class EngineDouble:
         landed = falling & (self.positions[:, 2] <= ground)
         if landed.any():
             before = self._energy(landed)
-            self.positions[landed, 2], self.velocities[landed] = ground, [0.0, 0.0, self.fixtures.velocity]
+            self.positions[landed, 2], self.velocities[landed] = ground[landed], along
             self.account.dissipated += before - self._energy(landed)
             self._standing = carried | landed
 
@@ -289,11 +295,6 @@ class EngineDouble:
     # -- smarticles --------------------------------------------------------------------------------------------
 
     @property
-    def stand(self) -> float:
-        """Height above the floor at which centres of mass come to rest: no sphere is below it, however it is turned."""
-        return self.particle.reach
-
-    @property
     def count(self) -> int:
         return len(self.positions)
 
@@ -302,7 +303,10 @@ class EngineDouble:
         n, boxes = len(poses.positions), self.particle.boxes
         self.positions = np.concatenate([self.positions, poses.positions])
         self.velocities = np.concatenate([self.velocities, np.zeros((n, 3))])
-        self._rotations = np.concatenate([self._rotations, [turn.as_matrix() for turn in poses.rotations]])
+        turned = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
+        self._rotations = np.concatenate([self._rotations, turned])
+        lowest = (self._rotations[:, 2] @ self.particle.centres.T).min(axis=1)
+        self.stands = self.particle.radius - lowest
         self._standing = np.concatenate([self._standing, np.zeros(n, dtype=np.bool_)])
         self.account.added += boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
         self.motors.angles = np.tile(boxes.angles, (self.count, 1))

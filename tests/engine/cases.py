@@ -86,6 +86,31 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     }
 
 
+class Stuck:
+    """YADE as it is when it has stopped: asked for a step it makes none."""
+
+    def __init__(self, omega: Any) -> None:
+        self.iter, self.time, self.dt = omega.iter, omega.time, omega.dt
+
+    def step(self) -> None:
+        pass
+
+
+def stopping(data: dict[str, Any]) -> dict[str, Any]:
+    """What is said when YADE stops, and steps after advances by none."""
+    engine = build(load(data))
+    engine.advance(7)
+    for none in (0, -3):
+        engine.advance(none)
+    steps = engine.steps
+    engine._omega = Stuck(engine._omega)
+    try:
+        engine.advance(5)
+    except RunError as error:
+        return {"steps": steps, "text": str(error)}
+    return {"steps": steps, "text": ""}
+
+
 def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle lying flat on a floor without friction is pushed along it."""
     scene = scene_of(data)

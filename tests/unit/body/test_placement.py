@@ -122,3 +122,23 @@ def test_impossible_layer_fails_with_the_way_out() -> None:
         f"only 0 of 3 smarticles of a layer found room in a container of radius {0.3 * particle.reach:g} m; "
         "lower phases.0.per_layer or widen container.radius_m"
     )
+
+
+def test_layers_keep_off_the_steps_of_a_mould() -> None:
+    one, cylinder = make_particle(0.8), Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.012, 0.016),))
+    for seed in range(10):
+        poses = place_layer(
+            one,
+            count=8,
+            radius=cylinder.inner_radius,
+            bottom=0.001,
+            height=0.015,
+            obstacles=np.empty((0, 3)),
+            rng=np.random.default_rng(seed),
+            narrower=cylinder.inner_radii,
+        )
+        for position, rotation in zip(poses.positions, poses.rotations, strict=True):
+            spheres = rotation.apply(one.centres) + position
+            off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
+            tops = spheres[:, 2] + one.radius
+            assert (off_axis + one.radius < cylinder.inner_radii(tops)).all()

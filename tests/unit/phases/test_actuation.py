@@ -152,7 +152,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
         scene = active({**OSCILLATION, **changes}, smarticle__aspect_ratio=ratio, motor__speed_limit_rad_per_s=4)
         phase = scene.phases[1]
         assert actuated(phase)
-        motion = phase.spelled_out(scene.smarticle, scene.motor).motions[1]
+        motion = phase.gait(scene.smarticle, scene.motor).motions[1]
         assert isinstance(motion, Triangle)
         return motion
 

@@ -239,3 +239,24 @@ def test_memory_is_a_copy() -> None:
     memory = motors.memory
     held(HALT, 0.0, 1.0, 10, motors)
     assert memory["commands"] == [[0.0, 0.0]]
+
+
+# -- servos ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_servo_is_a_damped_spring_capped_as_a_whole_each_with_its_own_strength() -> None:
+    law = MotorLaw(torque_limit=0.05, speed_limit=6.0, stiffness=0.1, law="servo", damping=1e-3)
+    home, strengths = np.full((1, 2), 1.5), np.array([[1.0, 0.8]])
+    motors = Motors(law, home, strengths)
+    torques = motors.look(home - 0.2, home, 1e-4, 1e-4, np.full((1, 2), -2.0))
+    assert torques == pytest.approx(np.array([[0.1 * 0.2 + 2e-3, 0.08 * 0.2 + 2e-3]]))
+    assert not motors.halted.any()
+    torques = motors.look(home - 0.49, home, 1e-4, 1e-4, np.full((1, 2), -2.0))
+    assert torques == pytest.approx(np.array([[0.05, 0.04]]))
+    # It remembers where it is to be, however far it was turned.
+    assert (motors.commands == home).all()
+    kept = Motors(law, home, strengths)
+    kept.restore(motors.memory)
+    after = [m.look(home - 0.1, home, 1e-4, 1e-4, np.zeros((1, 2))) for m in (motors, kept)]
+    assert (after[0] == after[1]).all()
+    assert (motors.work == kept.work).all()

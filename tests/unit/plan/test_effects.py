@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from scenes import chain
 
 from dem.engine.effect import Adds
 from dem.engine.yade.construction import ORDER
@@ -123,3 +124,12 @@ def test_every_column_belongs_to_one_effect() -> None:
     assert sorted(declared) == sorted(name for table in tables for name in table)
     assert len(set(declared)) == len(declared)
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
+
+
+def test_the_plan_tells_plane_strings_and_servos() -> None:
+    text = plan(chain({"motor.strength_spread": 0.1})).to_text()
+    assert "two walls 100 mm apart" in text
+    assert "h/H = 0.62" in text
+    assert "strings" in text
+    assert "servo" in text
+    assert text.splitlines()[0].endswith("in a plane")

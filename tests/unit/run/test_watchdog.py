@@ -188,3 +188,30 @@ def test_unknown_work_forgets_what_was_seen() -> None:
     looks(dog, (1.0, 0.0), (math.nan, 0.0), (9.0, 0.0), (9.05, 0.0))
     with pytest.raises(RunError, match="risen by"):
         looks(dog, (9.2, 0.0))
+
+
+TIERED = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),)), speed=5.0)
+
+
+def at(*position: float) -> State:
+    still = np.zeros((1, 3))
+    return State.rigid(BOXES, np.array([position], dtype=float), np.eye(3)[None], still, still)
+
+
+def test_it_knows_a_wall_that_is_gone_and_a_hook_that_is_raised() -> None:
+    far, high = at(0.2, 0.0, 0.01), at(0.0, 0.0, 0.11)
+    for state in (far, high):
+        with pytest.raises(RunError):
+            TIERED.check(state, floor=0.0, time=1.0)
+        TIERED.check(state, floor=0.0, time=1.0, raised=None)
+    TIERED.check(high, floor=0.0, time=1.0, raised=0.02)
+    with pytest.raises(RunError, match="left through the wall"):
+        TIERED.check(far, floor=0.0, time=1.0, raised=0.02)
+    with pytest.raises(RunError, match="left through the wall or the floor"):
+        TIERED.check(at(0.2, 0.0, -0.01), floor=0.0, time=1.0, raised=None)  # the floor stays
+
+
+def test_it_knows_the_tiers() -> None:
+    TIERED.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
+    with pytest.raises(RunError, match="left through the wall"):
+        TIERED.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)

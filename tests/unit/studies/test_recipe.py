@@ -100,6 +100,7 @@ def test_what_is_measured_judged_told_and_written(runs: list[Path], tmp_path: Pa
     # Nothing temporary is left.
     assert {path.name for path in (tmp_path / "out").iterdir()} == set(report.files) == names
     assert pd.read_csv(report.files["sums.csv"], comment="#")["sum"].tolist() == ["24 in all"]
+    pd.testing.assert_frame_equal(pd.read_csv(report.files["runs.csv"], comment="#"), report.tables["runs"])
 
 
 def test_every_output_names_its_origin(runs: list[Path], tmp_path: Path) -> None:

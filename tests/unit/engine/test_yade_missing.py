@@ -1,15 +1,13 @@
-"""A machine without YADE: a clear error, and nothing written. And what the engine asks of YADE, from a double of it."""
+"""A machine without YADE: a clear error, and nothing written."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.library import import_yade
 from dem.errors import RunError
 from dem.run.run import run_scene
@@ -52,46 +50,3 @@ def test_yade_that_breaks_on_import_says_the_cause(tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     with pytest.raises(RunError, match=r"^YADE cannot be imported \(libboost_python311\.so\.1\.74: cannot open\)"):
         import_yade()
-
-
-class Omega:
-    """What `YadeEngine.advance` sees of YADE."""
-
-    def __init__(self, stops_at: int | None = None) -> None:
-        self.iter, self.time, self.asked = 0, 0.0, 0
-        self._stops_at = stops_at
-
-    def step(self) -> None:
-        self.asked += 1
-        self.iter = self.iter + 1 if self._stops_at is None else min(self.iter + 1, self._stops_at)
-
-
-def make_engine(omega: Omega) -> YadeEngine:
-    engine = YadeEngine.__new__(YadeEngine)
-    # What `advance` needs, without YADE: Omega, and what counts the smarticles' seconds.
-    vars(engine).update(
-        _yade=SimpleNamespace(omega=omega),
-        _omega=omega,
-        _assembly=SimpleNamespace(count=0, hinges=None),
-        _shaker=None,
-        strings=None,
-        fixtures=SimpleNamespace(moving=[], felt=()),
-        account=SimpleNamespace(step=lambda number, advance: advance()),
-        _smarticle_seconds=0.0,
-        time_step=1e-5,
-    )
-    return engine
-
-
-def test_engine_that_stops_early_is_a_run_error() -> None:
-    engine = make_engine(Omega(stops_at=7))
-    engine.advance(5)
-    with pytest.raises(RunError) as caught:
-        engine.advance(5)
-    assert str(caught.value) == "YADE stopped at step 7 of 10 (t = 0.0000 s); see its message above"
-
-
-def test_no_steps_are_no_run() -> None:
-    omega = Omega()
-    make_engine(omega).advance(0)
-    assert omega.asked == 0
