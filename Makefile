@@ -46,6 +46,7 @@ lint: setup ## style: ruff (seconds)
 
 types: setup ## types: mypy, strict (a minute the first time)
 	$(BIN)/mypy
+	$(BIN)/mypy tests/double.py
 
 unit: setup ## tests that need no YADE (minutes)
 	$(PYTEST) tests/unit
