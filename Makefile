@@ -7,7 +7,8 @@
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
 # A test is one thread: threads that find no free core spin, and bits depend on their number.
-PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
+# As many processes as cores, a file of tests in one of them, those that run YADE first: they take longest.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -32,9 +33,9 @@ bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard onset
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard figure
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification.hard cases
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification onset
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification figure
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification cases
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
 	$(PYTEST) -m "not validation"

@@ -1,5 +1,7 @@
-"""The two ways in which the project says no."""
+"""The two ways in which the project says no, and the word that was meant."""
 
+import difflib
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -28,3 +30,16 @@ def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
         msg = f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}"
         raise RunError(msg)
+
+
+def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
+    """`did you mean …` where a known word is close, else the list of known words.
+
+    Args:
+        word: what was given.
+        known: what there is, in the order in which it is listed.
+        cutoff: how alike a word must be that was meant [1].
+    """
+    words = list(known)
+    close = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)
+    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(words) or 'none'}"

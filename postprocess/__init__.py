@@ -5,9 +5,12 @@ return frozen results. Lengths are in metres, times in seconds. `heights` and `e
 functions of the modules of the same name and are imported from there.
 """
 
+from dem.record.frame import Frame, read_frame
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import PhaseRecord, RunManifest, read_run
+from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
-from postprocess.frames import Frame, FrameSequence, read_frame, read_frames
-from postprocess.manifest import PhaseRecord, RunManifest, read_run
+from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.contacts import ContactPairs, contact_pairs, neighbours_in_contact
 from postprocess.measures.entanglement import (
     CrossingPairs,
@@ -18,12 +21,10 @@ from postprocess.measures.entanglement import (
     link_crossings,
     linking_pairs,
 )
-from postprocess.measures.geometry import centres_of_mass
 from postprocess.measures.heights import Heights, material_height
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table
-from postprocess.series import Series, read_series
 from postprocess.statistics.averages import Mean, mean_with_error
 
 __all__ = [

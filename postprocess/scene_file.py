@@ -1,4 +1,8 @@
-"""What the scene of a run asked for: its phases, container and hooks, from `scene.yaml`."""
+"""What the scene of a run asked for: its phases, container and hooks, from `scene.yaml`.
+
+Read without the checks of `dem.scene`: a run directory tells what was run, also where this version would refuse such a
+scene, and every default of the version that ran it is written out in the file.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,9 @@ from typing import Any
 
 import yaml
 
-from postprocess.errors import refuse
-from postprocess.measures.region import Cylinder
+from dem.record.files import cannot_read
+from dem.record.names import SCENE
+from dem.scene.yaml_text import load_yaml
 
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
@@ -44,9 +49,9 @@ class Settings:
         value = self.values.get(key)
         kind = "a finite number above 0" if positive else "a finite number"
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            refuse("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
+            cannot_read("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
         if positive and value <= 0:
-            refuse("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
+            cannot_read("scene", self.path, f"{self.place}{key} must be {kind}: got {value!r}", _REMEDY)
         return float(value)
 
     def part(self, key: str) -> Settings | None:
@@ -59,7 +64,7 @@ class Settings:
         if value is None:
             return None
         if not isinstance(value, dict):
-            refuse("scene", self.path, f"{self.place}{key} must be a mapping: got {value!r}", _REMEDY)
+            cannot_read("scene", self.path, f"{self.place}{key} must be a mapping: got {value!r}", _REMEDY)
         return Settings(path=self.path, place=f"{self.place}{key}.", values=MappingProxyType(value))
 
     def parts(self, key: str) -> tuple[Settings, ...]:
@@ -72,7 +77,7 @@ class Settings:
         if value is None:
             return ()
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            refuse("scene", self.path, f"{self.place}{key} must be a list of mappings: got {value!r}", _REMEDY)
+            cannot_read("scene", self.path, f"{self.place}{key} must be a list of mappings: got {value!r}", _REMEDY)
         return tuple(
             Settings(path=self.path, place=f"{self.place}{key}.{index}.", values=MappingProxyType(item))
             for index, item in enumerate(value)
@@ -104,13 +109,13 @@ def read_scene(directory: Path | str) -> Settings:
     Source:
         ARCHITECTURE.md, "The run directory": the resolved scene, every default written out.
     """
-    path = Path(directory) / "scene.yaml"
+    path = Path(directory) / SCENE
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError) as error:
-        refuse("scene", path, error, _REMEDY)
+        cannot_read("scene", path, error, _REMEDY)
     if not isinstance(content, dict):
-        refuse("scene", path, "it must be a mapping", _REMEDY)
+        cannot_read("scene", path, "it must be a mapping", _REMEDY)
     return Settings(path=path, values=MappingProxyType(content))
 
 
@@ -129,29 +134,8 @@ def read_phases(directory: Path | str) -> tuple[PhaseSettings, ...]:
     scene = read_scene(directory)
     phases = scene.values.get("phases")
     if not isinstance(phases, list) or not all(isinstance(phase, dict) and "type" in phase for phase in phases):
-        refuse("scene", scene.path, "'phases' must be a list of phases with a type", _REMEDY)
+        cannot_read("scene", scene.path, "'phases' must be a list of phases with a type", _REMEDY)
     return tuple(
         PhaseSettings(path=part.path, place=part.place, values=part.values, index=index, type=str(part.values["type"]))
         for index, part in enumerate(scene.parts("phases"))
     )
-
-
-def read_tiers(directory: Path | str) -> tuple[Cylinder, ...]:
-    """The tiers of a run's container, heights above its floor.
-
-    Args:
-        directory: A run directory.
-
-    Returns:
-        The tiers from below; none where the container is one cylinder.
-
-    Raises:
-        InputError: The file is missing or damaged, or a tier lacks its sizes.
-    """
-    container = read_scene(directory).part("container")
-    found, bottom = [], 0.0
-    for tier in container.parts("tiers") if container is not None else ():
-        top = bottom + tier.number("height_m", positive=True)
-        found.append(Cylinder(radius=tier.number("radius_m", positive=True), bottom=bottom, top=top))
-        bottom = top
-    return tuple(found)

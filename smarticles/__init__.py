@@ -19,7 +19,7 @@ _HOMES = {
     "RunDirectory": "smarticles.public",
     "RunError": "dem.errors",
     "Scene": "dem.scene.scene",
-    "load_scene": "dem.scene.scene",
+    "load_scene": "dem.scene.reading",
     "read": "smarticles.public",
     "run": "smarticles.public",
     "sweep": "smarticles.public",

@@ -1,8 +1,8 @@
 import postprocess as measures
 from dem.errors import InputError as InputError
 from dem.errors import RunError as RunError
-from dem.scene.scene import Scene as Scene
 from dem.scene.reading import load_scene as load_scene
+from dem.scene.scene import Scene as Scene
 from smarticles.public import RunDirectory as RunDirectory
 from smarticles.public import read as read
 from smarticles.public import run as run

@@ -90,7 +90,7 @@ print(json.dumps({{"version": importlib.metadata.version({distribution!r})}}))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class Probe:
     """What was found about one thing.
 
     Attributes:
@@ -124,7 +124,7 @@ def doctor(json_output: bool) -> int:
     Returns:
         Exit status: 0 if everything that a run needs works, otherwise 1.
     """
-    checks: list[Check] = []
+    checks: list[Probe] = []
     for check in examine():
         checks.append(check)
         if not json_output:
@@ -139,9 +139,9 @@ def doctor(json_output: bool) -> int:
     return 1 if failed else 0
 
 
-def examine() -> Iterator[Check]:
+def examine() -> Iterator[Probe]:
     """All checks, one after the other; they take a few seconds."""
-    yield Check(
+    yield Probe(
         name="python",
         ok=True,
         needed=True,
@@ -157,37 +157,37 @@ def examine() -> Iterator[Check]:
     yield check_disk(Path.cwd())
 
 
-def check_yade() -> Check:
+def check_yade() -> Probe:
     """Whether YADE imports and moves a sphere."""
     way_out = "`make setup` installs it; for other systems see environment.md"
     answer = _ask(_YADE)
     if isinstance(answer, str):
-        return Check(name="yade", ok=False, needed=True, found=answer, way_out=way_out)
+        return Probe(name="yade", ok=False, needed=True, found=answer, way_out=way_out)
     found = f"{answer['version']}, {answer['path']}"
     if not 0.08 < answer["speed"] < 0.12:
-        return Check(
+        return Probe(
             name="yade",
             ok=False,
             needed=True,
             found=f"{found}: a sphere falls at {answer['speed']:.3g} m/s after 0.01 s, not 0.1 m/s",
             way_out="install the version that environment.md names",
         )
-    return Check(name="yade", ok=True, needed=True, found=f"{found}; a sphere falls")
+    return Probe(name="yade", ok=True, needed=True, found=f"{found}; a sphere falls")
 
 
-def check_pyvista() -> Check:
+def check_pyvista() -> Probe:
     """Whether PyVista draws without a display."""
     answer = _ask(_PYVISTA)
     if isinstance(answer, str) or answer["contrast"] < 1:
         found = answer if isinstance(answer, str) else f"{answer['window']} draws an empty picture"
-        return Check(
+        return Probe(
             name="pyvista",
             ok=False,
             needed=False,
             found=found,
             way_out="only pictures need it; `make setup` installs it, see environment.md",
         )
-    return Check(
+    return Probe(
         name="pyvista",
         ok=True,
         needed=False,
@@ -195,21 +195,21 @@ def check_pyvista() -> Check:
     )
 
 
-def check_package(module: str, distribution: str, *, needed: bool) -> Check:
+def check_package(module: str, distribution: str, *, needed: bool) -> Probe:
     """Whether a Python package imports, and its version."""
     answer = _ask(_VERSION.format(module=module, distribution=distribution))
     if isinstance(answer, str):
         way_out = "`make setup` installs it"
         if not needed:
             way_out += "; measures and figures need it, a run does not"
-        return Check(name=distribution, ok=False, needed=needed, found=answer, way_out=way_out)
-    return Check(name=distribution, ok=True, needed=needed, found=answer["version"])
+        return Probe(name=distribution, ok=False, needed=needed, found=answer, way_out=way_out)
+    return Probe(name=distribution, ok=True, needed=needed, found=answer["version"])
 
 
-def check_slurm() -> Check:
+def check_slurm() -> Probe:
     """Whether jobs can be submitted to Slurm."""
     if shutil.which("sbatch") is None or shutil.which("scontrol") is None:
-        return Check(
+        return Probe(
             name="slurm",
             ok=False,
             needed=False,
@@ -222,30 +222,30 @@ def check_slurm() -> Check:
         version = _output("sbatch", "--version")
         _output("scontrol", "ping")
     except (OSError, subprocess.SubprocessError):
-        return Check(
+        return Probe(
             name="slurm",
             ok=False,
             needed=False,
             found=f"{version}, its controller does not answer",
             way_out="try `scontrol ping`, or use `--submit local`",
         )
-    return Check(name="slurm", ok=True, needed=False, found=f"{version}, its controller answers")
+    return Probe(name="slurm", ok=True, needed=False, found=f"{version}, its controller answers")
 
 
-def check_cores() -> Check:
+def check_cores() -> Probe:
     """How many cores this process may use."""
     usable, present = len(os.sched_getaffinity(0)), os.cpu_count()
-    return Check(name="cores", ok=True, needed=True, found=f"{usable} usable of {present}")
+    return Probe(name="cores", ok=True, needed=True, found=f"{usable} usable of {present}")
 
 
-def check_memory() -> Check:
+def check_memory() -> Probe:
     """Whether enough memory is free for one run."""
     lines = (line.split() for line in Path("/proc/meminfo").read_text("ascii").splitlines())
     kilobytes = {words[0].rstrip(":"): int(words[1]) for words in lines}
     available = kilobytes["MemAvailable"] * 1024 / _GIB
     total = kilobytes["MemTotal"] * 1024 / _GIB
     ok = available >= _LEAST_MEMORY_GIB
-    return Check(
+    return Probe(
         name="memory",
         ok=ok,
         needed=True,
@@ -254,7 +254,7 @@ def check_memory() -> Check:
     )
 
 
-def check_disk(folder: Path) -> Check:
+def check_disk(folder: Path) -> Probe:
     """Whether a run directory can be written in a folder."""
     free = shutil.disk_usage(folder).free / _GIB
     found = f"{free:.1f} GiB free in {folder}"
@@ -270,10 +270,10 @@ def check_disk(folder: Path) -> Check:
         way_out = "change to a folder that you may write to, or give its path with --out"
     if not way_out and free < _LEAST_DISK_GIB:
         way_out = f"free space until there is {_LEAST_DISK_GIB:g} GiB, or work on another disk"
-    return Check(name="disk", ok=not way_out, needed=True, found=found, way_out=way_out)
+    return Probe(name="disk", ok=not way_out, needed=True, found=found, way_out=way_out)
 
 
-def _row(check: Check) -> str:
+def _row(check: Probe) -> str:
     row = f"{check.name:<15} {check.state:<5} {check.found}"
     return f"{row}\n{'':<15} {'':<5} way out: {check.way_out}" if check.way_out else row
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 
 class Cell(str):
@@ -33,3 +34,9 @@ def _text(value: object) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def told_results(table: str, told: Sequence[str], files: Mapping[str, Path], output: Path) -> str:
+    """What an analysis says at the terminal: its table, its sentences, and where the rest is."""
+    figures = [f"figure: {path}" for path in files.values() if path.suffix == ".png"]
+    return "\n".join([table, "", *told, "", *figures, f"tables, and the origin of every number: {output}"])

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 
 Handler = Callable[[argparse.Namespace], int]
 """Does what a subcommand says; returns the exit status."""
@@ -33,7 +32,7 @@ class Parser(argparse.ArgumentParser):
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
             what = message.partition(":")[0].removeprefix("argument ")
-            message = f"{what}: {invalid[1]!r} is not known; {_nearest(invalid[1], known)}"
+            message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known, cutoff=0.5)}"
         msg = f"{message}; see `{self.prog} --help`"
         raise InputError(msg)
 
@@ -47,12 +46,7 @@ class Parser(argparse.ArgumentParser):
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")
         options = [name for action in self._actions for name in action.option_strings]
-        self.error(f"unknown option {word}; {_nearest(word, options)}")
-
-
-def _nearest(word: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+        self.error(f"unknown option {word}; {nearest(word, options, cutoff=0.5)}")
 
 
 class Commands:

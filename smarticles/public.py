@@ -16,7 +16,7 @@ from dem.scene.scene import Scene
 from postprocess import FrameSequence, RunManifest, Series, read_frames, read_run, read_series
 from smarticles.main import BAD_INPUT
 from smarticles.sweeps import complete, make_folder
-from templates.local.local import environment, smarticles_command
+from templates.local.runner import environment, smarticles_command
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from dem.errors import RunError
 
 if TYPE_CHECKING:
     from dem.scene.scene import Scene
-    from templates.local.local import Outcome
+    from templates.local.runner import Outcome
     from templates.sweep.expand import Point
     from templates.sweep.folder import Folder
-    from templates.sweep.sweep import Sweep
+    from templates.sweep.sweep_file import Sweep
 
 
 def make_folder(
@@ -40,7 +40,7 @@ def make_folder(
         InputError: the sweep is not valid, or the directory holds something else.
     """
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     sweep = with_constants(load_sweep(file), constants or {})
     return folder_of(sweep, expand(sweep, max_points=max_points or MAX_POINTS), out, command)
@@ -89,7 +89,7 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     from rich.console import Console  # noqa: PLC0415
 
     from templates.local.display import display_for  # noqa: PLC0415
-    from templates.local.local import run_folder  # noqa: PLC0415
+    from templates.local.runner import run_folder  # noqa: PLC0415
     from templates.slurm.submission import refuse_queued  # noqa: PLC0415
 
     refuse_queued(folder)

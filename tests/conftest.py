@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
@@ -11,28 +10,13 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from scenes import SMALL, changed, small
 
-from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 
 # The same cases on every machine, and no failure because a shared machine was slow.
 settings.register_profile("suite", derandomize=True, deadline=None, max_examples=25)
 settings.load_profile("suite")
-
-
-def changed(data: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """A copy with `{"phases.1.duration_s": 2}` and the like put in."""
-    data = copy.deepcopy(data)
-    for key, value in changes.items():
-        here: Any = data
-        *parents, last = key.split(".")
-        for part in parents:
-            here = here[int(part)] if isinstance(here, list) else here.setdefault(part, {})
-        if isinstance(here, list):
-            here[int(last)] = value
-        else:
-            here[last] = value
-    return data
 
 
 @pytest.fixture
@@ -63,31 +47,15 @@ def scene_data() -> Callable[..., dict[str, Any]]:
     """Plain data of a small scene: pour, rest, shake. Positional mapping: dotted keys to change."""
 
     def make(changes: dict[str, Any] | None = None) -> dict[str, Any]:
-        data = {
-            "schema_version": 1,
-            "name": "small",
-            "seed": 1,
-            "count": 10,
-            "fidelity": "draft",
-            "phases": [
-                {"type": "deposit", "per_layer": 5},
-                {"type": "relax", "duration_s": 0.1},
-                {"type": "shake", "duration_s": 0.2, "frequency_hz": 30, "peak_acceleration_g": 2},
-            ],
-        }
-        return changed(data, changes or {})
+        return changed(SMALL, changes or {})
 
     return make
 
 
 @pytest.fixture
-def make_scene(scene_data: Callable[..., dict[str, Any]]) -> Callable[..., Scene]:
+def make_scene() -> Callable[..., Scene]:
     """The same, validated."""
-
-    def make(changes: dict[str, Any] | None = None) -> Scene:
-        return parse_scene(scene_data(changes), source="scene.yaml")
-
-    return make
+    return small
 
 
 def pytest_configure() -> None:

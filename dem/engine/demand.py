@@ -45,7 +45,7 @@ class Demand(Protocol):
 
     @property
     def gravity_m_per_s2(self) -> float:
-        """g [m/s²]."""
+        """G [m/s²]."""
 
     @property
     def fidelity(self) -> Fidelity:

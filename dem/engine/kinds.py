@@ -46,13 +46,12 @@ class EngineKind(Protocol):
             articulated: whether barbs may turn, or have turned before.
         """
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
-        """Wall seconds that a step costs in the full pile, one core, about.
+    def seconds_per_step(self, scene: Demand) -> float:
+        """Wall seconds that a step of rigid smarticles costs in the full pile, one core, about."""
 
-        Args:
-            scene: the scene.
-            actuated: whether motors are at work.
-        """
+    @property
+    def actuated_share(self) -> float:
+        """What a step costs while motors are at work, over one of rigid smarticles [1]."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
         """A simulation of a scene, empty, with a time step [s] of its phases with motors that is not checked."""

@@ -109,7 +109,8 @@ def plan(scene: Scene) -> Plan:
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
-        wall = kind.seconds_per_step(scene, actuated=phase.actuates) / dt * estimate * (POUR_SHARE if phase.pours else 1.0)
+        share = POUR_SHARE if phase.pours else kind.actuated_share if phase.actuates else 1.0
+        wall = kind.seconds_per_step(scene) / dt * estimate * share
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)

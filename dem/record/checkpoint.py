@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError
-from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT, partial
+from dem.record.files import whole
+from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
 # In checkpoints of before engines had names there was one engine: its member, and the key of its version.
@@ -55,7 +56,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     Raises:
         RunError: it cannot be written; the checkpoints that were there stay.
     """
-    temporary, newest = folder / partial(CHECKPOINT), folder / CHECKPOINT
+    newest = folder / CHECKPOINT
     name, version = checkpoint.made_by
     head = {
         "format": CHECKPOINT_FORMAT,
@@ -65,18 +66,14 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     columns = io.BytesIO()
     np.savez(columns, **checkpoint.series)  # type: ignore[arg-type] # the stubs take any keyword for allow_pickle
     try:
-        with temporary.open("wb") as file:
+        with whole(newest, before=folder / CHECKPOINT_BEFORE) as temporary, temporary.open("wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 archive.writestr(_STATE, json.dumps({**head, **checkpoint.state}))
                 archive.writestr(_SERIES, columns.getvalue())
                 archive.writestr(_ENGINE, checkpoint.engine)
             file.flush()
             os.fsync(file.fileno())
-        if newest.exists():
-            os.replace(newest, folder / CHECKPOINT_BEFORE)  # noqa: PTH105 - the atomic call by its name
-        os.replace(temporary, newest)  # noqa: PTH105
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         msg = (
             f"{newest}: cannot be written ({error.strerror or error}); free space and go on with "
             "`smarticles run … --resume`; the checkpoint before is whole"

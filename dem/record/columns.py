@@ -124,3 +124,14 @@ STRAIN_COLUMNS: Columns = {
     "chain_length_m": Column("m", "chain length", "distance along x of the two points where strings are tied"),
     "chain_width_m": Column("m", "chain width", "extent of all links along y, with their thickness"),
 }
+
+EVERY: Columns = {
+    **COLUMNS,
+    **MOTOR_COLUMNS,
+    **ENERGY_COLUMNS,
+    **LEDGER_COLUMNS,
+    **HOOK_COLUMNS,
+    **RELEASE_COLUMNS,
+    **STRAIN_COLUMNS,
+}
+"""All that any scene may have."""

@@ -1,20 +1,43 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and how a file that cannot be read is told."""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from dem.errors import RunError
+from dem.errors import InputError, RunError
 from dem.record.names import partial
 
 
+@contextlib.contextmanager
+def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
+    """A temporary path beside `path`, renamed to it when the block ends well, removed when it does not.
+
+    Args:
+        path: the file that is to appear, or to be replaced.
+        before: where the file that is replaced is to be kept; None: nowhere.
+        shared: whether several processes may write the same file at once.
+    """
+    name = f"{path.stem}.{os.getpid()}{path.suffix}" if shared else path.name
+    temporary = path.with_name(partial(name))
+    try:
+        yield temporary
+        if before is not None and path.exists():
+            os.replace(path, before)  # noqa: PTH105 - the atomic call by its name
+        os.replace(temporary, path)  # noqa: PTH105
+    except BaseException:
+        # Where even this fails, the first error is the one to tell.
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+
+
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` make a file under a temporary name beside `path`, then rename it.
+    """Let `write` make a file of a run, a sweep or a bench.
 
     Args:
         path: the file that is to appear, or to be replaced; its folder is made if needed.
@@ -23,31 +46,20 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     Raises:
         RunError: the disk is full or the folder cannot be written; what was at `path` before is untouched.
     """
-    temporary = path.with_name(partial(path.name))
     try:
         path.parent.mkdir(exist_ok=True)
-        write(temporary)
-        os.replace(temporary, path)  # noqa: PTH105 - the atomic call by its name
+        with whole(path) as temporary:
+            write(temporary)
     except OSError as error:
-        _remove(temporary)
         msg = (
             f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
             "everything written before is whole"
         )
         raise RunError(msg) from error
-    except BaseException:
-        _remove(temporary)
-        raise
-
-
-def _remove(path: Path) -> None:
-    # Where even this fails, the first error is the one to tell.
-    with contextlib.suppress(OSError):
-        path.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text whole."""
+    """Write text whole; errors as in `write_whole`."""
 
     def write(temporary: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
@@ -56,5 +68,26 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write JSON whole."""
+    """Write JSON whole; errors as in `write_whole`."""
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+
+
+def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
+    """Says in one line that a file is missing, truncated or not what it should be.
+
+    Args:
+        what: What the file is, e.g. "frame".
+        path: The file.
+        cause: Why it cannot be used; of an exception only its first line is kept.
+        remedy: The way out.
+
+    Raises:
+        InputError: Always. The exception behind it, if any, is left out of what the user sees.
+    """
+    if isinstance(cause, BaseException):
+        lines = str(cause).strip().splitlines()
+        named = ": ".join([type(cause).__name__, *lines[:1]])
+        # The system's own words say enough, and str() would repeat the path.
+        cause = getattr(cause, "strerror", None) or named
+    msg = f"cannot read {what} {path}: {cause}; {remedy}"
+    raise InputError(msg) from None

@@ -1,107 +1,25 @@
-"""Frames: one small VTK file per recorded time, and the ParaView collection that lists them; spheres the same way.
-
-The format is the contract with `postprocess`; ARCHITECTURE.md describes it.
-"""
+"""The frames of a run in time: files numbered in order, and the ParaView collection that lists them."""
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import overload
+from xml.etree import ElementTree as ET
 from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.particle import LINKS, Particle
-from dem.body.state import State
 from dem.record import names
-from dem.record.files import write_text, write_whole
+from dem.record.files import cannot_read, write_text, write_whole
+from dem.record.frame import Frame, read_frame
 
-Array = NDArray[np.float64]
-
-VERTICES = 4
-
-
-def frame_mesh(
-    state: State,
-    *,
-    contacts: NDArray[np.int64],
-    time: float,
-    floor: float,
-    phase: int,
-    hinged: bool = False,
-    torques: NDArray[np.float64] | None = None,
-    work: NDArray[np.float64] | None = None,
-    halted: NDArray[np.bool_] | None = None,
-) -> meshio.Mesh:
-    """One frame as a mesh of lines.
-
-    Args:
-        state: all smarticles at this time.
-        contacts: (N,) how many others each smarticle touches.
-        time: simulated time [s].
-        floor: height of the container's floor [m].
-        phase: index of the phase.
-        hinged: whether the scene has hinges and motors at all.
-        torques: (N, 2) of the motors on the barbs [N m]; None while welded.
-        work: (N, 2) of the motors since the start [J]; None while welded.
-        halted: (N, 2) whether a motor is halted; None while welded.
-    """
-    n = state.count
-    first = VERTICES * np.arange(n)[:, None] + np.arange(LINKS)
-    lines = np.stack([first, first + 1], axis=-1).reshape(-1, 2)
-    number = LINKS * n
-    data = {
-        "smarticle_id": np.repeat(np.arange(n), LINKS),
-        "link": np.tile(np.arange(LINKS), n),
-        "velocity_m_per_s": state.link_velocities.reshape(-1, 3),
-        "angular_velocity_rad_per_s": state.link_spins.reshape(-1, 3),
-        "contacts": np.repeat(contacts, LINKS),
-        "time_s": np.full(number, time),
-        "floor_z_m": np.full(number, floor),
-        "phase": np.full(number, phase, dtype=np.int64),
-    }
-    if hinged:
-        none = np.full((n, 2), np.nan)
-        data |= {
-            "angle_rad": _per_link(state.angles),
-            "motor_torque_N_m": _per_link(none if torques is None else torques),
-            "motor_work_J": _per_link(none if work is None else work),
-            "halted": np.nan_to_num(_per_link(none if halted is None else halted)).astype(np.int64),
-        }
-    return meshio.Mesh(
-        state.vertices.reshape(-1, 3),
-        [("line", lines)],
-        cell_data={name: [values] for name, values in data.items()},
-    )
-
-
-def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
-    """The spheres of all smarticles as points, for ParaView's glyphs: what the engine sees of them.
-
-    Args:
-        state: all smarticles at this time.
-        particle: one smarticle, of S spheres.
-    """
-    count, spheres = state.count, len(particle.centres)
-    number = count * spheres
-    data = {
-        "radius_m": np.full(number, particle.radius),
-        "smarticle_id": np.repeat(np.arange(count), spheres),
-        "link": np.tile(particle.links, count).astype(np.int64),
-    }
-    points = state.spheres(particle).reshape(-1, 3)
-    return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
-
-
-def _per_link(barbs: NDArray[Any]) -> Array:
-    """(3N,) values on the barbs, from (N, 2); NaN on the middle links."""
-    links = np.full((len(barbs), LINKS), np.nan)
-    links[:, [0, 2]] = barbs
-    return links.ravel()
+_REMEDY = "give the directory of a run that has written a frame"
 
 
 @dataclass
@@ -144,3 +62,92 @@ class FrameWriter:
         ]
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
+
+
+class FrameSequence(Sequence[Frame]):
+    """The frames of a run in time order; a file is read only when its frame is asked for.
+
+    A slice is again a lazy sequence. Frames are not kept: each access reads the file anew.
+
+    Attributes:
+        times: (n,) float64 [s], as listed in `frames.pvd`; needs no frame to be read.
+        paths: The files, in time order.
+    """
+
+    def __init__(self, times: NDArray[np.float64], paths: tuple[Path, ...]) -> None:
+        self.times = times
+        self.paths = paths
+
+    def __repr__(self) -> str:
+        if not self.paths:
+            return "FrameSequence(empty)"
+        span = f"{self.times[0]:g} s … {self.times[-1]:g} s"
+        return f"FrameSequence({len(self)} frames, {span})"
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> FrameSequence: ...
+
+    def __getitem__(self, index: int | slice) -> Frame | FrameSequence:
+        if isinstance(index, slice):
+            return FrameSequence(self.times[index], self.paths[index])
+        return read_frame(self.paths[index])
+
+    def in_phase(self, phase: int) -> FrameSequence:
+        """The frames of one phase, found by bisection: phases follow each other in time.
+
+        Args:
+            phase: Index into `RunManifest.phases`.
+
+        Returns:
+            Its frames; empty if the run has not recorded any.
+        """
+        first = bisect_left(self, phase, key=attrgetter("phase"))
+        last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
+        return self[first:last]
+
+
+def read_frames(directory: Path | str) -> FrameSequence:
+    """Opens the frames of a run; the run may be done, failed or still going on.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The frames in time order, read lazily.
+
+    Raises:
+        InputError: `frames.pvd` is missing, damaged or not in time order.
+
+    Source:
+        ARCHITECTURE.md, "The run directory".
+
+    Example:
+        >>> for frame in read_frames("runs/pile")[-2:]:
+        ...     print(frame.phase, frame.vertices.shape)
+        3 (12, 4, 3)
+        3 (12, 4, 3)
+    """
+    path = Path(directory) / names.collection(names.FRAME)
+    try:
+        root = ET.parse(path).getroot()
+    except (OSError, ET.ParseError) as error:
+        cannot_read("list of frames", path, error, _REMEDY)
+    times, files = [], []
+    for entry in root.iter("DataSet"):
+        try:
+            times.append(float(entry.attrib["timestep"]))
+            files.append(path.parent / entry.attrib["file"])
+        except (KeyError, ValueError) as error:
+            cause = f"entry {len(files)} lacks a time or a file ({error})"
+            cannot_read("list of frames", path, cause, _REMEDY)
+    if not files:
+        cannot_read("list of frames", path, "it lists no frame", _REMEDY)
+    if not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0):
+        cannot_read("list of frames", path, "its times do not ascend", _REMEDY)
+    return FrameSequence(np.array(times), tuple(files))

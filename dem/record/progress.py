@@ -21,7 +21,7 @@ def _now() -> float:
 
 
 @dataclass
-class Progress:
+class ProgressWriter:
     """Tells at most once per second.
 
     Args:

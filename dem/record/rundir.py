@@ -1,4 +1,4 @@
-"""The run directory: claimed by one process at a time, and marked when the run has ended."""
+"""The run directory: claimed by one process at a time, with its log."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from dem.errors import InputError, RunError
-from dem.record.files import write_json
-from dem.record.names import DONE, FAILED, LOCK, LOG, MANIFEST, is_partial
+from dem.errors import InputError
+from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 
 @contextmanager
@@ -80,32 +78,6 @@ def recorded_scene_hash(out: Path) -> str:
     except (OSError, ValueError, KeyError, TypeError):
         msg = f"{path}: cannot be read; start the run anew in another --out"
         raise InputError(msg) from None
-
-
-def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
-    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too.
-
-    Args:
-        out: the run directory.
-        status: "failed" or "interrupted".
-        cause: why.
-        time: simulated time that the run came to [s].
-        checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
-    """
-    try:
-        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
-    except RunError:
-        return
-
-
-def mark_done(out: Path, data: dict[str, Any]) -> None:
-    """Write `done.json`, the last file of a run.
-
-    Raises:
-        RunError: it cannot be written.
-    """
-    (out / FAILED).unlink(missing_ok=True)
-    write_json(out / DONE, {"status": "done", **data})
 
 
 @contextmanager

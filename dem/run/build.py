@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
 from dem.plan.effects import called_for
+from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter
 from dem.record.names import SPHERE
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.sampler import Sampler
@@ -34,7 +37,7 @@ def build_engine(scene: Scene, dt: float) -> Engine:
     return engine_kind(scene.engine).build(scene, dt)
 
 
-def build_recorder(scene: Scene, out: Path, progress: Progress) -> Recorder:
+def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
     """The recorder of a scene, with the watchdog's limits."""
     recording = scene.recording
     # No one radius gives the volume of a mould of tiers.
@@ -65,3 +68,18 @@ def build_watchdog(scene: Scene) -> Watchdog:
         # Without gravity there is no such measure.
         energy=RISE_LIMIT * diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
     )
+
+
+@dataclass(frozen=True)
+class Builders:
+    """What makes the parts of a run; who watches or spoils one on purpose gives others.
+
+    Args:
+        steps: time step of each phase [s].
+        engine: of a scene and a time step [s].
+        recorder: of a scene, a run directory and its progress.
+    """
+
+    steps: Callable[[Scene], Sequence[float]] = time_steps
+    engine: Callable[[Scene, float], Engine] = build_engine
+    recorder: Callable[[Scene, Path, ProgressWriter], Recorder] = build_recorder

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from dem.body.state import State
 from dem.engine.interface import Engine
-from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
-from dem.record.progress import Progress
+from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frames import FrameWriter
+from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.sampler import Sampler
 from dem.run.watchdog import Watchdog
@@ -42,7 +43,7 @@ class Recorder:
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
-    progress: Progress
+    progress: ProgressWriter
     interval: float
     frame_every: int
     watch_every: int | None = None

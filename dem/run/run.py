@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
@@ -19,13 +18,13 @@ import numpy as np
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.advice import warnings_of
-from dem.plan.steps import time_steps
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
-from dem.record.files import write_json, write_text
-from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, SCENE
-from dem.record.progress import Progress
-from dem.record.rundir import claimed, log_of, mark_done, mark_failed, recorded_scene_hash
-from dem.run.build import build_engine, build_recorder
+from dem.record.files import write_text
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
+from dem.record.names import DONE, FAILED, SCENE
+from dem.record.progress import ProgressWriter
+from dem.record.rundir import claimed, log_of, recorded_scene_hash
+from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import dump_scene, scene_hash
 from dem.scene.scene import Scene
@@ -48,7 +47,9 @@ class RunOutcome:
     wall_s: float
 
 
-def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False) -> RunOutcome | None:
+def run_scene(
+    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+) -> RunOutcome | None:
     """Run a scene into a run directory.
 
     Args:
@@ -57,6 +58,7 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         command: the command line, for the manifest.
         progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
+        builders: what makes its parts; by default what a run has.
 
     Returns:
         The outcome; None where the run was done already and there was nothing to resume.
@@ -67,23 +69,21 @@ def run_scene(scene: Scene, out: Path, *, command: str, progress: bool, resume: 
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
-    steps, kind = time_steps(scene), engine_kind(scene.engine)
-    made_by = (kind.name, kind.version())
+    builders, kind = builders or Builders(), engine_kind(scene.engine)
+    steps, made_by = builders.steps(scene), (kind.name, kind.version())
     with claimed(out, resume=resume):
         if resume and (out / DONE).exists():
             return None
         if resume:
             _check_scene(scene, out)
         else:
-            write_json(
-                out / MANIFEST, manifest(scene, steps=steps, command=command, made_by=made_by, threads=kind.threads())
-            )
+            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=kind.threads()))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, steps=steps, made_by=made_by, progress=progress, resume=resume)
+            return _run(scene, out, log, builders, steps=steps, made_by=made_by, progress=progress, resume=resume)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -100,20 +100,21 @@ def _run(
     scene: Scene,
     out: Path,
     log: logging.Logger,
+    builders: Builders,
     *,
     steps: Sequence[float],
     made_by: tuple[str, str],
     progress: bool,
     resume: bool,
 ) -> RunOutcome:
-    bar = Progress(out, scene.count, show=progress)
+    bar = ProgressWriter(out, scene.count, show=progress)
     simulation: Simulation | None = None
     try:
-        engine = build_engine(scene, min(steps))
+        engine = builders.engine(scene, min(steps))
         simulation = Simulation(
             scene=scene,
             engine=engine,
-            recorder=build_recorder(scene, out, bar),
+            recorder=builders.recorder(scene, out, bar),
             folder=out,
             log=log,
             made_by=made_by,
@@ -124,16 +125,7 @@ def _run(
         if resume:
             _restore(simulation, scene, out, log)
         phases = simulation.run()
-        mark_done(
-            out,
-            {
-                "time_s": engine.time,
-                "steps": engine.steps,
-                "wall_s": simulation.wall,
-                "cpu_s": simulation.cpu,
-                "phases": phases,
-            },
-        )
+        mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
     except RunError as error:
         _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
@@ -194,46 +186,50 @@ def _keep_series(simulation: Simulation | None) -> None:
 
 
 def manifest(
-    scene: Scene, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
-) -> dict[str, Any]:
-    """The content of `run.json`: what made the run, and the numbers that measures need.
+    scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
+) -> RunManifest:
+    """What makes the run, and the numbers that measures need.
 
     Args:
         scene: what is run.
+        out: the run directory.
         steps: time step of each phase [s].
         command: the command line.
         made_by: name and version of the engine.
         threads: that it runs with.
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
-    return {
-        "format": MANIFEST_FORMAT,
-        "name": scene.name,
-        "scene_sha256": scene_hash(scene),
-        "seed": scene.seed,
-        "command": command,
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(made_by),
-        "threads": threads,
-        "fidelity": scene.fidelity.base,
-        "count": scene.count,
-        "aspect_ratio": scene.smarticle.aspect_ratio,
-        "middle_length_m": boxes.middle_length,
-        "barb_length_m": boxes.barb_length,
-        "thickness_normal_m": boxes.thickness_normal,
-        "thickness_in_plane_m": boxes.thickness_in_plane,
-        "smarticle_mass_kg": boxes.mass,
-        "solid_volume_m3": boxes.volume,
-        "container_radius_m": scene.container.radius_m,
-        "container_tiers": 1 + len(scene.cylinder.upper),
-        "sphere_diameter_m": particle.chain.diameter,
-        "spheres_per_smarticle": len(particle.centres),
-        "time_step_s": min(steps),
-        "phases": [
-            {"index": k, "type": phase.kind, "time_step_s": dt}
+    return RunManifest(
+        directory=out,
+        name=scene.name,
+        scene_sha256=scene_hash(scene),
+        seed=scene.seed,
+        command=command,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=versions(made_by),
+        threads=threads,
+        fidelity=scene.fidelity.base,
+        count=scene.count,
+        aspect_ratio=scene.smarticle.aspect_ratio,
+        middle_length=boxes.middle_length,
+        barb_length=boxes.barb_length,
+        thickness_normal=boxes.thickness_normal,
+        thickness_in_plane=boxes.thickness_in_plane,
+        smarticle_mass=boxes.mass,
+        solid_volume=boxes.volume,
+        container_radius=scene.container.radius_m,
+        container_tiers=1 + len(scene.cylinder.upper),
+        sphere_diameter=particle.chain.diameter,
+        spheres_per_smarticle=len(particle.centres),
+        time_step=min(steps),
+        phases=tuple(
+            PhaseRecord(index=k, type=phase.kind, time_step=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
-        ],
-    } | ({} if scene.plane is None else {"planar": True, "channel_width_m": scene.plane.width_m})
+        ),
+        status="unfinished",
+        planar=scene.plane is not None,
+        channel_width=None if scene.plane is None else scene.plane.width_m,
+    )
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:

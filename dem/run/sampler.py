@@ -24,7 +24,7 @@ from dem.record.columns import (
     STRAIN_COLUMNS,
     Columns,
 )
-from dem.record.series import packing_fraction
+from dem.record.packing import packing_fraction
 
 COLUMNS_OF: Mapping[EffectName, Columns] = {
     EffectName.MOTORS: MOTOR_COLUMNS,

@@ -112,8 +112,8 @@ class Watchdog:
             RunError: cause, smarticles concerned, time and the way out.
         """
         cause = (
-            f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass through "
-            "each other or through the container"
+            f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
+            "through each other or through the container"
         )
         way_out = "raise fidelity.stiffness_N_per_m, or load the pile less"
         if overlaps.held:

@@ -32,6 +32,10 @@ from dem.setting.plane import Channel, Plane
 from dem.setting.recording import Recording
 from dem.setting.smarticle import Smarticle
 
+# Diameters from sphere to sphere of the chains that stand for smooth links where poses are drawn, and in pictures: two
+# of them overlap by a thirtieth of a diameter at most before the links do.
+SMOOTH_PITCH = 0.35
+
 
 class Scene(Part):
     """One run: everything that decides its result."""
@@ -120,6 +124,11 @@ class Scene(Part):
         return max(pile, hooks_top) + 4 * self.particle.reach + 6 * boxes.middle_length
 
     @property
+    def smooth(self) -> bool:
+        """Whether the engine takes links as they are, swept segments, and not as chains of spheres."""
+        return self.engine == "links"
+
+    @property
     def sphere_diameter(self) -> float:
         """Sphere diameter [m]: given, or by the rule that `Fidelity.diameter_m` states."""
         if self.fidelity.diameter_m is not None:
@@ -127,7 +136,8 @@ class Scene(Part):
         smarticle = self.smarticle
         if self.fidelity.rows == 1:
             width = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
-            return width / chain_mean_width(self.fidelity.pitch)
+            # A smooth round bar touches others at its own diameter, which chains of spheres do not.
+            return width if self.smooth else width / chain_mean_width(self.fidelity.pitch)
         return smarticle.thickness_in_plane_m
 
     def seed_for(self, purpose: str) -> int:
@@ -176,7 +186,8 @@ class Scene(Part):
     def particle(self) -> Particle:
         """The smarticle as the engine sees it."""
         diameter = self.sphere_diameter
-        chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=self.fidelity.pitch * diameter)
+        pitch = SMOOTH_PITCH if self.smooth else self.fidelity.pitch
+        chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=pitch * diameter)
         return Particle(self.smarticle.boxes, chain)
 
 

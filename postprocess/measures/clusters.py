@@ -10,9 +10,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import checked_vertices
 from postprocess.measures.contacts import contact_pairs
 from postprocess.measures.entanglement import crossing_pairs
-from postprocess.measures.geometry import checked_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

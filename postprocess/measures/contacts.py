@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
-from postprocess.measures.geometry import checked_vertices, link_lengths
+from postprocess.geometry.links import checked_vertices, link_lengths
+from postprocess.measures.registry import FrameMeasure, Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -159,3 +160,13 @@ def _point_distances(
 def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     product: NDArray[np.float64] = np.einsum("nc,nc->n", a, b)
     return product
+
+
+MEASURES = (
+    FrameMeasure(
+        name="contacts",
+        place=50,
+        quantities=(Quantity("contacts mean", "-"),),
+        take=lambda frame, _: (float(frame.contacts.mean()),),
+    ),
+)

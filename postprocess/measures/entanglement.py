@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from postprocess.measures.geometry import bounding_spheres, checked_vertices, link_lengths, plane_frames
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.geometry.links import bounding_spheres, checked_vertices, link_lengths, plane_frames
+from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -270,3 +273,19 @@ def _sorted_nonzero(
     keep = np.nonzero(number)[0]
     order = keep[np.lexsort((j[keep], i[keep]))]
     return i[order], j[order], number[order]
+
+
+def _entanglement_of(frame: Frame, _: RunManifest) -> tuple[float, int]:
+    tangle = entanglement(frame.vertices)
+    return tangle.mean, int(tangle.has_plane.sum())
+
+
+MEASURES = (
+    FrameMeasure(
+        name="entanglement",
+        place=40,
+        quantities=(Quantity("crossings mean", "-"), Quantity("planes", "-")),
+        take=_entanglement_of,
+        told_of=in_space,
+    ),
+)

@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from dem.record.packing import second_highest
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.geometry import centres_of_mass, checked_vertices, link_lengths
+from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
+from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 from postprocess.statistics.bisection import least_reaching
 
 if TYPE_CHECKING:
@@ -60,7 +64,7 @@ def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95
         # Smarticles may differ in length, so their centres are weighted by it.
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
         highest_com=float(com[-1]),
-        second_highest_com=float(com[-2]) if len(com) > 1 else float("nan"),
+        second_highest_com=second_highest(com),
         top=material_height(vertices, floor_z=floor_z, percentile=percentile),
         percentile=percentile,
     )
@@ -102,3 +106,26 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
     return least_reaching(
         lambda height: weights @ np.clip((height - lower) / span, 0, 1), wanted, float(lower.min()), float(upper.max())
     )
+
+
+_PERCENTILE = 95.0
+
+
+def _heights_of(frame: Frame, _: RunManifest) -> tuple[float, ...]:
+    levels = heights(frame.vertices, floor_z=frame.floor_z, percentile=_PERCENTILE)
+    return levels.mean_com, levels.second_highest_com, levels.top
+
+
+MEASURES = (
+    FrameMeasure(
+        name="heights",
+        place=30,
+        quantities=(
+            Quantity("com height", "m"),
+            Quantity("second-highest com height", "m"),
+            Quantity(f"top {_PERCENTILE:g} % height", "m"),
+        ),
+        take=_heights_of,
+        told_of=in_space,
+    ),
+)

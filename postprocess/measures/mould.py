@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.measures.geometry import checked_vertices, link_lengths
-from postprocess.measures.outline import outlines
+from postprocess.geometry.links import checked_vertices, link_lengths
+from postprocess.geometry.outline import outlines
+from postprocess.geometry.region import Region
+from postprocess.scene_file import read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.measures.region import Cylinder
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -22,7 +23,7 @@ class Cast:
     """A pile in its mould, and the same pile without it.
 
     Attributes:
-        filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.measures.outline` [-].
+        filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-].
         filled_after: (T,) the same without the mould [-].
         kept: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier.
         material_before: (T,) share of all links' length inside each tier [-].
@@ -45,7 +46,7 @@ class Cast:
 def cast(
     before: ArrayLike,
     after: ArrayLike,
-    tiers: Sequence[Cylinder],
+    tiers: Sequence[Region],
     *,
     thickness: float,
     ball: float,
@@ -87,12 +88,33 @@ def cast(
     )
 
 
+def read_tiers(directory: Path | str) -> tuple[Region, ...]:
+    """The tiers of a run's container, heights above its floor.
+
+    Args:
+        directory: A run directory.
+
+    Returns:
+        The tiers from below; none where the container is one cylinder.
+
+    Raises:
+        InputError: The file is missing or damaged, or a tier lacks its sizes.
+    """
+    container = read_scene(directory).part("container")
+    found, bottom = [], 0.0
+    for tier in container.parts("tiers") if container is not None else ():
+        top = bottom + tier.number("height_m", positive=True)
+        found.append(Region(radius=tier.number("radius_m", positive=True), bottom=bottom, top=top))
+        bottom = top
+    return tuple(found)
+
+
 def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
     total = int(whole.sum())
     return float(part.sum() / total) if total else float("nan")
 
 
-def _material(vertices: ArrayLike, tiers: Sequence[Cylinder], samples: int = 50) -> NDArray[np.float64]:
+def _material(vertices: ArrayLike, tiers: Sequence[Region], samples: int = 50) -> NDArray[np.float64]:
     """(T,) share of all links' length in each tier, by points evenly along each link."""
     vertices = checked_vertices(vertices)
     shares = (np.arange(samples) + 0.5) / samples

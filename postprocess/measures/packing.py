@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from dem.record.packing import filled
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.geometry import checked_vertices
+from postprocess.geometry.links import checked_vertices
+from postprocess.geometry.region import Region, inner_region
+from postprocess.geometry.voronoi import local_packing
+from postprocess.geometry.voxel import solid_fraction
 from postprocess.measures.heights import heights, material_height
-from postprocess.measures.region import Cylinder, inner_region
-from postprocess.measures.voronoi import local_packing
-from postprocess.measures.voxel import solid_fraction
+from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -96,13 +101,14 @@ def packing_fraction(
 
     Source:
         "second-highest-com": wsavoie/SmarticleSim, without the factor (0.0234/0.0224)² = 1.091
-        that one of its scripts applies. "voronoi": see `postprocess.measures.voronoi`.
+        that one of its scripts applies. "voronoi": see `postprocess.geometry.voronoi`.
 
     Example:
-        >>> result = packing_fraction(  # doctest: +SKIP
-        ...     frame.vertices, radius=0.0234, solid_volume=1.783e-8, floor_z=frame.floor_z
-        ... )
-        >>> result.value, result.definition  # doctest: +SKIP
+        >>> from postprocess import read_frames
+        >>> frame = read_frames("runs/pile")[-1]
+        >>> result = packing_fraction(frame.vertices, radius=0.0234, solid_volume=1.783e-8, floor_z=frame.floor_z)
+        >>> round(result.value, 3), result.definition
+        (0.132, 'second-highest-com')
     """
     vertices = checked_vertices(vertices)
     if definition not in DEFINITIONS:
@@ -122,7 +128,7 @@ def packing_fraction(
     if not height > 0:
         msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
         raise UndefinedMeasureError(msg)
-    pile = Cylinder(radius=radius, bottom=floor_z, top=floor_z + height, axis=axis)
+    pile = Region(radius=radius, bottom=floor_z, top=floor_z + height, axis=axis)
     if definition == "voxel":
         if thickness_normal is None or thickness_in_plane is None:
             msg = "definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None"
@@ -143,5 +149,47 @@ def packing_fraction(
             spacing=spacing,
         ).value
     else:
-        value = len(vertices) * solid_volume / pile.volume
+        value = filled(len(vertices), solid_volume=solid_volume, radius=radius, height=pile.top - pile.bottom)
     return PackingFraction(value=value, definition=definition, height=height)
+
+
+def packing_of(frame: Frame, run: RunManifest, *, definition: str) -> float:
+    """Packing fraction of a frame of a run [-]; NaN where it has no meaning.
+
+    Args:
+        frame: One of the run's frames.
+        run: The run.
+        definition: Key of `DEFINITIONS`.
+    """
+    if not run.fills_cylinder(frame.phase):
+        return math.nan
+    try:
+        return packing_fraction(
+            frame.vertices,
+            radius=run.container_radius,
+            solid_volume=run.solid_volume,
+            definition=definition,
+            floor_z=frame.floor_z,
+            thickness_normal=run.thickness_normal,
+            thickness_in_plane=run.thickness_in_plane,
+        ).value
+    except UndefinedMeasureError:
+        return math.nan
+
+
+def _packing(definition: str, frame: Frame, run: RunManifest) -> tuple[float]:
+    return (packing_of(frame, run, definition=definition),)
+
+
+MEASURES = tuple(
+    FrameMeasure(
+        name=f"phi {definition}",
+        place=70,
+        quantities=(Quantity(f"phi {definition}", "-"),),
+        take=partial(_packing, definition),
+        told_of=in_space,
+        definition=definition,
+        costly=definition in COSTLY_DEFINITIONS,
+    )
+    for definition in DEFINITIONS
+)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from dem.record.series import Series
+from postprocess.measures.registry import PhaseMeasure, Quantity
 from postprocess.scene_file import Settings, read_phases, read_scene
-from postprocess.series import Series
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +36,7 @@ END = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pull:
+class HookPull:
     """A hook's history while it is pulled.
 
     Attributes:
@@ -66,7 +67,7 @@ class Pull:
         return float(self.force @ np.diff(self.raised))
 
     @property
-    def net(self) -> Pull:
+    def net(self) -> HookPull:
         """The same history with the force that does not go on to the other hook: that of pile and container."""
         return replace(self, force=self.force - self.held)
 
@@ -91,7 +92,7 @@ class Peak:
     raised: float
 
 
-def read_pull(run: RunManifest, series: Series, phase: int) -> Pull:
+def read_pull(run: RunManifest, series: Series, phase: int) -> HookPull:
     """A hook's history in a phase, so far as it has come.
 
     Args:
@@ -113,7 +114,7 @@ def read_pull(run: RunManifest, series: Series, phase: int) -> Pull:
     resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
     resting = resting[np.isfinite(resting)][-max(1, _samples(series.time[span], END)) :]
     work = series.data.get("container_work_J")
-    return Pull(
+    return HookPull(
         edges=series.time[span] - series.time[span[0]],
         raised=height[span] - height[span[0]],
         force=force[inside],
@@ -132,7 +133,7 @@ def weight_of_one(run: RunManifest) -> float:
     return run.smarticle_mass * read_scene(run.directory).number("gravity_m_per_s2")
 
 
-def moving_mean(pull: Pull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Means of the force over every window: middles (m,) [s] and forces (m,) [N].
 
     Args:
@@ -144,7 +145,7 @@ def moving_mean(pull: Pull, window: float = WINDOW) -> tuple[NDArray[np.float64]
     return np.convolve(pull.times, weights, mode="valid"), np.convolve(pull.force, weights, mode="valid")
 
 
-def peak(pull: Pull, window: float = WINDOW) -> Peak:
+def peak(pull: HookPull, window: float = WINDOW) -> Peak:
     """The largest mean over a window; arguments as in `moving_mean`."""
     times, means = moving_mean(pull, window)
     highest = int(means.argmax())
@@ -152,13 +153,13 @@ def peak(pull: Pull, window: float = WINDOW) -> Peak:
     return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
 
 
-def held_at(pull: Pull, time: float, window: float = WINDOW) -> float:
+def held_at(pull: HookPull, time: float, window: float = WINDOW) -> float:
     """Mean over a window about a time, since the pull began [s], of the force on the other hook [N]."""
     times, means = moving_mean(replace(pull, force=pull.held), window)
     return float(np.interp(time, times, means))
 
 
-def freed(pull: Pull, window: float = WINDOW) -> float:
+def freed(pull: HookPull, window: float = WINDOW) -> float:
     """Time from which the windowed force stays below `FREE` of its peak [s]; NaN if it does not come to that."""
     times, means = moving_mean(pull, window)
     held = np.nonzero(means > FREE * means.max())[0]
@@ -167,7 +168,7 @@ def freed(pull: Pull, window: float = WINDOW) -> float:
     return float(times[held[-1] + 1])
 
 
-def held_fast(pull: Pull, asked: Settings) -> bool:
+def held_fast(pull: HookPull, asked: Settings) -> bool:
     """Whether the hook was stopped by its force limit on the way, so that its peak is a lower bound.
 
     Args:
@@ -181,27 +182,22 @@ def held_fast(pull: Pull, asked: Settings) -> bool:
     return bool(pull.raised[-1] < 0.99 * asked.number("distance_m", positive=True))
 
 
-def pull_columns(run: RunManifest, series: Series, phase: int) -> dict[str, float]:
-    """Measures of a pull for a table, forces over the weight of all smarticles, n W_s.
-
-    Raises:
-        InputError: As `read_pull` and `weight_of_one`.
-    """
+def _pull_of(run: RunManifest, series: Series, phase: int) -> tuple[float, ...]:
+    """Measures of a pull for a table, forces over the weight of all smarticles, n W_s."""
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
     ended = run.phases[phase].end is not None
-    held = float(held_fast(pull, read_phases(run.directory)[phase])) if ended else math.nan
-    return {
-        "hook peak force over n W_s [-]": highest.force / weight / run.count,
-        "hook peak time [s]": highest.time,
-        "hook peak raised [m]": highest.raised,
-        "lower hook force at the peak over n W_s [-]": held_at(pull, highest.time) / weight / run.count,
-        "hook work [J]": pull.work,
-        "hook free time [s]": freed(pull),
-        "hook load at the end [smarticles]": pull.left / weight,
-        "hook raised at the end [m]": float(pull.raised[-1]),
-        "hook held fast [-]": held,
-    }
+    return (
+        highest.force / weight / run.count,
+        highest.time,
+        highest.raised,
+        held_at(pull, highest.time) / weight / run.count,
+        pull.work,
+        freed(pull),
+        pull.left / weight,
+        float(pull.raised[-1]),
+        float(held_fast(pull, read_phases(run.directory)[phase])) if ended else math.nan,
+    )
 
 
 def has_pull(series: Series, phase: int) -> bool:
@@ -212,3 +208,24 @@ def has_pull(series: Series, phase: int) -> bool:
 def _samples(edges: NDArray[np.float64], window: float) -> int:
     """Samples in a window [s], one at least and all at most."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
+
+
+MEASURES = (
+    PhaseMeasure(
+        name="pull of a hook",
+        phase=PULL,
+        quantities=(
+            Quantity("hook peak force over n W_s", "-"),
+            Quantity("hook peak time", "s"),
+            Quantity("hook peak raised", "m"),
+            Quantity("lower hook force at the peak over n W_s", "-"),
+            Quantity("hook work", "J"),
+            Quantity("hook free time", "s"),
+            Quantity("hook load at the end", "smarticles"),
+            Quantity("hook raised at the end", "m"),
+            Quantity("hook held fast", "-"),
+        ),
+        take=_pull_of,
+        told_of=has_pull,
+    ),
+)

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
-from postprocess.measures.geometry import centres_of_mass, checked_vertices, link_lengths
+from postprocess.measures.registry import FrameMeasure, Quantity
 from postprocess.statistics.bisection import least_reaching
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from postprocess.manifest import RunManifest
 
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
@@ -230,3 +232,29 @@ def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radiu
     first, last = (np.clip((-mixed + sign * reach) / safe, 0, 1) for sign in (-1, 1))
     shares: NDArray[np.float64] = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
     return shares
+
+
+def _free_pile_of(frame: Frame, run: RunManifest) -> tuple[float, ...]:
+    if run.walled(frame.phase):
+        return (math.nan,) * 6
+    pile = free_pile(frame.vertices, run, floor_z=frame.floor_z)
+    return pile.touching, pile.entangled, pile.radius_half, pile.radius_most, pile.sloughed, pile.tilt
+
+
+MEASURES = (
+    FrameMeasure(
+        name="free pile",
+        place=60,
+        quantities=(
+            Quantity("largest cluster by contact", "-"),
+            Quantity("largest cluster by crossings", "-"),
+            Quantity("spread radius 50 %", "m"),
+            Quantity("spread radius 95 %", "m"),
+            Quantity("sloughed", "-"),
+            Quantity("tilt", "degree"),
+        ),
+        take=_free_pile_of,
+        # Of a run that takes its wall away.
+        told_of=lambda run: not (run.planar or run.walled(run.phases[-1].index)),
+    ),
+)

@@ -15,36 +15,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
-from postprocess.series import Series, read_series
+from dem.record.manifest import RunManifest
+from dem.record.series import Series, read_series
+from postprocess.measures.registry import PhaseMeasure, Quantity
 
 Array = NDArray[np.float64]
 
 STRAIN = "strain"
 """Type of the phase."""
 
-PEAK, AT_PEAK, FRACTURE = "peak force [N]", "strain at the peak [-]", "strain at fracture [-]"
-STIFFNESS, BEND = "stiffness at the start [N]", "second over first slope [-]"
-YIELD, DROP, WIDENING = "strain at the yield drop [-]", "force lost at the yield drop [-]", "widening [-]"
-SLIP_WIDENING = "widening at the first maximum [-]"
-WALL, IMBALANCE = "greatest force on a wall [N]", "imbalance of the strings [N]"
-QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {
-        PEAK: "largest force of the pulled string, means over 1 ms",
-        AT_PEAK: "strain where it is reached",
-        FRACTURE: "largest strain while the force is a fifth of the peak or more",
-        STIFFNESS: "slope of force against strain, from 20 % to 80 % of the force at the first maximum",
-        BEND: "the same for the upper half of these forces over that for the lower half: 1 for a straight line",
-        YIELD: "strain at the first maximum that is followed by a loss of a tenth of the force or more, and by more "
-        "strain of 0.05 at least before the fracture; empty without any",
-        DROP: "share of the force that is lost there",
-        WIDENING: "largest width of the chain before the fracture over the width at the start, less 1",
-        SLIP_WIDENING: "the same at the first maximum of the force",
-        WALL: "largest force on either wall across the channel before the fracture, means over 0.1 s",
-        IMBALANCE: "root mean square difference of the two strings' forces along x before the fracture",
-    }
-)
+_MEANINGS = {
+    Quantity("peak force", "N"): "largest force of the pulled string, means over 1 ms",
+    Quantity("strain at the peak", "-"): "strain where it is reached",
+    Quantity("strain at fracture", "-"): "largest strain while the force is a fifth of the peak or more",
+    Quantity(
+        "stiffness at the start", "N"
+    ): "slope of force against strain, from 20 % to 80 % of the force at the first maximum",
+    Quantity(
+        "second over first slope", "-"
+    ): "the same for the upper half of these forces over that for the lower half: 1 for a straight line",
+    Quantity(
+        "strain at the yield drop", "-"
+    ): "strain at the first maximum that is followed by a loss of a tenth of the "
+    "force or more, and by more strain of 0.05 at least before the fracture; empty without any",
+    Quantity("force lost at the yield drop", "-"): "share of the force that is lost there",
+    Quantity("widening", "-"): "largest width of the chain before the fracture over the width at the start, less 1",
+    Quantity("widening at the first maximum", "-"): "the same at the first maximum of the force",
+    Quantity(
+        "greatest force on a wall", "N"
+    ): "largest force on either wall across the channel before the fracture, means over 0.1 s",
+    Quantity(
+        "imbalance of the strings", "N"
+    ): "root mean square difference of the two strings' forces along x before the fracture",
+}
+QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: told for quantity, told in _MEANINGS.items()})
 """What is measured of a strain test: names of columns with their units, and what they are."""
+PEAK, AT_PEAK, FRACTURE, STIFFNESS, BEND, YIELD, DROP, WIDENING, SLIP_WIDENING, WALL, IMBALANCE = QUANTITIES
 
 LEAST_SAMPLES = 3  # of a strain test
 CARRIES = 0.2  # of the peak force, below which a chain no longer holds
@@ -56,7 +62,7 @@ _TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pull:
+class StrainTest:
     """One strain test.
 
     Attributes:
@@ -90,17 +96,15 @@ def has_strain(series: Series) -> bool:
     return int(tied.sum()) >= LEAST_SAMPLES and bool((force[tied] > 0).any())
 
 
-def strain_columns(run: RunManifest) -> dict[str, float]:
-    """Measures of a strain test for a table; what its end tells is NaN while the run is not done.
-
-    Raises:
-        InputError: As `read_pull`.
-    """
-    found = measured(read_pull(run))
-    return found if run.status == "done" else found | dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
+def _strain_of(run: RunManifest, _: Series, __: int) -> tuple[float, ...]:
+    """Measures of a strain test for a table; what its end tells is NaN while the run is not done."""
+    found = measured(read_strain_test(run))
+    if run.status != "done":
+        found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
+    return tuple(found[name] for name in QUANTITIES)
 
 
-def read_pull(run: RunManifest) -> Pull:
+def read_strain_test(run: RunManifest) -> StrainTest:
     """The strain test of a run.
 
     Raises:
@@ -115,7 +119,7 @@ def read_pull(run: RunManifest) -> Pull:
     first = length[shown][0]
     shown &= np.isfinite(force)
     outwards = np.stack([-series["channel_lower_force_N"][:, 1], series["channel_upper_force_N"][:, 1]])
-    return Pull(
+    return StrainTest(
         times=series.time[shown],
         strains=length[shown] / first - 1,
         forces=force[shown],
@@ -125,7 +129,7 @@ def read_pull(run: RunManifest) -> Pull:
     )
 
 
-def measured(pull: Pull) -> dict[str, float]:
+def measured(pull: StrainTest) -> dict[str, float]:
     """The quantities of one strain test; see `QUANTITIES`."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
@@ -188,3 +192,14 @@ def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
             return math.nan, math.nan
         slopes.append(float(np.polyfit(strains[inside], forces[inside], 1)[0]))
     return slopes[0], slopes[2] / slopes[1]
+
+
+MEASURES = (
+    PhaseMeasure(
+        name="strain of a chain",
+        phase=STRAIN,
+        quantities=tuple(_MEANINGS),
+        take=_strain_of,
+        told_of=lambda series, _: has_strain(series),
+    ),
+)

@@ -6,28 +6,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
-from postprocess.frames import read_frames
-from postprocess.manifest import read_run
-from postprocess.measures.entanglement import entanglement
-from postprocess.measures.geometry import centres_of_mass
-from postprocess.measures.heights import heights
-from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_fraction
-from postprocess.measures.pull import PULL, has_pull, pull_columns
-from postprocess.measures.spread import free_pile
-from postprocess.measures.strain import STRAIN, has_strain, strain_columns
-from postprocess.series import Series, read_series
+from dem.record.columns import EVERY
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
+from dem.record.names import SERIES
+from dem.record.series import Series, read_series
+from postprocess.measures.packing import DEFINITIONS, packing_of
+from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.averages import Mean, mean_with_error
+from postprocess.statistics.columns import ASPECT, SEED
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from postprocess.frames import Frame, FrameSequence
-    from postprocess.manifest import RunManifest
+    from dem.record.frames import FrameSequence
+    from dem.record.manifest import RunManifest
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
@@ -38,35 +34,7 @@ PASSIVE_PHASES = frozenset({"deposit", "relax"})
 LAST_FRAMES = 20
 """Frames averaged at the end of a phase, as in Savoie et al."""
 
-_LABELS = ("run", "name", "seed", "aspect ratio [-]", "count", "fidelity", "scene_sha256")
-_SERIES_COLUMNS = {
-    "container_z_m": "container z",
-    "container_velocity_m_per_s": "container velocity",
-    "container_force_N": "container force",
-    "kinetic_energy_J": "kinetic energy",
-    "max_speed_m_per_s": "max speed",
-    "unbalanced_force": "unbalanced force",
-    "gravitational_energy_J": "gravitational energy",
-    "container_work_J": "container work",
-    "motor_work_J": "motor work",
-    "commanded_angle_rad": "commanded angle",
-    "angle_rad": "angle",
-    "schedule_error_rad": "schedule error",
-    "tracking_error_rad": "tracking error",
-    "motor_torque_N_m": "motor torque",
-    "halted_fraction": "halted fraction",
-    "joint_gap_m": "joint gap",
-    "hook_upper_force_N": "upper hook force",
-    "hook_lower_force_N": "lower hook force",
-    "hook_upper_z_m": "upper hook z",
-    "string_fixed_force_N": "fixed string force",
-    "string_pulled_force_N": "pulled string force",
-    "channel_lower_force_N": "lower wall force",
-    "channel_upper_force_N": "upper wall force",
-    "pulled_m": "pulled",
-    "chain_length_m": "chain length",
-    "chain_width_m": "chain width",
-}
+_LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
 # What the columns of a series of vectors are, by their number.
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 # Recorded by the engine and measured here from the frames as well.
@@ -135,8 +103,8 @@ def summarise_run(
 
     Each measure has a second column, "… SE", with the standard error of the mean as in
     `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
-    those of the last frame alone, without an error, unless asked for at every frame. A phase that pulls a
-    hook has the measures of `pull.pull_columns` as well, one that strains a chain those of `strain.strain_columns`.
+    those of the last frame alone, without an error, unless asked for at every frame. A phase has
+    what it tells as a whole beside, see `registry.PhaseMeasure`.
 
     Args:
         directory: A run directory.
@@ -168,19 +136,11 @@ def summarise_run(
             summary[name] = mean.value
             summary[f"{quantity} SE [{unit}"] = mean.standard_error
         if series is not None:
-            summary |= _test_columns(manifest, series, part[0].phase)
+            # Of the whole phase, not of its last frames.
+            for measure in phase_measures():
+                summary |= measure.columns(manifest, series, part[0].phase)
         summaries.append(summary)
     return pd.DataFrame(summaries)
-
-
-def _test_columns(manifest: RunManifest, series: Series, phase: int) -> dict[str, float]:
-    """What a phase tells that tests the pile or a chain: of the whole phase, not of its last frames."""
-    kind = manifest.phases[phase].type
-    if kind == PULL and has_pull(series, phase):
-        return pull_columns(manifest, series, phase)
-    if kind == STRAIN and has_strain(series):
-        return strain_columns(manifest)
-    return {}
 
 
 def packing_change(
@@ -232,7 +192,7 @@ def packing_change(
             kind = manifest.phases[phase].type
             msg = f"run {directory} has no frame of phase {phase} ({kind}) yet; wait or resume it"
             raise InputError(msg)
-        means.append(mean_with_error([_phi(frame, manifest, definition) for frame in part]))
+        means.append(mean_with_error([packing_of(frame, manifest, definition=definition) for frame in part]))
     return PackingChange(
         before=means[0],
         after=means[1],
@@ -256,7 +216,7 @@ def _open(directory: Path | str, definitions: Iterable[str]) -> tuple[RunManifes
     manifest = read_run(directory)
     frames = read_frames(directory)
     # A run that failed early may have frames and no series.
-    has_series = (manifest.directory / "series.h5").exists()
+    has_series = (manifest.directory / SERIES).exists()
     return manifest, frames, read_series(directory) if has_series else None
 
 
@@ -283,6 +243,7 @@ def _rows(
 ) -> list[dict[str, object]]:
     """One row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []
+    measures = [measure for measure in frame_measures(definitions) if measure.told_of(manifest)]
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
         row: dict[str, object] = _labels(manifest)
@@ -292,13 +253,8 @@ def _rows(
             "phase": frame.phase,
             "phase type": manifest.phases[frame.phase].type,
         }
-        row |= _shape_columns(frame, manifest)
-        if not (manifest.planar or manifest.walled(manifest.phases[-1].index)):
-            row |= _free_columns(frame, manifest)
-        for definition in definitions if not manifest.planar else ():
-            wanted = take_costly or definition not in COSTLY_DEFINITIONS
-            phi = _phi(frame, manifest, definition) if wanted else float("nan")
-            row[f"phi {definition} [-]"] = phi
+        for measure in measures:
+            row |= measure.columns(frame if take_costly or not measure.costly else None, manifest)
         if series is not None:
             row |= _series_columns(series, frame.time)
         rows.append(row)
@@ -318,71 +274,14 @@ def _labels(manifest: RunManifest) -> dict[str, object]:
     return dict(zip(_LABELS, values, strict=True))
 
 
-def _shape_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
-    if manifest.planar:
-        # All lie at one height, and each in the plane of all others.
-        return {"smarticles [-]": frame.count, "contacts mean [-]": float(frame.contacts.mean())}
-    levels = heights(frame.vertices, floor_z=frame.floor_z)
-    tangle = entanglement(frame.vertices)
-    return {
-        "smarticles [-]": frame.count,
-        "escaped [-]": _escaped(frame, manifest.container_radius),
-        "com height [m]": levels.mean_com,
-        "second-highest com height [m]": levels.second_highest_com,
-        f"top {levels.percentile:g} % height [m]": levels.top,
-        "crossings mean [-]": tangle.mean,
-        "planes [-]": int(tangle.has_plane.sum()),
-        "contacts mean [-]": float(frame.contacts.mean()),
-    }
-
-
-def _free_columns(frame: Frame, manifest: RunManifest) -> dict[str, float]:
-    """What is told of a pile without a wall; NaN while there is one."""
-    pile = None
-    if not manifest.walled(frame.phase):
-        pile = free_pile(frame.vertices, manifest, floor_z=frame.floor_z)
-    names = {
-        "largest cluster by contact [-]": "touching",
-        "largest cluster by crossings [-]": "entangled",
-        "spread radius 50 % [m]": "radius_half",
-        "spread radius 95 % [m]": "radius_most",
-        "sloughed [-]": "sloughed",
-        "tilt [degree]": "tilt",
-    }
-    return {name: float("nan") if pile is None else getattr(pile, key) for name, key in names.items()}
-
-
-def _escaped(frame: Frame, radius: float) -> int:
-    """Smarticles with their centre of mass beside or below the container."""
-    centres = centres_of_mass(frame.vertices)
-    outside = np.hypot(centres[:, 0], centres[:, 1]) > radius
-    return int((outside | (centres[:, 2] < frame.floor_z)).sum())
-
-
-def _phi(frame: Frame, manifest: RunManifest, definition: str) -> float:
-    if not manifest.fills_cylinder(frame.phase):
-        return float("nan")
-    try:
-        return packing_fraction(
-            frame.vertices,
-            radius=manifest.container_radius,
-            solid_volume=manifest.solid_volume,
-            definition=definition,
-            floor_z=frame.floor_z,
-            thickness_normal=manifest.thickness_normal,
-            thickness_in_plane=manifest.thickness_in_plane,
-        ).value
-    except UndefinedMeasureError:
-        return float("nan")
-
-
 def _series_columns(series: Series, time: float) -> dict[str, float]:
     columns: dict[str, float] = {}
     index = series.nearest(time)
     for name, values in series.data.items():
         if name in _SERIES_MEASURED:
             continue
-        label = _SERIES_COLUMNS.get(name, name)
+        # Of a column that this version does not know, as its file has it.
+        label = EVERY[name].label if name in EVERY else name
         # The recorder writes the SI unit one; the tables write a dash.
         unit = "-" if series.units[name] in {"1", ""} else series.units[name]
         if values.ndim == 1:

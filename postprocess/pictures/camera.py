@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.frames import Frame
-from postprocess.manifest import RunManifest
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.pictures.colouring import COLOURINGS, Colouring
 from postprocess.pictures.surroundings import Surroundings
 

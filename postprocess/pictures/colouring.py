@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 
-from postprocess.frames import Frame
+from dem.record.frame import Frame
+from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.measures.entanglement import link_crossings
-from postprocess.measures.geometry import centres_of_mass, link_lengths
 from postprocess.report import figures
 
 if TYPE_CHECKING:

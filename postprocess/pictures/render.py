@@ -1,4 +1,4 @@
-"""Pictures and films of a run, drawn off-screen: what is drawn, and where to. How is in `postprocess.pictures.stage`."""
+"""Pictures and films of a run, off-screen: what is drawn, and where to. How is in `postprocess.pictures.canvas`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess.frames import FrameSequence, read_frames
-from postprocess.manifest import RunManifest, read_run
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import RunManifest, read_run
 from postprocess.pictures import film
 from postprocess.pictures.camera import Look, extent
-from postprocess.pictures.stage import Stage
+from postprocess.pictures.canvas import Canvas
 from postprocess.pictures.surroundings import read_surroundings
 from postprocess.report import figures
 
@@ -57,7 +57,8 @@ def render_run(
         RunError: This machine lacks the libraries to draw without a display.
 
     Example:
-        >>> render_run("runs/pile", color_by="height", view="oblique")  # doctest: +SKIP
+        >>> render_run("runs/pile", color_by="height", view="oblique").name
+        'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",), overwrite=overwrite)
     run = read_run(directory)
@@ -66,8 +67,8 @@ def render_run(
     frame = frames[_frame_at(frames, time)]
     values = look.colouring.values(frame)
     around = read_surroundings(run)
-    with Stage(run, look, around, extent(frame, run, look, around), _span(values)) as stage:
-        image = stage.picture(frame, values)
+    with Canvas(run, look, around, extent(frame, run, look, around), _span(values)) as canvas:
+        image = canvas.picture(frame, values)
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
@@ -128,12 +129,12 @@ def render_film(
         values.append(look.colouring.values(frame))
 
     with (
-        Stage(run, look, around, np.concatenate(extents), _span(np.concatenate(values))) as stage,
+        Canvas(run, look, around, np.concatenate(extents), _span(np.concatenate(values))) as canvas,
         figures.whole_file(output, overwrite=overwrite) as temporary,
     ):
 
         def picture(number: int) -> Image.Image:
-            return stage.picture(frames[int(shown[number])], values[number])
+            return canvas.picture(frames[int(shown[number])], values[number])
 
         samples = [picture(number) for number in sorted({0, len(shown) // 3, 2 * len(shown) // 3, len(shown) - 1})]
         film.write_film(temporary, map(picture, range(len(shown))), frames_per_second, samples)

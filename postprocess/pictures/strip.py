@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from postprocess.frames import Frame, read_frames
-from postprocess.manifest import read_run
+from dem.record.frame import Frame
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
 from postprocess.pictures.camera import Look, extent
 from postprocess.pictures.surroundings import read_surroundings
 from postprocess.report import figures
@@ -78,7 +79,7 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
 
 
 def _pictures(row: Row) -> list[Image.Image]:
-    from postprocess.pictures.stage import Stage  # noqa: PLC0415  (imports PyVista)
+    from postprocess.pictures.canvas import Canvas  # noqa: PLC0415  (imports PyVista)
 
     run, frames = read_run(row.directory), read_frames(row.directory)
     shown: list[Frame] = [frames[int(np.argmin(np.abs(frames.times - time)))] for time in row.times]
@@ -87,5 +88,5 @@ def _pictures(row: Row) -> list[Image.Image]:
     extents = np.concatenate([extent(frame, run, look, around) for frame in shown])
     width, height = look.panel
     below = (0, _SIZE[1] - height, width, _SIZE[1])
-    with Stage(run, look, around, extents, (0.0, 1.0)) as stage:
-        return [stage.picture(frame, look.colouring.values(frame)).crop(below) for frame in shown]
+    with Canvas(run, look, around, extents, (0.0, 1.0)) as canvas:
+        return [canvas.picture(frame, look.colouring.values(frame)).crop(below) for frame in shown]

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
-from postprocess.scene_file import Settings, read_scene, read_tiers
-from postprocess.series import Series, read_series
+from dem.record.manifest import RunManifest
+from dem.record.names import SERIES
+from dem.record.series import Series, read_series
+from postprocess.measures.mould import read_tiers
+from postprocess.scene_file import Settings, read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +21,7 @@ _REMOVAL = "remove-container"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hooks:
+class DrawnHooks:
     """Two crosses of two square bars each.
 
     Attributes:
@@ -85,7 +87,7 @@ class Surroundings:
     tiers: tuple[tuple[float, float], ...] = ()
     removed: int | None = None
     lift: Lift | None = None
-    hooks: Hooks | None = field(default=None, repr=False)
+    hooks: DrawnHooks | None = field(default=None, repr=False)
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -118,14 +120,14 @@ def read_surroundings(run: RunManifest) -> Surroundings:
         InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
     """
     scene = read_scene(run.directory)
-    series = read_series(run.directory) if (run.directory / "series.h5").exists() else None
+    series = read_series(run.directory) if (run.directory / SERIES).exists() else None
     hooks = scene.part("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
     return Surroundings(
         tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run.directory)),
         removed=removed,
         lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
-        hooks=None if hooks is None else Hooks.of(hooks, series),
+        hooks=None if hooks is None else DrawnHooks.of(hooks, series),
     )
 
 

@@ -5,7 +5,6 @@ A figure is drawn inside `style()`, gets its provenance from `add_footer` and is
 
 from __future__ import annotations
 
-import os
 import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem.errors import InputError
+from dem.record.files import whole
 
 with warnings.catch_warnings():
     # The distribution's mpl_toolkits shadows ours where the environment sees system packages; no
@@ -193,12 +193,8 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     if not path.parent.is_dir():
         msg = f"{path}: the folder {path.parent} does not exist: create it or choose another output"
         raise InputError(msg)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
+    with whole(path, shared=True) as temporary:
         yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.record.files import whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,17 +34,9 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
         msg = f"cannot write table {path}: it exists; choose another name or ask to overwrite it"
         raise InputError(msg)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    except OSError as error:
+        with whole(path, shared=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            table.to_csv(file, index=False)
+    except (FileNotFoundError, PermissionError) as error:
         msg = f"cannot write table {path}: {error.strerror}; choose a folder that can be written"
         raise InputError(msg) from None
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            table.to_csv(file, index=False)
-        # mkstemp makes files private; a table is as readable as any other new file.
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return path

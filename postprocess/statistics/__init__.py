@@ -1,1 +1,1 @@
-"""Means, errors and comparisons."""
+"""Means, errors and comparisons: of numbers, with no idea of what they measure. On NumPy, SciPy and pandas alone."""

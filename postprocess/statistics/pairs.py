@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Verdict, all_of, judge, negative, told
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.runs import ASPECT, SEED
 
 
 def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import pandas as pd
 
+from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.runs import SEED, SEEDS
 
 ToldTable = tuple[list[str], list[list[str]]]
 """Header and rows of a table for a person to read."""

@@ -6,11 +6,11 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.commands.studies import told_results
 from smarticles.commands.study import compute_and_analyse
 from smarticles.layout import columns
 from smarticles.parsing import Commands, add_scene, add_slots, positive_number
@@ -18,8 +18,10 @@ from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
     from studies.accuracy.ladder import Ladder
+    from studies.accuracy.rung import Rung
+    from studies.accuracy.study import Accuracy
     from templates.sweep.expand import Point
-    from templates.sweep.sweep import Sweep
+    from templates.sweep.sweep_file import Sweep
 
 _SEEDS = "1,2,3"
 
@@ -75,8 +77,8 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Study:
-    """A ladder, expanded.
+class _Expanded:
+    """A ladder with its runs.
 
     Args:
         ladder: its rungs.
@@ -93,14 +95,15 @@ class _Study:
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """`smarticles accuracy`."""
-    from studies.accuracy.ladder import BASE, parse_seeds  # noqa: PLC0415
+    from studies.accuracy.ladder import parse_seeds  # noqa: PLC0415
+    from studies.accuracy.rung import BASE  # noqa: PLC0415
 
     seeds = parse_seeds(arguments.seeds)
-    study = _study(arguments, seeds)
+    expanded = _expanded(arguments, seeds)
     if not arguments.dry_run and arguments.out is None:
         msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
         raise InputError(msg)
-    print(_listing(study, len(seeds), arguments.jobs), flush=True)
+    print(_listing(expanded, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
         print(
             "smarticles: warning: one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3",
@@ -108,16 +111,25 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
         )
     if arguments.dry_run:
         return 0
-    folder = folder_of(study.sweep, study.points, arguments.out, arguments.command_line, extend=True)
-    expected = {entry.name: entry.expected_s for entry in folder.entries}
+    folder = folder_of(expanded.sweep, expanded.points, arguments.out, arguments.command_line, extend=True)
+    ladder = expanded.ladder
+    left_out = f"; left out: {'; '.join(ladder.left_out)}" if ladder.left_out else ""
+    return compute_and_analyse(
+        folder,
+        arguments,
+        partial(_load, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
+        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
+        pictured={"setting": BASE},
+    )
 
-    def analyse(runs: Sequence[Path], output: Path) -> str:
-        return _analyse(study, expected, runs, output, arguments)
 
-    return compute_and_analyse(folder, arguments, analyse, {"setting": BASE})
+def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Accuracy:
+    from studies.accuracy.study import Accuracy  # noqa: PLC0415
+
+    return Accuracy(rungs=rungs, expected_s=expected_s)
 
 
-def _study(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Study:
+def _expanded(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Expanded:
     from dem.scene.reading import load_scene  # noqa: PLC0415
     from studies.accuracy.ladder import affordable, build_ladder, ladder_sweep, parse_knobs  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
@@ -129,58 +141,28 @@ def _study(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Study:
     if arguments.max_run_hours is not None:
         ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
     sweep = ladder_sweep(scene, ladder, seeds)
-    return _Study(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s)
+    return _Expanded(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s)
 
 
-def _listing(study: _Study, seeds: int, jobs: int | None) -> str:
+def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
     """The ladder as a table, and what it is expected to take."""
     from dem.plan.outlook import plan  # noqa: PLC0415
-    from templates.local.local import slots_here  # noqa: PLC0415
+    from templates.local.runner import slots_here  # noqa: PLC0415
 
-    ladder = study.ladder
+    ladder = expanded.ladder
     references = ladder.references()
     rows = []
     for rung in ladder.rungs:
         planned = plan(ladder.scenes[rung.setting])
         own = "reference" if references[rung.knob] == rung else ""
         shape = [planned.time_step_s, planned.spheres_per_smarticle]
-        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(study.expected_s[rung.setting])])
+        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(expanded.expected_s[rung.setting])])
     header = ["knob", "value", "setting", "", "time step s", "spheres", "expected wall s"]
-    slots = min(jobs or slots_here(), len(study.points))
-    hours = seeds * sum(study.expected_s[setting] for setting in ladder.settings) / 3600
+    slots = min(jobs or slots_here(), len(expanded.points))
+    hours = seeds * sum(expanded.expected_s[setting] for setting in ladder.settings) / 3600
     lines = [columns(header, rows), *(f"left out: {line}" for line in ladder.left_out)]
     lines.append(
-        f"{len(ladder.settings)} settings × {seeds} seeds = {len(study.points)} runs, about {hours:.2g} h of one core, "
-        f"{hours / slots:.2g} h or more with {slots} at once"
+        f"{len(ladder.settings)} settings × {seeds} seeds = {len(expanded.points)} runs, about {hours:.2g} h of one "
+        f"core, {hours / slots:.2g} h or more with {slots} at once"
     )
     return "\n".join(lines)
-
-
-def _analyse(
-    study: _Study, expected_s: Mapping[str, float], runs: Sequence[Path], output: Path, arguments: argparse.Namespace
-) -> str:
-    from studies.accuracy.ladder import SENSITIVITIES  # noqa: PLC0415
-    from studies.accuracy.runs import Rung  # noqa: PLC0415
-    from studies.accuracy.study import analyse_accuracy, told_rungs  # noqa: PLC0415
-
-    ladder = study.ladder
-    left_out = f"; left out: {'; '.join(ladder.left_out)}" if ladder.left_out else ""
-    report = analyse_accuracy(
-        runs,
-        output,
-        rungs=[
-            Rung(
-                knob=rung.knob,
-                value=rung.value,
-                unit=rung.unit,
-                setting=rung.setting,
-                sensitivity=rung.knob in SENSITIVITIES,
-            )
-            for rung in ladder.rungs
-        ],
-        expected_s=expected_s,
-        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
-        command=arguments.command_line,
-    )
-    told = ["* beyond the seed-to-seed band, 95 %.", "", *(one.sentence for one in report.advice), "", report.closing]
-    return told_results(columns(*told_rungs(report.table)), told, report.files, output)

@@ -43,7 +43,7 @@ For a study, give the study's command again: it also makes the tables and figure
 
 def resume_sweep(arguments: argparse.Namespace) -> int:
     """`smarticles resume`."""
-    from templates.slurm.slurm import require_sbatch  # noqa: PLC0415
+    from templates.slurm.queue import require_sbatch  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     directory: Path = arguments.directory

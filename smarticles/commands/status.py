@@ -71,7 +71,7 @@ def show_status(arguments: argparse.Namespace) -> int:
 
 def _with_queue(runs: list[RunStatus], directory: Path) -> tuple[list[RunStatus], dict[str, object] | None]:
     """States with what the queue says, and how that went; None where nothing was submitted."""
-    from templates.slurm.slurm import QueueError  # noqa: PLC0415
+    from templates.slurm.queue import QueueError  # noqa: PLC0415
     from templates.slurm.submission import merged, plain, submissions, tasks_of_runs  # noqa: PLC0415
 
     found = submissions(directory)

@@ -5,20 +5,24 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
-from smarticles.commands.studies import STUDIES, Analysis
+from smarticles.layout import columns, told_results
 from smarticles.parsing import Commands, add_slots
 from smarticles.sweeps import compute, make_folder, refuse_failures
+from studies import registry
 
 if TYPE_CHECKING:
+    from studies.base.report import Report
+    from studies.base.study import Study
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
 
 
-_ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in STUDIES.items())
+_ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in registry.STUDIES.items())
 
 
 def add(commands: Commands) -> None:
@@ -42,7 +46,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
   smarticles study procedures --out procedures --analyse     what the finished runs say so far
 """,
     )
-    study.add_argument("name", choices=tuple(STUDIES), metavar="NAME", help=", ".join(STUDIES))
+    study.add_argument("name", choices=tuple(registry.STUDIES), metavar="NAME", help=", ".join(registry.STUDIES))
     study.add_argument("--quick", action="store_true", help="the variant that takes minutes")
     study.add_argument(
         "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
@@ -54,27 +58,22 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
 
 def run_study(arguments: argparse.Namespace) -> int:
     """`smarticles study`."""
-    from studies.shipped import study_file  # noqa: PLC0415
-
-    study = STUDIES[arguments.name]
-    file = study_file(arguments.name, quick=arguments.quick)
+    shipped = registry.shipped(arguments.name)
+    file = registry.study_file(arguments.name, quick=arguments.quick)
     changed = _changed(arguments.name, file, arguments.fidelity)
     folder = make_folder(file, arguments.out, arguments.command_line, changed)
     note = _note(arguments.name, file, changed)
     print(note, flush=True)
-
-    def analyse(runs: Sequence[Path], output: Path) -> str:
-        return study.analyse(
-            Analysis(runs=runs, output=output, note=note, command=arguments.command_line, quick=arguments.quick)
-        )
-
-    return compute_and_analyse(folder, arguments, analyse, study.pictured)
+    load = partial(shipped.load, quick=arguments.quick)
+    return compute_and_analyse(folder, arguments, load, note=note, pictured=shipped.pictured)
 
 
 def compute_and_analyse(
     folder: Folder,
     arguments: argparse.Namespace,
-    analyse: Callable[[Sequence[Path], Path], str],
+    load: Callable[[], Study[Any]],
+    *,
+    note: str,
     pictured: Mapping[str, object],
 ) -> int:
     """Run what a sweep is missing unless --analyse says not to, then say what the finished runs say.
@@ -82,8 +81,8 @@ def compute_and_analyse(
     Args:
         folder: the sweep's directory.
         arguments: of the command.
-        analyse: measures the run directories given, finished or not, and writes to a folder; gives the text for the
-            terminal.
+        load: gives the study that analyses the runs, once there are any: its libraries are large.
+        note: how the runs differ from the full study.
         pictured: values of the run that a picture is drawn of.
 
     Raises:
@@ -98,12 +97,18 @@ def compute_and_analyse(
     if finished:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
-        print(analyse([folder.run(entry) for entry in folder.entries], results))
+        runs = [folder.run(entry) for entry in folder.entries]
+        print(told_report(load().analyse(runs, results, note=note, command=arguments.command_line)))
         sys.stdout.flush()
         _draw(folder, finished, pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
     refuse_failures(folder, outcomes)
     return 0
+
+
+def told_report(report: Report[Any]) -> str:
+    """What a study says at the terminal."""
+    return told_results(columns(report.header, report.rows), report.told, report.files, report.output)
 
 
 def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
@@ -114,7 +119,7 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     """
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity is None:
         return {}
@@ -144,12 +149,12 @@ def _scenes(points: Sequence[Point]) -> set[str]:
 
 def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
     """How what is run differs from the full study as it ships, one line."""
-    from studies.shipped import differences, study_file  # noqa: PLC0415
+    from studies.base.shipped import differences  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     here = expand(with_constants(load_sweep(file), changed))
-    lines = differences(here, expand(load_sweep(study_file(name))))
+    lines = differences(here, expand(load_sweep(registry.study_file(name))))
     return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
 
 

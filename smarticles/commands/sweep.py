@@ -69,9 +69,9 @@ def add(commands: Commands) -> None:
 
 def run_sweep(arguments: argparse.Namespace) -> int:
     """`smarticles sweep`."""
-    from templates.slurm.slurm import require_sbatch  # noqa: PLC0415
+    from templates.slurm.queue import require_sbatch  # noqa: PLC0415
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
-    from templates.sweep.sweep import load_sweep  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
     sweep = load_sweep(arguments.sweep)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)

@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 from dem.errors import RunError
-from smarticles.commands.studies import told_results
-from smarticles.layout import columns
+from smarticles.layout import columns, told_results
 from smarticles.parsing import Commands
 
 
@@ -59,7 +58,7 @@ def run_verify(arguments: argparse.Namespace) -> int:
 
 def _compute(folder: Path) -> None:
     """Compute the tables in a process of its own: YADE and what draws never meet in one."""
-    command = [sys.executable, "-m", "smarticles.verification", str(folder.resolve())]
+    command = [sys.executable, "-m", "smarticles.verification", "known", str(folder.resolve())]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     child = subprocess.run(command, stderr=subprocess.PIPE, text=True, env=environment, check=False)
     if child.returncode:

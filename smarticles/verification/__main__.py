@@ -1,131 +1,77 @@
-"""`python -m smarticles.verification DIR`: compute all known answers; tables into a folder that exists.
+"""`python -m smarticles.verification PART`: what `smarticles verify` and `make stability` compute, part by part.
 
-Writes verification.csv, trajectories.csv and clumps.csv, and versions.json; progress goes to standard output. What
-draws and judges them is another process, see `smarticles.verification.report`; `smarticles verify` runs both.
+`known DIR` computes all known answers: verification.csv, trajectories.csv, clumps.csv and versions.json, which
+`smarticles verify` judges and draws in another process. The other parts are those of `make stability`; what is in their
+tables already is skipped, so that a run that was stopped goes on, and parts can be run apart.
 """
 
 from __future__ import annotations
 
+import argparse
+import os
 import sys
-import time
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
-import pandas as pd
-
-from dem.engine.yade.library import yade_version
 from dem.errors import RunError
-from dem.record.files import write_json, write_text
-from dem.run.run import versions
-from smarticles.verification.answer import Case, Ladder
-from smarticles.verification.catalogue import CASES, LADDERS
-from smarticles.verification.known.clumps import flat_impacts
-
-T = TypeVar("T")
 
 
-def rows_of_case(case: Case) -> list[dict[str, object]]:
-    """One row per check."""
-    return [
-        {
-            "case": case.name,
-            "quantity": check.quantity,
-            "unit": check.unit,
-            "theory [unit]": check.theory,
-            "measured [unit]": check.measured,
-            "error [1]": check.error,
-            "tolerance [1]": check.tolerance,
-            "ok": check.ok,
-            "error relative to [unit]": check.scale or abs(check.theory),
-            "about": case.about,
-            "source": case.theory,
-            "reason of the tolerance": check.reason,
-        }
-        for check in case.measure()
-    ]
-
-
-def rows_of_ladder(ladder: Ladder) -> list[dict[str, object]]:
-    """One row per time step."""
-    return [
-        {
-            "ladder": ladder.name,
-            "quantity": ladder.quantity,
-            "unit": ladder.unit,
-            "time step [s]": step,
-            "error [unit]": error,
-            "size of the motion [unit]": ladder.size,
-            "order of the scheme [1]": ladder.order,
-            "about": ladder.about,
-            "why": ladder.why,
-        }
-        for step, error in zip(ladder.steps, ladder.errors(ladder.steps), strict=True)
-    ]
-
-
-_CLUMP_COLUMNS = {
-    "rows": "rows [1]",
-    "pitch": "pitch [1]",
-    "spheres": "spheres [1]",
-    "contacts": "contacts [1]",
-    "nominal": "restitution asked for [1]",
-    "parallel": "restitution, n in parallel [1]",
-    "theory": "restitution, n in parallel and tilt [1]",
-    "measured": "restitution measured [1]",
-    "at_scene_step": "restitution at the scene's time step [1]",
-    "theory_contact": "contact time, theory [s]",
-    "measured_contact": "contact time measured [s]",
-    "single_contact": "contact time of one elastic contact [s]",
-    "theory_sunk": "depth at rest, theory [m]",
-    "measured_sunk": "depth at rest measured [m]",
-    "step": "time step of the scene [s]",
-}
-
-
-def compute(folder: Path) -> None:
-    """Run everything.
+def main(argv: Sequence[str] | None = None) -> int:
+    """Do one of the parts.
 
     Args:
-        folder: where the tables go.
+        argv: the arguments; by default those of this process.
 
-    Raises:
-        RunError: YADE is not installed, or a disk is full.
+    Returns:
+        The exit status.
     """
-    write_json(folder / "versions.json", versions(("yade", yade_version())))
-    _write(folder / "verification.csv", [row for case in CASES for row in _timed(case.name, rows_of_case, case)])
-    _write(folder / "trajectories.csv", [row for one in LADDERS for row in _timed(one.name, rows_of_ladder, one)])
-    impacts = _timed("flat impacts over the number of spheres", flat_impacts)
-    _write(
-        folder / "clumps.csv", [{_CLUMP_COLUMNS[key]: value for key, value in asdict(one).items()} for one in impacts]
-    )
-
-
-def _timed(name: str, run: Callable[..., list[T]], *arguments: object) -> list[T]:
-    begun = time.perf_counter()
-    found = run(*arguments)
-    print(f"{time.perf_counter() - begun:6.1f} s  {name}", flush=True)
-    return found
-
-
-def _write(path: Path, rows: list[dict[str, object]]) -> None:
-    write_text(path, pd.DataFrame(rows).to_csv(index=False, float_format="%.10g"))
-
-
-def main() -> int:
-    """Compute into the folder that the command line names."""
-    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
-        print(
-            "python -m verification DIR: DIR must be a folder; `smarticles verify --out DIR` makes it", file=sys.stderr
-        )
-        return 2
+    arguments = _parser().parse_args(argv)
+    os.environ["OMP_NUM_THREADS"] = "1"
     try:
-        compute(Path(sys.argv[1]))
+        return _done(arguments)
     except RunError as error:
         print(error, file=sys.stderr)
         return 1
+
+
+def _done(arguments: argparse.Namespace) -> int:
+    # Figures bring in Matplotlib and the package of measures, the others YADE: each only where it is asked for.
+    out: Path = arguments.out
+    if arguments.part == "figure":
+        from smarticles.verification.figures import draw_onset  # noqa: PLC0415
+
+        print(draw_onset(out))
+        return 0
+    from smarticles.verification import tables  # noqa: PLC0415
+
+    out.mkdir(parents=True, exist_ok=True)
+    if arguments.part == "known":
+        tables.compute_known(out)
+    elif arguments.part == "cases":
+        good = tables.run_cases(out, form=arguments.form, only=arguments.only, again=arguments.again)
+        return 0 if good else 1
+    else:
+        from smarticles.verification.hard.onset import run_onset  # noqa: PLC0415
+
+        run_onset(out, arguments.seeds)
     return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m smarticles.verification", description=__doc__)
+    parts = parser.add_subparsers(dest="part", required=True)
+    known = parts.add_parser("known", help="compute the known answers")
+    known.add_argument("out", type=Path, metavar="DIR", help="folder of the tables")
+    cases = parts.add_parser("cases", help="run the hard cases")
+    cases.add_argument("--form", choices=("short", "long"), default="long", help="size of the cases")
+    cases.add_argument("--only", nargs="+", default=[], metavar="TEXT", help="cases whose name contains one of these")
+    cases.add_argument("--again", action="store_true", help="run cases whose rows are there already, too")
+    onset = parts.add_parser("onset", help="run the same scenes at steps around the stable one and above")
+    onset.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="seeds of every scene")
+    figure = parts.add_parser("figure", help="draw the figure of the onset from its table")
+    for part in (cases, onset, figure):
+        part.add_argument("--out", type=Path, default=Path("results/stability"), help="folder of tables and figure")
+    return parser
 
 
 if __name__ == "__main__":

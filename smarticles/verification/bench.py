@@ -1,4 +1,4 @@
-"""The bench that cases are built on: bodies, engines, and hands that push and hold.
+"""The bench that all cases are built on: bodies, engines, hands that push and hold, and looks as a run has them.
 
 The only module here that reaches behind the engine's interface: a run never sets a velocity or holds a link. SI
 throughout. Velocities of YADE belong to the half step before the positions (leapfrog): a body that is to have v at
@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,13 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
+from dem.engine.yade.kind import YadeKind, contact_law_of, hinge_law, motor_law
+from dem.errors import RunError
 from dem.physics.contact import ContactLaw, damping_ratio
 from dem.plan.steps import time_step
+from dem.record.progress import ProgressWriter
+from dem.run.build import build_recorder
+from dem.run.recorder import Recorder
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
@@ -32,6 +37,7 @@ Array = NDArray[np.float64]
 
 G = 9.81  # m/s²
 FLAT = Rotation.identity()
+TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
 # Steel, and the stiffness of the fidelities `standard` and `reference`.
 BALL_RADIUS, BALL_MASS = 2e-3, 2.6e-4  # m, kg
@@ -63,7 +69,7 @@ def ball(radius: float = BALL_RADIUS, mass: float = BALL_MASS) -> Ball:
 
 def scene_of(data: Mapping[str, Any]) -> Scene:
     """A scene from plain data."""
-    return parse_scene(data, source="verification")
+    return parse_scene(data, source="case")
 
 
 def scene(*, fidelity: Any = "draft", phases: Iterable[str] = ("relax",), **parts: Any) -> Scene:
@@ -193,3 +199,41 @@ def drive(
                 log[0].append(engine.motors._hinges.torques()[0])
                 log[1].append(engine.motors._hinges.angles()[0])
         yield look * interval
+
+
+# -- as a run has it ---------------------------------------------------------------------------------------------------
+
+
+def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, YadeEngine, Recorder]:
+    """Engine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
+    scene = scene_of(data)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    engine = YadeKind().build(scene, time_step(scene) if dt is None else dt)
+    progress = ProgressWriter(Path(out), scene.count, show=False)
+    return scene, engine, build_recorder(scene, Path(out), progress)
+
+
+def look(engine: YadeEngine, recorder: Recorder) -> str | None:
+    """What the recorder's next look says, contacts included; None: nothing."""
+    recorder.watch_every = 1
+    try:
+        recorder.record(engine, 0)
+    except RunError as error:
+        return str(error)
+    return None
+
+
+def energy(engine: YadeEngine) -> float:
+    """Kinetic, potential, and that of the springs of all contacts [J]."""
+    state = engine.state()
+    return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.account.elastic()[0]
+
+
+def fastest(engine: YadeEngine) -> float:
+    """Speed of the fastest link [m/s]."""
+    return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
+
+
+def lying(scene: Scene) -> float:
+    """Height [m] of the centre of mass of a smarticle that lies flat on the floor."""
+    return float(scene.particle.radius - scene.particle.centres[:, 2].min())

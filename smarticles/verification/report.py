@@ -1,4 +1,4 @@
-"""Known answers, judged and told: from the tables of the `verification` package to orders, a report and figures.
+"""Known answers, judged and told: from tables to orders, a report and figures.
 
 The tables are computed in another process, which loads YADE.
 """
@@ -27,7 +27,7 @@ class Verification:
     """Known answers and how they were met.
 
     Attributes:
-        checks: One row per quantity, see `smarticles.verification.__main__`.
+        checks: One row per quantity, see `smarticles.verification.tables`.
         orders: One row per ladder over the time step.
         clumps: One row per sphere chain, flat impacts.
         failed: What is not as it must be, one line each.

@@ -1,1 +1,1 @@
-"""The study accuracy."""
+"""What accuracy costs: the ladder of one scene, each knob turned by itself; the command `smarticles accuracy`."""

@@ -1,4 +1,4 @@
-"""What the rungs of a ladder of accuracy advise, in sentences; the table is that of `accuracy_runs.work_precision`."""
+"""What the rungs of a ladder of accuracy advise, in sentences; the table is that of `measure.work_precision`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from postprocess.statistics.columns import SEEDS
 from postprocess.statistics.points import told_number
-from studies.accuracy.runs import (
+from studies.accuracy.measure import (
     COMPARED,
     COST,
     IS_REFERENCE,
@@ -22,7 +23,6 @@ from studies.accuracy.runs import (
     VALUE,
     VERDICT,
 )
-from studies.base.runs import SEEDS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +159,7 @@ def told_closing(advice: Sequence[Advice], table: pd.DataFrame) -> str:
 
     Args:
         advice: Of each knob.
-        table: See `accuracy_runs.work_precision`.
+        table: See `measure.work_precision`.
     """
     cheap = [f"{one.knob} {one.use} ({one.bound:.1f} %)" for one in advice if one.use is not None and one.cheaper]
     dear = [f"{one.knob} ({one.use})" for one in advice if one.use is not None and not one.cheaper]

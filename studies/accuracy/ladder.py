@@ -14,16 +14,13 @@ from types import MappingProxyType
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, Fidelity
+from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE, Rung
 from templates.sweep.render import Value, render_yaml
-from templates.sweep.sweep import SEED, Sweep, SweepFile
-from templates.sweep.texts import nearest
-
-BASE = "base"
-"""Setting of the scene as it stands."""
+from templates.sweep.sweep_file import SEED, Sweep, SweepFile
 
 KNOBS: Mapping[str, str] = MappingProxyType(
     {
@@ -37,15 +34,6 @@ KNOBS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-SENSITIVITIES = frozenset({"restitution"})
-"""Knobs of what is modelled, not of how well; their rungs are compared with the scene itself."""
-
-ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})
-"""Types of phase in which barbs move."""
-
-ACTIVITIES = ACTUATED | {"shake"}
-"""Types of phase that do something to the pile in its container."""
-
 _OF_MOTORS = frozenset({"control", "hinge"})
 # Left as the scene has them: facets, since no knob turns them; a step by hand is refused.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
@@ -57,28 +45,6 @@ _CONTROL_INTERVALS = (4e-4, 2e-4, 1e-4)
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_ROWS = max(_ROWS)
 _SWEEP, _TEMPLATE = Path("accuracy.yaml"), Path("accuracy.yaml.j2")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rung:
-    """One value of one knob.
-
-    Args:
-        knob: key of `KNOBS`.
-        value: the value, as text.
-        unit: its unit, or empty.
-        setting: name of the variant of the scene that has it.
-    """
-
-    knob: str
-    value: str
-    unit: str
-    setting: str
-
-    @property
-    def label(self) -> str:
-        """Value and unit."""
-        return f"{self.value} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +70,7 @@ class Ladder:
 
     def references(self) -> dict[str, Rung]:
         """What each knob's rungs are compared with: its finest rung, or the scene itself for a sensitivity."""
-        found = {rung.knob: rung for rung in self.rungs if rung.knob not in SENSITIVITIES or rung.setting == BASE}
+        found = {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
         return {knob: found[knob] for knob in self.knobs}
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postprocess.report import figures
-from studies.procedures.runs import EXTERNAL, INTERNAL, SHAPE, STATIC
+from studies.base.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -13,13 +12,13 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report import figures
 from postprocess.report.markdown import table_lines
+from studies.base.references import Reference
 from studies.base.runs import DEFINITION, MissingRun
-from studies.gravish.reference import CITATION, DIGITISING_ERROR, REFERENCE
 
 
 def make_folder(path: Path | str) -> Path:
@@ -35,36 +34,6 @@ def make_folder(path: Path | str) -> Path:
         msg = f"cannot write to {path}: {error.strerror}; choose another folder as output"
         raise InputError(msg) from None
     return path
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reference:
-    """What a study is compared with.
-
-    Attributes:
-        statement: Names it, for footers; without a full stop.
-        facts: The same for `provenance.json`.
-    """
-
-    statement: str
-    facts: Mapping[str, object]
-
-
-GRAVISH = Reference(
-    statement=f"{CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}",
-    facts=MappingProxyType(
-        {
-            "file": REFERENCE.name,
-            "sha256": hashlib.sha256(REFERENCE.read_bytes()).hexdigest(),
-            "digitising_error": DIGITISING_ERROR,
-        }
-    ),
-)
-
-SAVOIE = Reference(
-    statement="statements in the text of Savoie et al., Soft Matter 2023, DOI 10.1039/d2sm01573k; no data of theirs",
-    facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +54,7 @@ class Origin:
     missing: tuple[MissingRun, ...]
     note: str
     command: str
-    reference: Reference = GRAVISH
+    reference: Reference
 
     def footer(self, points: str, *statements: str) -> tuple[str, ...]:
         """What every table and figure says about its origin, one statement each.
@@ -116,19 +85,17 @@ class Origin:
         *,
         tables: Mapping[str, pd.DataFrame],
         text: tuple[str, Sequence[str]],
-        draw: Callable[[], Sequence[Path]],
     ) -> Mapping[str, Path]:
-        """Writes all results of a study: its tables and that of the missing runs, text, provenance, figures.
+        """Writes what a study tells: its tables and that of the missing runs, its text, and the provenance.
 
         Args:
             output: Folder, see `make_folder`.
             footer: See `footer`.
             tables: By name, without suffix.
             text: Name of the Markdown file, and its lines; missing runs and footer are put below.
-            draw: Draws the figures into the folder.
 
         Returns:
-            Everything that was written, by name.
+            The files, by name.
         """
         written = write_tables(output, {**tables, "missing": missing_table(self.missing)}, footer)
         name, lines = text
@@ -136,7 +103,7 @@ class Origin:
         provenance = output / "provenance.json"
         told = {column for table in tables.values() for column in table.columns}
         written[provenance.name] = write_text(_provenance(self, footer, told), provenance)
-        return MappingProxyType(written | {path.name: path for path in draw()})
+        return MappingProxyType(written)
 
 
 def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str]) -> str:

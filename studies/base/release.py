@@ -5,21 +5,21 @@ A run is poured, goes through one activity or none, rests, and loses its wall in
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import pandas as pd
 
 from dem.errors import InputError
-from postprocess.frames import Frame, FrameSequence, read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
+from dem.record.frame import Frame
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
 from postprocess.measures.table import PASSIVE_PHASES
-from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
-from postprocess.statistics.findings import Finding, Verdict
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.findings import Verdict
 from postprocess.statistics.pairs import compared, mean_difference
-from postprocess.statistics.points import ToldTable, averaged, ordered, seeds_of, told_number
+from postprocess.statistics.points import averaged, ordered, seeds_of, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.runs import ASPECT, SEED
-from studies.procedures.runs import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
+from studies.base.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 
 ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 """Procedures in the order of tables and pictures."""
@@ -42,7 +42,7 @@ def removal(run: RunManifest) -> PhaseRecord:
 
 
 def procedure(run: RunManifest) -> str:
-    """What the pile went through before: a key of `procedures_runs.PROCEDURES`' values, or static.
+    """What the pile went through before: a key of `procedures.PROCEDURES`' values, or static.
 
     Raises:
         InputError: More than one activity, or an unknown one.
@@ -127,19 +127,3 @@ def by_procedure(runs: pd.DataFrame, quantity: str, form: str = ".3f") -> str:
         if mean.count:
             parts.append(f"{name} {told_number(mean.value, form, mean.standard_error)}")
     return ", ".join(parts) or "none"
-
-
-def markdown(title: str, found: Sequence[Finding], table: ToldTable, meanings: Mapping[str, str]) -> list[str]:
-    """Lines of `findings.md`: findings, points, and what their columns are."""
-    return [
-        f"# {title}",
-        "",
-        *findings_lines(found),
-        "",
-        "## Points",
-        "",
-        "Means over seeds ± standard error.",
-        "",
-        *table_lines(*table),
-        *meaning_lines("points.csv", meanings),
-    ]

@@ -1,28 +1,42 @@
-"""What the analysis of a study gives to whoever asked for it: a table to read, sentences, and the files written."""
+"""What the analysis of a study gives to whoever asked for it: a table to read, sentences, tables, and the files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Generic, TypeVar
 
-from postprocess.statistics.findings import Finding
+import pandas as pd
+
+from studies.base.runs import MissingRun
+
+Judgement = TypeVar("Judgement")
+"""What a study says in the end: a finding of a paper with its verdict, an answer, an advice."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StudyReport:
-    """Results of a study for a person to read.
+class Report(Generic[Judgement]):
+    """Results of a study.
 
     Attributes:
-        header: Names of the columns, with units.
-        rows: Of the table.
-        findings: The paper's findings, judged.
-        told: Further sentences, such as what the numbers are.
+        header: Names of the columns of the table for a person to read, with units.
+        rows: Of that table.
+        told: Sentences below it, the judgements among them.
+        tables: Everything that was tabulated, by name; `runs` has one row per finished run, or several.
+        judged: What is judged by them; empty where a study judges nothing.
+        missing: Runs that were given and are not in the tables.
+        footer: What every figure and table says about its origin, one statement each.
         files: Everything that was written, by name.
+        output: The folder that it was written to.
     """
 
     header: Sequence[str]
     rows: Sequence[Sequence[object]] = field(repr=False)
-    findings: tuple[Finding, ...] = ()
-    told: tuple[str, ...] = ()
+    told: tuple[str, ...]
+    tables: Mapping[str, pd.DataFrame] = field(repr=False)
+    judged: tuple[Judgement, ...]
+    missing: tuple[MissingRun, ...]
+    footer: tuple[str, ...] = field(repr=False)
     files: Mapping[str, Path] = field(repr=False)
+    output: Path

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, legend_above, procedure_marker
+from studies.base.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
-from studies.base.runs import SEED
-from studies.casting.runs import (
+from studies.casting.measure import (
     AFTER,
     FILLED,
     FILLED_AFTER,
@@ -28,7 +29,6 @@ from studies.casting.runs import (
     WHOLE_AFTER,
     WHOLE_KEPT,
 )
-from studies.procedures.runs import INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,8 +61,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: Means over seeds, see `release_runs.means`.
-        runs: Rows of `casting_runs.casting_row`.
+        points: Means over seeds, see `base.release.means`.
+        runs: Rows of `measure.casting_row`.
         manifests: The runs.
         footer: Origin, one statement each.
 

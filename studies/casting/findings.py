@@ -8,8 +8,9 @@ import pandas as pd
 
 from postprocess.statistics.findings import Finding, all_of, judge, negative, told
 from postprocess.statistics.seeds import mean_over_seeds
+from studies.base.procedures import INTERNAL, SHAPE, STATIC
 from studies.base.release import by_procedure, compared_with, of, paired
-from studies.casting.runs import (
+from studies.casting.measure import (
     FILLED,
     HEIGHT,
     IN_MOULD,
@@ -22,7 +23,6 @@ from studies.casting.runs import (
     WHOLE,
     WHOLE_KEPT,
 )
-from studies.procedures.runs import INTERNAL, SHAPE, STATIC
 
 FULL = 0.7
 """A tier is filled if the pile has more than this share of its volume [-].
@@ -35,7 +35,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        runs: Rows of `casting_runs.casting_row`.
+        runs: Rows of `measure.casting_row`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _pour_fills,

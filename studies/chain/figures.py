@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.strain import (
     FRACTURE,
     PEAK,
-    Pull,
-    read_pull,
+    StrainTest,
+    read_strain_test,
 )
 from postprocess.report import figures
 from postprocess.statistics.points import marked
 from studies.base.figures import draw_means, finished, marker
 from studies.chain.findings import COUNTS, RANGE
-from studies.chain.runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    _Value = Callable[[Pull], NDArray[np.float64]]
+    _Value = Callable[[StrainTest], NDArray[np.float64]]
 
 _WIDE = 2 * figures.COLUMN_WIDTH
 _LOOKS = {2: marker("o", figures.BLUE, figures.BLUE), 6: marker("s", figures.ORANGE, "white")}
@@ -47,16 +47,16 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `chain_runs.points`.
-        runs: See `chain_runs.chain_row`.
-        changes: See `chain_findings.sensitivity`.
+        points: See `measure.points`.
+        runs: See `measure.chain_row`.
+        changes: See `findings.sensitivity`.
         manifests: The runs.
         footer: Origin, one statement each.
 
     Returns:
         The files written.
     """
-    pulls = {run.directory.name: read_pull(run) for run in manifests}
+    pulls = {run.directory.name: read_strain_test(run) for run in manifests}
     written = []
     with figures.style():
         for name, label, value in (
@@ -72,7 +72,7 @@ def draw(
     return written
 
 
-def _draw_curves(label: str, value: _Value, runs: pd.DataFrame, pulls: dict[str, Pull]) -> Figure:
+def _draw_curves(label: str, value: _Value, runs: pd.DataFrame, pulls: dict[str, StrainTest]) -> Figure:
     base = runs[runs[VARIANT] == BASELINE]
     ratios = sorted(base[CONFINEMENT].unique())
     colours = dict(zip(ratios, figures.sequence(len(ratios), first=0.0, last=0.85), strict=True))
@@ -90,7 +90,7 @@ def _draw_curves(label: str, value: _Value, runs: pd.DataFrame, pulls: dict[str,
     return figure
 
 
-def _draw_curve(axes: Axes, pull: Pull, value: _Value, colour: str, label: str) -> None:
+def _draw_curve(axes: Axes, pull: StrainTest, value: _Value, colour: str, label: str) -> None:
     end = pull.fracture + 1
     place = np.floor(np.maximum.accumulate(pull.strains[:end]) / _BIN).astype(int)
     counts = np.maximum(np.bincount(place), 1)

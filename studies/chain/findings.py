@@ -19,10 +19,10 @@ from postprocess.measures.strain import (
     WIDENING,
     YIELD,
 )
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
-from studies.base.runs import SEED
-from studies.chain.runs import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
 
 RANGE = (0.52, 0.65)
 """h/H of the paper."""
@@ -41,7 +41,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        runs: See `chain_runs.chain_row`.
+        runs: See `measure.chain_row`.
     """
     base = runs[runs[VARIANT] == BASELINE]
     inside, wide = base[base[CONFINEMENT].between(*RANGE)], f"h/H {RANGE[0]:g} to {RANGE[1]:g}"
@@ -146,7 +146,7 @@ def sensitivity(runs: pd.DataFrame) -> pd.DataFrame:
     """What each variant changes against the baseline with the same chain and walls, trial by trial.
 
     Args:
-        runs: See `chain_runs.chain_row`.
+        runs: See `measure.chain_row`.
 
     Returns:
         One row per variant and quantity; changes are in per cent of the baseline's trial with the same servos.

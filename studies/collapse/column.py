@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.frames import read_frames
-from postprocess.manifest import PhaseRecord, RunManifest
-from postprocess.measures.geometry import centres_of_mass
+from dem.record.frames import read_frames
+from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.series import read_series
+from postprocess.geometry.links import centres_of_mass
 from postprocess.scene_file import read_phases
-from postprocess.series import read_series
 from studies.collapse.time import CollapseTime, collapse_time
 
 if TYPE_CHECKING:

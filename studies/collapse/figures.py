@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postprocess.report import figures
+from postprocess.statistics.columns import ASPECT
 from studies.base.figures import ASPECT_LABEL, History, bin_width, draw_history, draw_means, finished, marker
-from studies.base.runs import ASPECT
 from studies.collapse.column import COM, CORE, REMAINING, column_history, vibration
 from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
+from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
 from studies.collapse.reference import ACCELERATIONS, read_collapse_reference
-from studies.collapse.runs import DEFINITION, GAMMA, LOG, WATCHED
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from postprocess.manifest import RunManifest
+    from dem.record.manifest import RunManifest
 
 _LABELS = {REMAINING: "remaining", COM: "centre of mass", CORE: "centre of mass within the radius"}
 _LOOKS = {
@@ -46,9 +46,9 @@ def draw(
 
     Args:
         output: Folder.
-        rows: See `collapse_runs.collapse_rows`.
-        levels: See `collapse_law.levels`.
-        activations: See `collapse_law.activations`.
+        rows: See `measure.collapse_rows`.
+        levels: See `law.levels`.
+        activations: See `law.activations`.
         manifests: The runs.
         footer: Origin, one statement each.
 

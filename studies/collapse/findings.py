@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, told
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import Difference, Slope, difference
-from studies.base.runs import ASPECT
 from studies.collapse.column import DEFINITIONS, REMAINING
 from studies.collapse.law import (
     ACTIVATION,
@@ -23,7 +23,7 @@ from studies.collapse.law import (
     activations,
     check_law,
 )
-from studies.collapse.runs import DEFINITION
+from studies.collapse.measure import DEFINITION
 
 INTERMEDIATE = 0.40
 """l/w of Gravish's greatest Δ [-]."""
@@ -39,7 +39,7 @@ def findings(rows: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, by the height `REMAINING`.
 
     Args:
-        rows: Of runs and definitions, see `collapse_runs.collapse_rows`.
+        rows: Of runs and definitions, see `measure.collapse_rows`.
     """
     table = activations(rows)
     return (_later_when_gentler(rows), _law(rows), _greatest_between(table), _as_gravish(table))

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, mean_columns, ordered
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
-from studies.base.runs import ASPECT, SEED, SEEDS
 from studies.collapse.column import DEFINITIONS
+from studies.collapse.measure import DEFINITION, DELTA, GAMMA, LOG, is_seen
 from studies.collapse.reference import reference_delta
-from studies.collapse.runs import DEFINITION, DELTA, GAMMA, LOG, is_seen
 
 ACTIVATION = "Delta [-]"
 ERROR, HALF_WIDTH, LOG_HALF_WIDTH = marked(ACTIVATION, "SE"), marked(ACTIVATION, "95 %"), marked(LOG, "95 %")
@@ -31,7 +31,7 @@ def levels(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per definition, aspect ratio and Γ: mean of ln(fτ) over seeds, with its error.
 
     Args:
-        rows: Of runs and definitions, see `collapse_runs.collapse_rows`.
+        rows: Of runs and definitions, see `measure.collapse_rows`.
 
     Returns:
         The table. Where a run gave a bound, the mean with it is a bound too, and has no error.

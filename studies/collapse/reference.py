@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from studies.base.origin import Reference
+from studies.base.references import Reference
 
 _FILE = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 

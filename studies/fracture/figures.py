@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.measures.pull import WINDOW
 from postprocess.report import figures
+from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
 from studies.base.figures import (
     ASPECT_LABEL,
@@ -24,11 +25,7 @@ from studies.base.figures import (
     marker,
     procedure_marker,
 )
-from studies.base.runs import ASPECT
-from studies.fracture.findings import SHOWN_ASPECT, at_shown_aspect
-from studies.fracture.runs import HELD_FAST, PEAK, force_history
-from studies.procedures.effects import of_procedure
-from studies.procedures.runs import (
+from studies.base.procedures import (
     AMPLITUDE,
     CROSSINGS,
     EXTERNAL,
@@ -37,7 +34,10 @@ from studies.procedures.runs import (
     SHAPE,
     STATIC,
     THETA,
+    of_procedure,
 )
+from studies.fracture.findings import SHOWN_ASPECT, at_shown_aspect
+from studies.fracture.measure import HELD_FAST, PEAK, force_history
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,8 +81,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `procedures_runs.points`.
-        runs: See `fracture_runs.fracture_row`.
+        points: See `base.procedures.points`.
+        runs: See `measure.fracture_row`.
         manifests: The runs, in any order.
         footer: Origin, one statement each.
 

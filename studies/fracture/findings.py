@@ -17,13 +17,23 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import told_less
 from postprocess.statistics.seeds import slope_within
-from studies.base.runs import ASPECT, SEED
-from studies.fracture.runs import HELD_FAST, NET, PEAK, PEAK_RAISED
-from studies.procedures.effects import of_procedure, paired
-from studies.procedures.runs import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
+from studies.base.procedures import (
+    AMPLITUDE,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PROCEDURE,
+    SHAPE,
+    STATIC,
+    THETA,
+    of_procedure,
+    paired,
+)
+from studies.fracture.measure import HELD_FAST, NET, PEAK, PEAK_RAISED
 
 SHOWN_ASPECT = 0.7
 """Aspect ratio at which procedures and amplitudes are compared, as in the paper [-]."""
@@ -33,7 +43,7 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        table: One row per run, see `fracture_runs.fracture_row`.
+        table: One row per run, see `measure.fracture_row`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _shape_change_strongest,

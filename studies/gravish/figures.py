@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
+from dem.record.series import read_series
 from postprocess.report import figures
-from postprocess.series import read_series
 from studies.base.figures import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,
@@ -48,8 +48,8 @@ def draw(
 
     Args:
         output: Folder.
-        summary: See `gravish_answers.summarise_runs`.
-        reference: See `gravish_reference.read_reference`.
+        summary: See `findings.summarise_runs`.
+        reference: See `references.read_reference`.
         manifests: The runs behind the summary.
         definition: Of the packing fraction that is compared.
         reading_error: Of the reference's points [-].

@@ -3,192 +3,166 @@
 Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012):
 steel staples shaken vertically at 30 Hz and a peak acceleration of 2 g for 20 s. Their points are
 digitised (`reference/README.md`); they are compared at equal l/w only and never interpolated.
-How errors and answers come about is in `studies.gravish.answers`.
+How errors and answers come about is in `studies.gravish.findings`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
 
 from dem.errors import InputError
+from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.report.markdown import table_lines
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import told_number
-from studies.base.origin import Origin, make_folder
-from studies.base.runs import (
-    ASPECT,
-    DEFINITION,
-    SEED,
-    SEEDS,
-    STAGES,
-    WHEN,
-    MissingRun,
-    collect_runs,
-    measured_row,
-    refuse_repeats,
-    runs_table,
-    told_bars,
-    told_seeds,
-    told_shaken,
-)
-from studies.gravish import figures as gravish_figures
-from studies.gravish.answers import (
-    Verdict,
+from studies.base.references import DIGITISING_ERROR, GRAVISH, SHAKE_TIME, Reference, read_reference
+from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
+from studies.base.shaken import STAGES, WHEN, measured_row, told_shaken
+from studies.base.study import Analysis, Study, Tables
+from studies.gravish import figures
+from studies.gravish.findings import (
+    Question,
     answers,
     deviations_from_reference,
     steps_between_ratios,
     summarise_runs,
 )
-from studies.gravish.reference import DIGITISING_ERROR, SHAKE_TIME, read_reference
-
-_STUDY = "gravish"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class GravishReport:
-    """Tables, answers and files of the study.
-
-    Attributes:
-        runs: One row per finished run.
-        summary: One row per aspect ratio: means over seeds with errors, and Gravish's values.
-        deviations: One row per point that Gravish has as well.
-        steps: One row per pair of neighbouring aspect ratios and stage: does φ fall?
-        verdicts: Answers to the study's questions.
-        missing: Runs that were given and are not in the tables.
-        footer: What every figure and table says about its origin, one statement each.
-        files: Everything that was written, by name.
-    """
-
-    runs: pd.DataFrame = field(repr=False)
-    summary: pd.DataFrame = field(repr=False)
-    deviations: pd.DataFrame = field(repr=False)
-    steps: pd.DataFrame = field(repr=False)
-    verdicts: tuple[Verdict, ...]
-    missing: tuple[MissingRun, ...]
-    footer: tuple[str, ...] = field(repr=False)
-    files: Mapping[str, Path] = field(repr=False)
-
-
-def analyse_gravish(
-    run_dirs: Sequence[Path | str],
-    output: Path | str,
-    *,
-    note: str,
-    command: str,
-    definitions: Sequence[str] = tuple(DEFINITIONS),
-) -> GravishReport:
-    """Measures the runs of the study and writes its tables and figures.
-
-    Runs that are not done, or cannot be read, are listed as missing. Files of an earlier analysis
-    in the same folder are replaced.
+class Gravish(Study[Question]):
+    """Runs that were poured and shaken.
 
     Args:
-        run_dirs: Run directories; any subset of the study.
-        output: Folder for the results; made if needed.
-        note: How these runs differ from the full study; stands in every footer.
-        command: Command line to state as the origin.
-        definitions: Definitions of the packing fraction to tabulate, keys of
-            `packing.DEFINITIONS`; the one that is compared is always among them. Those in
-            `packing.COSTLY_DEFINITIONS` take seconds per run.
-
-    Returns:
-        The report.
+        definitions: Definitions of the packing fraction to tabulate, keys of `packing.DEFINITIONS`; the one that is
+            compared is always among them. Those in `packing.COSTLY_DEFINITIONS` take seconds per run.
 
     Raises:
-        InputError: No run is done, a run is given twice, the runs differ in fidelity, an unknown
-            definition, or the output is no folder.
+        InputError: A definition is unknown.
     """
-    unknown = set(definitions) - set(DEFINITIONS)
-    if unknown:
-        msg = f"unknown definition '{min(unknown)}' of φ: choose from {', '.join(DEFINITIONS)}"
-        raise InputError(msg)
-    output = make_folder(output)
-    manifests, rows, missing = collect_runs(_STUDY, run_dirs, lambda run: measured_row(run, definitions))
-    refuse_repeats(_STUDY, manifests, "l/w", lambda run: f"{run.aspect_ratio:.6g}")
-    runs = runs_table(rows).sort_values([ASPECT, SEED], ignore_index=True)
-    reference = read_reference()
-    summary = summarise_runs(runs, reference)
-    deviations, steps = deviations_from_reference(summary), steps_between_ratios(summary)
-    verdicts = answers(runs, summary, deviations, steps)
-    origin = Origin(study=_STUDY, manifests=manifests, missing=missing, note=note, command=command)
-    footer = _footer(origin, runs)
-    files = origin.write(
-        output,
-        footer,
-        tables={
+
+    name = "gravish"
+    text_name = "deviations.md"
+
+    def __init__(self, definitions: Sequence[str] = tuple(DEFINITIONS)) -> None:
+        unknown = set(definitions) - set(DEFINITIONS)
+        if unknown:
+            msg = f"unknown definition '{min(unknown)}' of φ: choose from {', '.join(DEFINITIONS)}"
+            raise InputError(msg)
+        self.definitions = tuple(definitions)
+
+    def measure(self, run: RunManifest) -> MeasuredRun:
+        """φ and crossings before and after shaking."""
+        return MeasuredRun(manifest=run, rows=[measured_row(run, self.definitions)])
+
+    def refuse(self, found: Collected) -> None:
+        """An aspect ratio and seed twice."""
+        found.refuse_repeats("l/w", lambda run: f"{run.manifest.aspect_ratio:.6g}")
+
+    def tabulate(self, found: Collected) -> Tables:
+        """Runs, means over seeds, deviations from Gravish's points, and steps between neighbouring aspect ratios."""
+        runs = runs_table(found).sort_values([ASPECT, SEED], ignore_index=True)
+        summary = summarise_runs(runs, read_reference())
+        return {
             "runs": runs,
             "summary": summary,
-            "deviations": deviations,
-            "steps": steps,
-            "verdicts": pd.DataFrame([asdict(verdict) for verdict in verdicts]),
-        },
-        text=("deviations.md", _markdown(deviations, verdicts)),
-        draw=lambda: gravish_figures.draw(
+            "deviations": deviations_from_reference(summary),
+            "steps": steps_between_ratios(summary),
+        }
+
+    def judge(self, tables: Tables) -> tuple[Question, ...]:
+        """Answers to the study's questions."""
+        return answers(tables["runs"], tables["summary"], tables["deviations"], tables["steps"])
+
+    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
+        """`verdicts.csv`."""
+        return {"verdicts": pd.DataFrame([asdict(one) for one in judged])}
+
+    def reference_of(self, tables: Tables) -> Reference:
+        """Gravish's packing fractions."""
+        return GRAVISH
+
+    def statements(self, analysis: Analysis[Question]) -> tuple[str, ...]:
+        """Which runs, and how φ is taken."""
+        runs = analysis.tables["runs"]
+        counts = runs.groupby(ASPECT).size()
+        ratios = " ".join(f"{ratio:g}" for ratio in counts.index)
+        return (
+            f"l/w {ratios}, {told_seeds(runs, counts, 'l/w')}; shaken for {told_shaken(runs)} "
+            f"(Gravish: {SHAKE_TIME:g} s).",
+            f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame). "
+            f"{told_bars(counts, 'l/w')}.",
+        )
+
+    def text(self, analysis: Analysis[Question]) -> Sequence[str]:
+        """Answers, and deviations by stage and point."""
+        deviations = analysis.tables["deviations"]
+        stages = []
+        for stage, part in deviations.groupby("stage", sort=False):
+            percent = part["deviation [%]"]
+            largest = percent.loc[percent.abs().idxmax()]
+            numbers = [f"{percent.abs().mean():.1f} %", f"{percent.mean():+.1f} %", f"{largest:+.1f} %"]
+            stages.append([str(stage), STAGES[str(stage)], str(len(part)), *numbers])
+        points = [
+            [
+                row["stage"],
+                f"{row[ASPECT]:g}",
+                str(row[SEEDS]),
+                told_number(row["phi [-]"], ".4f", row["phi 95 % [-]"]),
+                f"{row['phi Gravish [-]']:.4f}",
+                f"{row['deviation [%]']:+.1f} %",
+            ]
+            for _, row in deviations.iterrows()
+        ]
+        judged = [(one.question, one.answer, one.evidence) for one in analysis.judged]
+        return [
+            "# Packing of shaken smarticles against Gravish et al. 2012",
+            "",
+            "## Verdicts",
+            "",
+            *table_lines(["question", "answer", "evidence"], judged),
+            "",
+            "## Mean absolute deviation",
+            "",
+            *table_lines(["stage", "meaning", "points", "mean absolute", "mean, signed", "largest"], stages),
+            "",
+            "## Points",
+            "",
+            *table_lines(["stage", "l/w", "seeds", "φ", "Gravish", "deviation"], points),
+        ]
+
+    def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
+        """φ and crossings against l/w, and φ against time."""
+        return figures.draw(
             output,
-            summary=summary,
-            reference=reference,
-            manifests=manifests,
+            summary=analysis.tables["summary"],
+            reference=read_reference(),
+            manifests=analysis.found.manifests,
             definition=DEFINITION,
             reading_error=DIGITISING_ERROR,
             footer=footer,
-        ),
-    )
-    return GravishReport(
-        runs=runs,
-        summary=summary,
-        deviations=deviations,
-        steps=steps,
-        verdicts=verdicts,
-        missing=missing,
-        footer=footer,
-        files=files,
-    )
+        )
 
-
-def _footer(origin: Origin, runs: pd.DataFrame) -> tuple[str, ...]:
-    counts = runs.groupby(ASPECT).size()
-    ratios = " ".join(f"{ratio:g}" for ratio in counts.index)
-    return origin.footer(
-        f"l/w {ratios}, {told_seeds(runs, counts, 'l/w')}; shaken for {told_shaken(runs)} (Gravish: {SHAKE_TIME:g} s).",
-        f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame). "
-        f"{told_bars(counts, 'l/w')}.",
-    )
-
-
-def _markdown(deviations: pd.DataFrame, verdicts: Sequence[Verdict]) -> list[str]:
-    stages = []
-    for stage, part in deviations.groupby("stage", sort=False):
-        percent = part["deviation [%]"]
-        largest = percent.loc[percent.abs().idxmax()]
-        numbers = [f"{percent.abs().mean():.1f} %", f"{percent.mean():+.1f} %", f"{largest:+.1f} %"]
-        stages.append([str(stage), STAGES[str(stage)], str(len(part)), *numbers])
-    points = [
-        [
-            row["stage"],
-            f"{row[ASPECT]:g}",
-            str(row[SEEDS]),
-            told_number(row["phi [-]"], ".4f", row["phi 95 % [-]"]),
-            f"{row['phi Gravish [-]']:.4f}",
-            f"{row['deviation [%]']:+.1f} %",
+    def table(self, analysis: Analysis[Question]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
+        """Deviations from Gravish's points."""
+        rows = [
+            [
+                row["stage"],
+                row[ASPECT],
+                row[SEEDS],
+                f"{row['phi [-]']:.4f}",
+                f"{row['phi 95 % [-]']:.4f}",
+                f"{row['phi Gravish [-]']:.4f}",
+                f"{row['deviation [%]']:+.1f}",
+            ]
+            for row in analysis.tables["deviations"].to_dict("records")
         ]
-        for _, row in deviations.iterrows()
-    ]
-    return [
-        "# Packing of shaken smarticles against Gravish et al. 2012",
-        "",
-        "## Verdicts",
-        "",
-        *table_lines(["question", "answer", "evidence"], [(v.question, v.answer, v.evidence) for v in verdicts]),
-        "",
-        "## Mean absolute deviation",
-        "",
-        *table_lines(["stage", "meaning", "points", "mean absolute", "mean, signed", "largest"], stages),
-        "",
-        "## Points",
-        "",
-        *table_lines(["stage", "l/w", "seeds", "φ", "Gravish", "deviation"], points),
-    ]
+        return ["φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"], rows
+
+    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
+        """Questions with their answers."""
+        return [f"{one.question} {one.answer.upper()}\n    {one.evidence}" for one in analysis.judged]

@@ -1,1 +1,29 @@
-"""The study melting."""
+"""The study `melting`: piles whose wall is taken away, against Savoie et al."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.base.shipped import Shipped
+
+if TYPE_CHECKING:
+    from studies.melting.study import Melting
+
+
+def _load(*, quick: bool) -> Melting:
+    from studies.melting.study import Melting  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Melting()
+
+
+SHIPPED = Shipped(
+    name="melting",
+    folder=Path(__file__).parent,
+    load=_load,
+    pictured={"procedure": "shape-change", "lift_m_per_s": 0, "l_over_w": 0.7},
+    about="""\
+the container's wall is taken away, at once or lifted, after shape change, internal or external oscillation or
+none: what holds together, spreads, comes off or falls over within 2 s, against the text of Savoie et al.
+48 runs of hours; --quick takes minutes.""",
+)

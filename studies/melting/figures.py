@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from postprocess.manifest import RunManifest
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
+from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.figures import COLOURS, History, bin_width, draw_history, finished
+from studies.base.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
-from studies.base.runs import ASPECT, SEED
-from studies.melting.runs import CONTACT, ENTANGLED, HEIGHT, LIFT, SLOUGHED, SPREAD, TILT, Melting
-from studies.procedures.runs import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.base.runs import MeasuredRun
+from studies.melting.measure import CONTACT, ENTANGLED, HEIGHT, LIFT, SINCE, SLOUGHED, SPREAD, TILT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,43 +49,47 @@ def draw(
     output: Path,
     *,
     runs: pd.DataFrame,
-    melted: Mapping[str, Melting],
-    manifests: Sequence[RunManifest],
+    melted: Sequence[MeasuredRun],
     footer: Sequence[str],
 ) -> list[Path]:
     """Draws and writes all figures.
 
     Args:
         output: Folder.
-        runs: Rows of `melting_runs.measure_melting`.
-        melted: All of it, by the name of the run.
-        manifests: The runs.
+        runs: Rows of `measure.measure_melting`, in order.
+        melted: The runs, with what was measured against time.
         footer: Origin, one statement each.
 
     Returns:
         The files written.
     """
+    by_name = {run.name: run for run in melted}
     written = []
     with figures.style():
         for (lift, aspect), part in runs.groupby([LIFT, ASPECT]):
             name = f"time_lw{aspect:.2f}" + ("_lifted" if lift else "")
-            written += _draw_times(output / name, part, melted, footer, lift=float(lift), aspect=float(aspect))
-    by_name = {run.directory.name: run for run in manifests}
+            written += _draw_times(output / name, part, by_name, footer, lift=float(lift), aspect=float(aspect))
     return written + _draw_pictures(output / "pictures.png", runs, by_name, footer)
 
 
 def _draw_times(
-    path: Path, runs: pd.DataFrame, melted: Mapping[str, Melting], footer: Sequence[str], *, lift: float, aspect: float
+    path: Path,
+    runs: pd.DataFrame,
+    melted: Mapping[str, MeasuredRun],
+    footer: Sequence[str],
+    *,
+    lift: float,
+    aspect: float,
 ) -> list[Path]:
     figure = figures.blank_figure(2 * figures.COLUMN_WIDTH, 3.9)
     grid = figure.subplots(2, 3, sharex=True)
-    ends = [float(melted[name].times[-1]) for name in runs["run"]]
+    ends = [float(melted[name].history[SINCE][-1]) for name in runs["run"]]
     width = bin_width(ends)
     for axes, (quantity, label) in zip(grid.flat, _PANELS.items(), strict=True):
         for procedure in ORDER:
             seeds = [
-                History(times=one.times, values=one.values[quantity], active=float(one.times[-1]))
-                for one in (melted[name] for name in runs[runs[PROCEDURE] == procedure]["run"])
+                History(times=one[SINCE], values=one[quantity], active=float(one[SINCE][-1]))
+                for one in (melted[name].history for name in runs[runs[PROCEDURE] == procedure]["run"])
             ]
             if seeds:
                 draw_history(axes, seeds, width, colour=COLOURS[procedure], label=LABELS[procedure])
@@ -106,7 +110,7 @@ def _draw_times(
 
 
 def _draw_pictures(
-    path: Path, runs: pd.DataFrame, manifests: Mapping[str, RunManifest], footer: Sequence[str]
+    path: Path, runs: pd.DataFrame, melted: Mapping[str, MeasuredRun], footer: Sequence[str]
 ) -> list[Path]:
     """The first seed of each procedure, its wall gone at once, at the aspect ratio nearest to the paper's."""
     at_once = runs[runs[LIFT] == 0]
@@ -116,7 +120,7 @@ def _draw_pictures(
         if part.empty:
             continue
         part = part.assign(apart=(part[ASPECT] - 0.7).abs()).sort_values(["apart", SEED])
-        run = manifests[str(part["run"].iloc[0])]
+        run = melted[str(part["run"].iloc[0])].manifest
         start, end = removal(run).start, run.end_time
         if start is not None and end is not None:
             times = (around(run)[0].time, start + 0.1, end)

@@ -9,8 +9,9 @@ import pandas as pd
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
+from studies.base.procedures import INTERNAL, SHAPE, STATIC
 from studies.base.release import by_procedure, compared_with, of, paired
-from studies.melting.runs import (
+from studies.melting.measure import (
     BASE,
     CENTRE,
     CONTACT,
@@ -22,7 +23,6 @@ from studies.melting.runs import (
     TOP,
     TOPPLED,
 )
-from studies.procedures.runs import INTERNAL, SHAPE, STATIC
 
 WHOLE = 0.95
 """A pile holds together if more than this share of it is one cluster [-]: of 60 smarticles, no more than 2 apart."""
@@ -35,7 +35,7 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged by the runs whose wall goes at once; the last ones by those where it is lifted as well.
 
     Args:
-        runs: Rows of `melting_runs.measure_melting`.
+        runs: Rows of `measure.measure_melting`.
     """
     at_once = runs[runs[LIFT] == 0]
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (

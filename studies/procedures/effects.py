@@ -4,30 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Verdict, all_of, judge, negative, told
-from postprocess.statistics.pairs import mean_difference, pairs
-from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
-from studies.base.runs import ASPECT, SEED
-from studies.procedures.runs import AMPLITUDE, INTERNAL, PROCEDURE, THETA
-
-
-def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
-    """Samples of one procedure; of the internal oscillation those that procedures are compared at."""
-    chosen = table[table[PROCEDURE] == procedure]
-    return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL else chosen
+from postprocess.statistics.pairs import pairs
+from postprocess.statistics.seeds import Slope, mean_over_seeds, slope_within
+from studies.base.procedures import THETA, of_procedure
 
 
 def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
     """Values of two procedures for the same aspect ratio and seed: columns `one` and `other`."""
     return pairs(of_procedure(table, one), of_procedure(table, other), quantity)
-
-
-def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """One procedure less another, mean over pairs of the same aspect ratio and seed."""
-    return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def against_aspect(part: pd.DataFrame, quantity: str) -> Slope:

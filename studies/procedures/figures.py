@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.report import figures
+from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
 from studies.base.figures import (
     ASPECT_LABEL,
@@ -27,22 +28,19 @@ from studies.base.figures import (
     procedure_marker,
     told_histories,
 )
-from studies.base.runs import ASPECT
-from studies.procedures.effects import of_procedure
-from studies.procedures.runs import (
+from studies.base.procedures import (
     ACTIVE,
     AMPLITUDE,
     CROSSINGS,
-    ENERGY,
     EXTERNAL,
     INTERNAL,
-    PHI_ACTIVE,
     PROCEDURE,
     SHAPE,
     STATIC,
     THETA,
-    height_history,
+    of_procedure,
 )
+from studies.procedures.measure import ENERGY, PHI_ACTIVE, height_history
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,8 +74,8 @@ def draw(
 
     Args:
         output: Folder.
-        points: See `procedures_runs.points`.
-        runs: See `procedures_runs.procedure_row`.
+        points: See `base.procedures.points`.
+        runs: See `measure.procedure_row`.
         manifests: The runs, in the order of the table.
         footer: Origin, one statement each.
 

@@ -13,34 +13,24 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pandas as pd
 
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.seeds import difference, mean_over_seeds
-from studies.base.runs import ASPECT, SEED
-from studies.procedures.effects import (
-    against_amplitude,
-    against_aspect,
-    by_aspect,
-    compared,
-    of_procedure,
-    paired,
-    pairs_of,
-)
-from studies.procedures.runs import (
+from studies.base.procedures import (
     AMPLITUDE,
     CROSSINGS,
-    ENERGY,
     EXTERNAL,
-    HALF,
-    HEIGHT,
     INTERNAL,
     PHI,
-    PHI_ACTIVE,
     PROCEDURE,
     SHAPE,
     STATIC,
-    STRAIGHT,
     THETA,
+    of_procedure,
+    paired,
 )
+from studies.procedures.effects import against_amplitude, against_aspect, by_aspect, compared, pairs_of
+from studies.procedures.measure import ENERGY, HALF, HEIGHT, PHI_ACTIVE, STRAIGHT
 
 FLAT = 0.2
 """⟨N⟩ is flat if it changes by less than this share of its mean over the aspect ratios [-]."""
@@ -56,7 +46,7 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        table: See `procedures_runs.samples`.
+        table: See `measure.samples`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _rises,

@@ -7,191 +7,125 @@ Each variant differs from the first one, the baseline, in one choice. Runs are n
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import MappingProxyType
+from typing import Never
 
 import pandas as pd
 
-from postprocess.manifest import RunManifest
+from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
-from postprocess.statistics.points import marked, seeds_of, told_number
-from postprocess.statistics.seeds import mean_over_seeds, relative_difference
-from studies.base.origin import Origin, make_folder
-from studies.base.runs import (
-    ASPECT,
-    DEFINITION,
-    SEEDS,
-    VARIANT,
-    WHEN,
-    MissingRun,
-    collect_runs,
-    measured_row,
-    named_variant,
-    refuse_mixture,
-    refuse_repeats,
-    runs_table,
-    told_bars,
-    told_seeds,
-    told_shaken,
-    variant_of,
-    variants_of,
-)
-from studies.gravish.reference import read_reference, reference_at
-from studies.sensitivity import figure as sensitivity_figure
-
-COMPARED: Mapping[str, str] = MappingProxyType(
-    {
-        "phi_0": f"phi_0 {DEFINITION}",
-        "phi_f": f"phi_f {DEFINITION}",
-        "crossings after": "crossings after",
-    }
-)
-"""What is compared with the baseline: its name here, and its column in the table of runs less the unit."""
+from postprocess.statistics.columns import ASPECT, SEEDS
+from postprocess.statistics.points import told_number
+from studies.base.references import GRAVISH, Reference, read_reference, reference_at
+from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
+from studies.base.shaken import WHEN, told_shaken
+from studies.base.study import Analysis, Study, Tables
+from studies.base.variants import VARIANT, variants_of
+from studies.sensitivity import figures
+from studies.sensitivity.measure import COMPARED, sensitivity_row, summarise_variants
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SensitivityReport:
-    """Tables and files of the study.
-
-    Attributes:
-        baseline: Variant that the others are compared with.
-        runs: One row per finished run.
-        summary: One row per variant, in the order given: means over seeds with errors, and changes
-            against the baseline; NaN without a finished run.
-        missing: Runs that were given and are not in the tables.
-        footer: What figure and tables say about their origin, one statement each.
-        files: Everything that was written, by name.
-    """
-
-    baseline: str
-    runs: pd.DataFrame = field(repr=False)
-    summary: pd.DataFrame = field(repr=False)
-    missing: tuple[MissingRun, ...]
-    footer: tuple[str, ...] = field(repr=False)
-    files: Mapping[str, Path] = field(repr=False)
-
-
-def analyse_sensitivity(
-    run_dirs: Sequence[Path | str], output: Path | str, *, study: str = "sensitivity", note: str, command: str
-) -> SensitivityReport:
-    """Measures the runs of the study and writes its tables and its figure.
-
-    Runs that are not done, or cannot be read, are listed as missing. Files of an earlier analysis
-    in the same folder are replaced.
+class Sensitivity(Study[Never]):
+    """Runs of the variants of one scene; the first run's variant is the baseline.
 
     Args:
-        run_dirs: Run directories named `VARIANT_seedN`; the first one's variant is the baseline.
-        output: Folder for the results; made if needed.
-        study: Name of the study.
-        note: How these runs differ from the full study; stands in the footer.
-        command: Command line to state as the origin.
-
-    Returns:
-        The report.
-
-    Raises:
-        InputError: No run is done, a run is given twice, the runs differ in fidelity, aspect ratio
-            or number of smarticles, or the output is no folder.
+        name: Of the study.
     """
-    output = make_folder(output)
-    manifests, rows, missing = collect_runs(study, run_dirs, _row)
-    refuse_mixture(study, manifests, "l/w", lambda run: f"{run.aspect_ratio:g}")
-    refuse_mixture(study, manifests, "count", lambda run: f"{run.count} smarticles")
-    refuse_repeats(study, manifests, VARIANT, lambda run: named_variant(run.directory)[0])
-    runs = runs_table(rows)
-    variants = variants_of(run_dirs)
-    summary = summarise_variants(runs, variants)
-    aspect = manifests[0].aspect_ratio
-    reference = {stage: reference_at(read_reference(), aspect, stage) for stage in ("phi_0", "phi_f")}
-    origin = Origin(study=study, manifests=manifests, missing=missing, note=note, command=command)
-    footer = _footer(origin, runs, baseline=variants[0])
-    title = f"Study {study}: packing at l/w = {aspect:g}"
-    files = origin.write(
-        output,
-        footer,
-        tables={"runs": runs, "summary": summary},
-        text=("summary.md", _markdown(title, summary, reference)),
-        draw=lambda: sensitivity_figure.draw(
-            output / "sensitivity", runs=runs, summary=summary, reference=reference, footer=footer
-        ),
-    )
-    return SensitivityReport(
-        baseline=variants[0],
-        runs=runs,
-        summary=summary,
-        missing=missing,
-        footer=footer,
-        files=files,
-    )
+
+    text_name = "summary.md"
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def measure(self, run: RunManifest) -> MeasuredRun:
+        """φ and crossings before and after shaking."""
+        return MeasuredRun(manifest=run, rows=[sensitivity_row(run)])
+
+    def refuse(self, found: Collected) -> None:
+        """Other aspect ratios, other numbers of smarticles, a variant and seed twice."""
+        found.refuse_mixture("l/w", lambda run: f"{run.manifest.aspect_ratio:g}")
+        found.refuse_other_counts()
+        found.refuse_repeats(VARIANT, lambda run: str(run.row[VARIANT]))
+
+    def tabulate(self, found: Collected) -> Tables:
+        """Runs, and means over seeds with changes, also of variants without a finished run."""
+        runs = runs_table(found)
+        return {"runs": runs, "summary": summarise_variants(runs, variants_of(found.given))}
+
+    def reference_of(self, tables: Tables) -> Reference:
+        """Gravish's packing fractions."""
+        return GRAVISH
+
+    def statements(self, analysis: Analysis[Never]) -> tuple[str, ...]:
+        """Which runs, how φ is taken, and what changes are against."""
+        runs = analysis.tables["runs"]
+        counts = runs.groupby(VARIANT, sort=False).size()
+        return (
+            f"l/w = {runs[ASPECT].iloc[0]:g}, {analysis.found.manifests[0].count} smarticles, "
+            f"{told_seeds(runs, counts, VARIANT)}; shaken for {told_shaken(runs)}.",
+            f"φ by {DEFINITION}; {WHEN}. {told_bars(counts, VARIANT)}.",
+            f"Changes are against the baseline {_baseline(analysis)}, their errors 95 % by Welch: where a choice "
+            "changes nothing at all, one change in twenty is still beyond its error.",
+        )
+
+    def text(self, analysis: Analysis[Never]) -> Sequence[str]:
+        """Means and changes of every variant."""
+        known = [f"{stage} = {value:.4f}" for stage, value in _gravish(analysis).items() if math.isfinite(value)]
+        told = f"Gravish et al. 2012 at this l/w: {', '.join(known)}." if known else "Gravish has no point at this l/w."
+        header = ["variant", "seeds", "φ_0", "change %", "φ_f", "change %", "⟨N⟩ after", "change %"]
+        cells = _cells(analysis.tables["summary"], lambda change: f"**{change}**")
+        return [
+            f"# Study {self.name}: packing at l/w = {analysis.found.manifests[0].aspect_ratio:g}",
+            "",
+            told,
+            "Changes are against the first row; those beyond their error are bold.",
+            "",
+            *table_lines(header, [list(map(str, row)) for row in cells]),
+        ]
+
+    def draw(self, output: Path, analysis: Analysis[Never], footer: Sequence[str]) -> Sequence[Path]:
+        """φ before and after shaking, one row per variant."""
+        return figures.draw(
+            output / "sensitivity",
+            runs=analysis.tables["runs"],
+            summary=analysis.tables["summary"],
+            reference=_gravish(analysis),
+            footer=footer,
+        )
+
+    def table(self, analysis: Analysis[Never]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
+        """Means and changes of every variant."""
+        header = ["variant", "seeds"]
+        for name in COMPARED:
+            header += [name, "change %"]
+        return header, _cells(analysis.tables["summary"], lambda change: f"{change} *")
+
+    def told(self, analysis: Analysis[Never]) -> Sequence[str]:
+        """What changes are against, and which are marked."""
+        return [f"Changes are against {_baseline(analysis)}; * beyond the error at 95 %."]
 
 
-def summarise_variants(runs: pd.DataFrame, variants: Sequence[str]) -> pd.DataFrame:
-    """One row per variant: means over seeds, and changes against the first variant.
+def _baseline(analysis: Analysis[Never]) -> str:
+    """The variant that the others are compared with."""
+    return str(analysis.tables["summary"][VARIANT].iloc[0])
 
-    Args:
-        runs: Table of runs, see `SensitivityReport.runs`.
-        variants: In the order wanted; one without runs has NaN.
 
-    Returns:
-        The table; `… 95 % [-]` are half-widths, `… change [%]` and its half-width `… change 95 %
-        [%]` are relative to the baseline's mean, `… clear` says whether the change is beyond it.
-    """
-    groups = {variant: runs[runs[VARIANT] == variant] for variant in variants}
+def _gravish(analysis: Analysis[Never]) -> dict[str, float]:
+    """Gravish's values at the aspect ratio of the runs, by stage; NaN without one [-]."""
+    aspect = analysis.found.manifests[0].aspect_ratio
+    return {stage: reference_at(read_reference(), aspect, stage) for stage in ("phi_0", "phi_f")}
+
+
+def _cells(summary: pd.DataFrame, mark: Callable[[str], str]) -> list[list[object]]:
+    """Rows for a person to read; changes beyond their error are marked."""
     rows = []
-    for variant, group in groups.items():
-        row: dict[str, object] = {VARIANT: variant, **seeds_of(group)}
+    for row in summary.to_dict("records"):
+        cells: list[object] = [row[VARIANT], row[SEEDS]]
         for name, quantity in COMPARED.items():
-            column = f"{quantity} [-]"
-            mean, baseline = mean_over_seeds(group[column]), mean_over_seeds(groups[variants[0]][column])
-            row[column] = mean.value
-            row[marked(column, "95 %")] = mean.half_width
-            change = None if variant == variants[0] else relative_difference(mean, baseline)
-            row[f"{name} change [%]"] = change.value if change else math.nan
-            row[f"{name} change 95 % [%]"] = change.half_width if change else math.nan
-            row[f"{name} clear"] = bool(change and change.clear)
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _row(run: RunManifest) -> dict[str, object]:
-    return {VARIANT: variant_of(run), **measured_row(run, [DEFINITION])}
-
-
-def _footer(origin: Origin, runs: pd.DataFrame, *, baseline: str) -> tuple[str, ...]:
-    counts = runs.groupby(VARIANT, sort=False).size()
-    return origin.footer(
-        f"l/w = {runs[ASPECT].iloc[0]:g}, {origin.manifests[0].count} smarticles, "
-        f"{told_seeds(runs, counts, VARIANT)}; shaken for {told_shaken(runs)}.",
-        f"φ by {DEFINITION}; {WHEN}. {told_bars(counts, VARIANT)}.",
-        f"Changes are against the baseline {baseline}, their errors 95 % by Welch: where a choice changes nothing "
-        "at all, one change in twenty is still beyond its error.",
-    )
-
-
-def _markdown(title: str, summary: pd.DataFrame, reference: Mapping[str, float]) -> list[str]:
-    known = [f"{stage} = {value:.4f}" for stage, value in reference.items() if math.isfinite(value)]
-    parts = [f"# {title}", ""]
-    parts += [f"Gravish et al. 2012 at this l/w: {', '.join(known)}." if known else "Gravish has no point at this l/w."]
-    parts += ["Changes are against the first row; those beyond their error are bold.", ""]
-    header = ["variant", "seeds", "φ_0", "change %", "φ_f", "change %", "⟨N⟩ after", "change %"]
-    rows = []
-    for _, row in summary.iterrows():
-        cells = [str(row[VARIANT]), str(row[SEEDS])]
-        for name, quantity in COMPARED.items():
-            cells.append(told_value(row[f"{quantity} [-]"], row[f"{quantity} 95 % [-]"], name))
-            change = told_change(row[f"{name} change [%]"], row[f"{name} change 95 % [%]"])
-            cells.append(f"**{change}**" if row[f"{name} clear"] else change)
+            form = ".4f" if name.startswith("phi") else ".2f"
+            cells.append(told_number(row[f"{quantity} [-]"], form, row[f"{quantity} 95 % [-]"]))
+            change = told_number(row[f"{name} change [%]"], "+.1f", row[f"{name} change 95 % [%]"])
+            cells.append(mark(change) if row[f"{name} clear"] else change)
         rows.append(cells)
-    return [*parts, *table_lines(header, rows)]
-
-
-def told_value(value: float, half_width: float, name: str) -> str:
-    """A mean with its half-width, as far as there are any; `name` is a key of `COMPARED`."""
-    return told_number(value, ".4f" if name.startswith("phi") else ".2f", half_width)
-
-
-def told_change(change: float, half_width: float) -> str:
-    """A change with its half-width, both in per cent, as far as there are any."""
-    return told_number(change, "+.1f", half_width)
+    return rows

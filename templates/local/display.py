@@ -11,7 +11,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from templates.local.local import Display, Outcome, Progress, Snapshot
+from templates.local.runner import Display, Outcome, Snapshot, Standing
 from templates.sweep.folder import Entry
 
 _MARKS = {"done": "[green]✔[/]", "kept": "[dim]=[/]", "failed": "[red]✘[/]", "interrupted": "■"}
@@ -26,14 +26,14 @@ def duration(seconds: float | None) -> str:
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
-def _simulated(run: Progress) -> str:
+def _simulated(run: Standing) -> str:
     if run.time_s is None:
         return "starting"
     end = f" of {run.end_s:.2f}" if run.end_s is not None else ""
     return f"{run.time_s:.2f}{end} s"
 
 
-def _phi(run: Progress) -> str:
+def _phi(run: Standing) -> str:
     return "" if run.phi is None else f"φ {run.phi:.3f}"
 
 

@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from dem.errors import InputError
-from templates.sweep.explain import Models, explain
-from templates.sweep.texts import nearest, read_text
+from dem.errors import InputError, nearest
+from templates.sweep.files import read_text
+from templates.sweep.refusal import Models, explain
 
 SHIPPED = Path(__file__).parent / "clusters"
 
@@ -123,7 +123,7 @@ class Cluster(_Model):
     @model_validator(mode="after")
     def _check(self) -> Cluster:
         if self.default_partition not in self.partitions:
-            advice = nearest(self.default_partition, self.partitions)
+            advice = nearest(self.default_partition, sorted(self.partitions))
             msg = f"default_partition: there is no {self.default_partition!r}; {advice}"
             raise ValueError(msg)
         return self
@@ -136,7 +136,8 @@ class Cluster(_Model):
         """
         wanted = name or self.default_partition
         if wanted not in self.partitions:
-            msg = f"--partition {wanted}: cluster {self.name} has no such partition; {nearest(wanted, self.partitions)}"
+            advice = nearest(wanted, sorted(self.partitions))
+            msg = f"--partition {wanted}: cluster {self.name} has no such partition; {advice}"
             raise InputError(msg)
         return wanted, self.partitions[wanted]
 
@@ -159,7 +160,7 @@ def cluster_file(reference: str) -> Path:
         return Path(reference)
     if reference not in shipped_clusters():
         msg = (
-            f"--cluster {reference}: is not known; {nearest(reference, shipped_clusters())} "
+            f"--cluster {reference}: is not known; {nearest(reference, sorted(shipped_clusters()))} "
             "or give a file of your own, FILE.toml"
         )
         raise InputError(msg)

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import jinja2
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from templates.slurm.cluster import Cluster, format_time
 from templates.slurm.request import Request
-from templates.sweep.texts import nearest
 
 TEMPLATES = Path(__file__).parent / "jobs"
 SCRIPT, RUN_LIST = "array.sh", "runs.txt"
@@ -105,6 +104,6 @@ def render_script(
     except (jinja2.TemplateError, TypeError, ValueError) as error:
         text = " ".join(str(error).split())
         unknown = re.match(r"'([^']+)' is undefined", text)
-        advice = nearest(unknown[1], values) if unknown else "correct it"
+        advice = nearest(unknown[1], sorted(values)) if unknown else "correct it"
         msg = f"{cluster.template or TEMPLATES / template}: {text}; {advice}"
         raise InputError(msg) from error

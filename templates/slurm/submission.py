@@ -17,12 +17,12 @@ from typing import Any
 
 from dem.errors import InputError
 from dem.record.files import write_json, write_text
-from templates.slurm import slurm
+from templates.slurm import queue
 from templates.slurm.cluster import Cluster
 from templates.slurm.request import Request
 from templates.slurm.script import RUN_LIST, SCRIPT, job_name, render_script
+from templates.sweep.files import read_json
 from templates.sweep.folder import Entry, Folder, RunStatus
-from templates.sweep.texts import read_json
 
 JOBS, JOB = "jobs", "job.json"
 
@@ -186,7 +186,7 @@ def submit(folder: Folder, draft: Draft) -> Submission:
         RunError: Slurm refused it.
     """
     # The name was stored before: a job whose number is lost here is still found in the queue by its name.
-    number = slurm.submit(draft.submission.script, folder.path)
+    number = queue.submit(draft.submission.script, folder.path)
     submitted = replace(draft.submission, job_id=number)
     _store(folder, submitted)
     return submitted
@@ -205,7 +205,7 @@ def _store(folder: Folder, submission: Submission) -> None:
     write_json(folder.path / JOBS / submission.number / JOB, content)
 
 
-def tasks_of_runs(found: Sequence[Submission]) -> dict[str, slurm.Task]:
+def tasks_of_runs(found: Sequence[Submission]) -> dict[str, queue.Task]:
     """What the queue says about each run: of its newest task that waits or computes, else of its newest.
 
     Raises:
@@ -214,12 +214,12 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, slurm.Task]:
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}
-    tasks = slurm.ask_queue(list(by_name))
+    tasks = queue.ask_queue(list(by_name))
     tasks.sort(key=lambda task: (task.state != "ended", order[task.job_name], task.job_id))
     return {run: task for task in tasks for run in by_name[task.job_name].of_task(task.index)}
 
 
-def merged(status: RunStatus, task: slurm.Task | None) -> RunStatus:
+def merged(status: RunStatus, task: queue.Task | None) -> RunStatus:
     """State of a run from its directory and from the queue together.
 
     What the directory says about an end counts: `done` and `failed` stay.
@@ -237,7 +237,7 @@ def merged(status: RunStatus, task: slurm.Task | None) -> RunStatus:
     return replace(status, job=task.label, state="queued", cause=cause)
 
 
-def to_submit(folder: Folder, tasks: Mapping[str, slurm.Task]) -> list[Entry]:
+def to_submit(folder: Folder, tasks: Mapping[str, queue.Task]) -> list[Entry]:
     """Runs without a result that no task of the queue is going to compute."""
     busy = {run for run, task in tasks.items() if task.state != "ended"}
     return [entry for entry in folder.entries if entry.name not in busy and not folder.is_done(entry)]
@@ -252,7 +252,7 @@ def refuse_queued(folder: Folder) -> None:
     found = submissions(folder.path)
     try:
         tasks = tasks_of_runs(found)
-    except slurm.QueueError as error:
+    except queue.QueueError as error:
         jobs = ", ".join(str(one.job_id or one.job_name) for one in found)
         msg = (
             f"{folder.path}: was submitted to Slurm (jobs {jobs}), and {error}; resume where the queue can be asked, "
@@ -268,7 +268,7 @@ def refuse_queued(folder: Folder) -> None:
         raise InputError(msg)
 
 
-def plain(tasks: Mapping[str, slurm.Task]) -> dict[str, Any]:
+def plain(tasks: Mapping[str, queue.Task]) -> dict[str, Any]:
     """How many tasks are in each of Slurm's states, for JSON."""
     unique = {task.label: task.slurm_state for task in tasks.values()}
     return {state: list(unique.values()).count(state) for state in sorted(set(unique.values()))}

@@ -12,7 +12,7 @@ from dem.errors import InputError
 from dem.scene.reading import parse_scene, scene_hash
 from dem.scene.scene import Scene
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
-from templates.sweep.sweep import SEED, Sweep
+from templates.sweep.sweep_file import SEED, Sweep
 
 MAX_POINTS = 10_000
 """Runs of one sweep, unless the user asks for more: a slip in a grid makes millions."""

@@ -23,9 +23,9 @@ from dem.record.files import write_json, write_text
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from templates.sweep.expand import Point
+from templates.sweep.files import read_json
 from templates.sweep.render import Value
-from templates.sweep.sweep import SEED, Sweep
-from templates.sweep.texts import read_json
+from templates.sweep.sweep_file import SEED, Sweep
 
 FORMAT = 1
 MANIFEST = "sweep.json"

@@ -18,9 +18,8 @@ from jinja2 import nodes
 from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.yaml_text import StrictLoader, parse_yaml
-from templates.sweep.texts import nearest
 
 Value = Any
 """What a variable may hold: None, bool, int, float, str, and lists and mappings of these."""
@@ -82,7 +81,7 @@ def _refuse(error: Exception, where: str, values: Mapping[str, Value]) -> NoRetu
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
-        advice = nearest(name[1], values) if name else f"defined: {', '.join(sorted(values))}"
+        advice = nearest(name[1], sorted(values)) if name else f"defined: {', '.join(sorted(values))}"
         msg = f"{where}: {text}; {advice}"
     else:
         msg = f"{where}: {text or type(error).__name__}; correct it"

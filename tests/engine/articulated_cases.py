@@ -16,31 +16,22 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
-from dem.plan.steps import time_step
+from dem.engine.yade.kind import hinge_law, motor_law
 from dem.scene.scene import Scene
-from dem.setting.container import Cylinder
 from smarticles.verification.bench import bodies, drive
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
-def build(scene: Scene, *, gravity: float | None = None, dt: float | None = None, radius: float = 0.5) -> YadeEngine:
-    """A wide container, so that nothing but the floor is near."""
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=Cylinder(radius=radius, height=scene.cylinder.height, facets=16),
-        law=contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
-        time_step=dt or time_step(scene),
-        shaken=False,
-        hinges=(hinge_law(scene), motor_law(scene)),
-    )
+def build(scene: Scene, *, dt: float | None = None, radius: float = 0.5, **instead: Any) -> YadeEngine:
+    """An engine for smarticles that are articulated."""
+    hinges = (hinge_law(scene), motor_law(scene))
+    return cases.build(scene, dt=dt, radius=radius, facets=16, hinges=hinges, **instead)
 
 
 def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, YadeEngine]:
     """One smarticle, welded, without gravity, far from everything."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, gravity=0.0)
     cases.add(engine, (0, 0, 0.05), TILTED)
     cases.push(engine, 0, velocity=velocity, spin=spin)
@@ -182,7 +173,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
 
     The same steps lead up to the change, so that a pile left alone is the answer.
     """
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene, radius=scene.container.radius_m)
     rng = np.random.default_rng(scene.seed)
     layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}
@@ -240,9 +231,8 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     engine.motors.articulate()
     for _ in drive(engine, scene, 0.25, lambda _: [angle, angle]):
         pass
-    path = Path(folder) / "saved.yade"
     saved = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
-    engine.load(path, engine.save(path))
+    engine.load(engine.save(Path(folder)), Path(folder))
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.motors.actuate(np.full((1, 2), angle), scene.fidelity.control_interval_s)
     return {"saved": saved, "loaded": loaded, "looked": engine.motors._hinges.torques(), "state": engine.state().angles}

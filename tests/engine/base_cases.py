@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from cases import add, advance_watched, build, load, pour
+from cases import add, advance_watched, build, pour
 from fixture_cases import damped
 
 from dem.engine.yade.engine import YadeEngine
@@ -14,6 +14,7 @@ from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 
 def last_shake(scene: Scene) -> tuple[float, float]:
@@ -36,7 +37,7 @@ def without_wall(engine: YadeEngine, scene: Scene) -> set[int]:
 
 def floor_motion(data: dict[str, Any], *, periods: float, refine: int, rest: int) -> dict[str, Any]:
     """Position of the floor at every step, once the wall has shaken with it and is gone."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True, dt=time_step(scene) / refine)
     wall = without_wall(engine, scene)
     amplitude, frequency = last_shake(scene)
@@ -62,7 +63,7 @@ def floor_motion(data: dict[str, Any], *, periods: float, refine: int, rest: int
 
 def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
     """A smarticle that lies flat on the floor and moves with it: force on the floor and work at every step."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     engine.account._works = True
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
@@ -100,7 +101,7 @@ def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
 
 def shaken_pile(data: dict[str, Any], *, count: int, samples: int, every: int) -> dict[str, Any]:
     """A pile on the floor alone, thrown about: the momentum balance against the contact force of every step."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
@@ -132,14 +133,14 @@ def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
         {"type": "remove-container", "speed_m_per_s": 0.05, "duration_s": 0.06},
         {"type": "shake", "duration_s": 0.1},
     ]
-    scene = load(data | {"count": 1, "phases": phases})
+    scene = scene_of(data | {"count": 1, "phases": phases})
     engine = build(scene, shaken=True)
     add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
-    lifting = scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
+    lifting = scene.phases[1].begin(scene, 1)
     while wait := lifting.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     try:
-        scene.phases[2].scene.phases[2].scene.phases[2].scene.phases[2].scene.phases[2].begin(scene, 2).proceed(engine)
+        scene.phases[2].begin(scene, 2).proceed(engine)
     except RunError as error:
         return str(error)
     return "nothing"

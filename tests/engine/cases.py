@@ -19,34 +19,28 @@ from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
 from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
-from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from smarticles.verification.bench import add, advance_watched, body_rotations, push
-from smarticles.verification.hard.hand import load
+from smarticles.verification.bench import add, advance_watched, body_rotations, push, scene_of
 from smarticles.verification.known.floor import resting
 
 
 def build(
-    scene: Scene,
-    *,
-    law: ContactLaw | None = None,
-    gravity: float | None = None,
-    dt: float | None = None,
-    radius: float | None = None,
-    shaken: bool = False,
+    scene: Scene, *, dt: float | None = None, radius: float | None = None, facets: int = 64, **instead: Any
 ) -> YadeEngine:
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=64),
-        law=law or contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2 if gravity is None else gravity,
-        time_step=dt or time_step(scene),
-        shaken=shaken,
-    )
+    """An engine of a scene, welded and at rest, or of what `instead` says."""
+    made = {
+        "particle": scene.particle,
+        "cylinder": Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=facets),
+        "law": contact_law_of(scene),
+        "gravity": scene.gravity_m_per_s2,
+        "time_step": dt or time_step(scene),
+        "shaken": False,
+    }
+    return YadeEngine(**(made | instead))
 
 
 def version() -> str:
@@ -55,7 +49,7 @@ def version() -> str:
 
 def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[str, Any]:
     """Tensors and sphere positions in the engine against the particle's, at random poses and after some steps."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, gravity=0.0, radius=1.0)
     rng = np.random.default_rng(seed)
     rotations = tuple(Rotation.random(random_state=rng) for _ in range(count))
@@ -87,9 +81,34 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     }
 
 
+class Stuck:
+    """YADE as it is when it has stopped: asked for a step it makes none."""
+
+    def __init__(self, omega: Any) -> None:
+        self.iter, self.time, self.dt = omega.iter, omega.time, omega.dt
+
+    def step(self) -> None:
+        pass
+
+
+def stopping(data: dict[str, Any]) -> dict[str, Any]:
+    """What is said when YADE stops, and steps after advances by none."""
+    engine = build(scene_of(data))
+    engine.advance(7)
+    for none in (0, -3):
+        engine.advance(none)
+    steps = engine.steps
+    engine._omega = Stuck(engine._omega)
+    try:
+        engine.advance(5)
+    except RunError as error:
+        return {"steps": steps, "text": str(error)}
+    return {"steps": steps, "text": ""}
+
+
 def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle lying flat on a floor without friction is pushed along it."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = resting(scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
     engine.advance(round(duration / engine.time_step))
     return {"v": engine.state().velocities[0, 1]}
@@ -112,7 +131,7 @@ def pour(
 
 
 def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict[str, Any]:
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     pour(engine, scene, count)
     engine.advance(round(settle / engine.time_step))
@@ -140,7 +159,7 @@ def _wall(engine: YadeEngine) -> float:
 
 def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0) -> dict[str, Any]:
     """Position and velocity of an empty container at every step."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     phase = next(p for p in scene.phases if p.type == "shake")
     amplitude = phase.amplitude(scene.gravity_m_per_s2)
@@ -173,7 +192,7 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
 
 def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) -> dict[str, Any]:
     """The momentum balance against the contact force of every step, in a pile that is thrown about."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, shaken=True)
     pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
@@ -198,7 +217,7 @@ def stack(
     data: dict[str, Any], *, layers: int, settle: float, watch: float, times_stable: float | None
 ) -> dict[str, Any]:
     """Smarticles lying flat on each other, let go from a slight height; largest speed after they settled."""
-    scene = load(data)
+    scene = scene_of(data)
     dt = None
     if times_stable is not None:
         dt = times_stable * stable_time_step(scene.particle, contact_law_of(scene))
@@ -222,7 +241,7 @@ def stack(
 def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     """A whole run; errors come back as text."""
     try:
-        run_scene(load(data), Path(out), command="test", progress=False)
+        run_scene(scene_of(data), Path(out), command="test", progress=False)
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
@@ -230,7 +249,7 @@ def run(data: dict[str, Any], out: str) -> dict[str, Any]:
 
 def still(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
     """Smarticles that lie flat on the floor, each by itself, turned by random angles; forces summed by hand."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, radius=0.2)
     rng = np.random.default_rng(6)
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
-from cases import add, load
+from cases import add
 from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
@@ -15,19 +13,20 @@ from dem.engine.yade.engine import YadeEngine
 from dem.phases.arrange import chain_of
 from dem.physics.strings import StringLaw
 from dem.plan.steps import time_step
-from dem.run import run
+from dem.run.build import build_engine
 from dem.scene.scene import Scene
+from smarticles.verification.bench import scene_of
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 
 
 def build(scene: Scene) -> YadeEngine:
-    return run.build_engine(scene, time_step(scene))
+    return build_engine(scene, time_step(scene))
 
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, YadeEngine]:
     """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     add(engine, (0, -scene.particle.boxes.vertices[0, 1], 0), rotation)
     engine.motors.articulate()
@@ -38,7 +37,7 @@ def hold(engine: YadeEngine, scene: Scene, seconds: float) -> None:
     """Let motors hold their commands for a time; one look per step, as the phases do."""
     interval = scene.fidelity.control_interval_s
     for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.deciding.commands, interval)
+        engine.motors.actuate(engine.motors.readings.commands, interval)
         engine.advance(1)
 
 
@@ -76,10 +75,10 @@ def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any
     stiffness, hinges = scene.motor.stiffness_N_m_per_rad, engine._assembly.hinges
     energies, interval = [], scene.fidelity.control_interval_s
     for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.deciding.commands, interval)
+        engine.motors.actuate(engine.motors.readings.commands, interval)
         engine.advance(1)
         # Velocities are half a step behind the angles: with those at the step's beginning the springs are as much late.
-        twisted = engine.motors.deciding.commands - hinges.angles()
+        twisted = engine.motors.readings.commands - hinges.angles()
         energies.append(engine.state().kinetic_energy + 0.5 * stiffness * (twisted**2).sum() + hinges.elastic_energy())
     state = engine.state()
     return {
@@ -93,10 +92,10 @@ def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any
 
 def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
     """A chain strained by the phase itself: how far it has left the plane, and its angles."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
-    scene.phases[0].scene.phases[0].scene.phases[0].begin(scene, 0).proceed(engine)
-    stage = scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
+    scene.phases[0].begin(scene, 0).proceed(engine)
+    stage = scene.phases[1].begin(scene, 1)
     first = chain_of(scene).length
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
@@ -112,16 +111,9 @@ def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
     }
 
 
-def series(data: dict[str, Any], out: str) -> dict[str, Any]:
-    """A whole run and its series."""
-    run.run_scene(load(data), Path(out), command="test", progress=False)
-    with h5py.File(Path(out) / "series.h5") as file:
-        return {name: file[name][()] for name in file}
-
-
 def bodies(data: dict[str, Any]) -> dict[str, int]:
     """What exists of plane and strings in a scene."""
-    engine = build(load(data))
+    engine = build(scene_of(data))
     return {
         "felt": len(engine.fixtures.felt),
         "container": len(engine.fixtures.container),

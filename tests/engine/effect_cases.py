@@ -28,7 +28,7 @@ OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
 
 def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     """Run a scene; what it was declared to be made of, and what was found at every sample and on the disk."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     declared = Adds.together(decision.adds for decision in decide(scene))
     found: dict[str, set[Any]] = defaultdict(set)
     record = Recorder.record
@@ -85,7 +85,7 @@ def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
 
 def calls_per_step(data: dict[str, Any], *, steps: int, moving: bool = False) -> dict[str, float]:
     """Functions of Python that are entered while time advances, by name, per step; with smarticles present."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build_engine(scene, time_step(scene))
     cases.add(engine, (0, 0, 0.05))
     if moving:
@@ -110,7 +110,7 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
     """Smarticles that roll about on the floor, clear of the wall, with the wall and without it."""
     states = []
     for remove in (False, True):
-        scene = cases.load(data)
+        scene = cases.scene_of(data)
         engine = build_engine(scene, time_step(scene))
         cases.pour(engine, scene, scene.count, radius=0.7 * scene.container.radius_m)
         engine.advance(200)
@@ -135,12 +135,12 @@ def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str
 
 def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     """The energy account of a pile right before and right after the simulation is saved and loaded."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)
     engine.advance(2500)
-    before, path = engine.account.elastic(), Path(out) / "engine.yade"
-    engine.load(path, engine.save(path))
+    before, folder = engine.account.elastic(), Path(out)
+    engine.load(engine.save(folder), folder)
     after = engine.account.elastic()
     engine.fixtures.remove_wall()
     return {"before": before, "after": after, "dissipated": engine.account.dissipated}

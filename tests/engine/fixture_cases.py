@@ -6,19 +6,19 @@ import math
 from pathlib import Path
 from typing import Any
 
+import cases
 import numpy as np
-from cases import load, pour
+from cases import pour
 from scipy.spatial.transform import Rotation
 
+from dem.engine.effect import EffectName
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
 from dem.errors import RunError
-from dem.plan.steps import time_step
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from smarticles.verification.bench import FLAT, add, advance_watched
+from smarticles.verification.bench import FLAT, add, advance_watched, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
@@ -27,15 +27,9 @@ def build(scene: Scene, *, radius: float | None = None) -> YadeEngine:
     cylinder = scene.cylinder
     if radius is not None:
         cylinder = type(cylinder)(radius=radius, height=cylinder.height, facets=cylinder.facets)
-    return YadeEngine(
-        particle=scene.particle,
-        cylinder=cylinder,
-        law=contact_law_of(scene),
-        gravity=scene.gravity_m_per_s2,
-        time_step=time_step(scene),
-        shaken=any(phase.type == "shake" for phase in scene.phases),
-        hooks=None if scene.hooks is None else scene.hooks.crosses,
-    )
+    hooks = None if scene.hooks is None else scene.hooks.crosses
+    shaken = any(phase.type == "shake" for phase in scene.phases)
+    return cases.build(scene, cylinder=cylinder, shaken=shaken, hooks=hooks)
 
 
 def damped(engine: YadeEngine, damping: float) -> None:
@@ -72,7 +66,7 @@ def energies(engine: YadeEngine) -> dict[str, float]:
 
 def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     """A U hung over a bar of the upper hook; then the hook is raised with it."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     cross = scene.hooks.crosses[1]
     particle = scene.particle
@@ -107,7 +101,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     Args:
         limit: overlap at which to stop [m].
     """
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     lower, upper = scene.hooks.crosses
     # The middle link stands at the end of two bars, which the barbs lie along.
@@ -117,7 +111,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
     before = engine.overlaps(limit)
     engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), Progress(Path(), 1, show=False)).watchdog
+    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
     while not strain.deep.any() and engine.time < 1:
         engine.advance(20)
         strain = engine.overlaps(limit)
@@ -136,7 +130,7 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
 
 def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, Any]:
     """A bar's end inside the mouth of a U that lies on the floor draws it along by its middle link."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, radius=0.2)
     particle = scene.particle
     cross = scene.hooks.crosses[0]
@@ -176,7 +170,7 @@ def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
 
 def rest(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
     """Forces on everything that is fixed, under a pile at rest in a container with hooks."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     _pour(engine, scene, count, settle)
     damped(engine, 0.3)
@@ -201,7 +195,7 @@ def rest(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
 
 def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
     """A pile at rest whose wall goes away at once: what is there before, right after, and while it spreads."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     _pour(engine, scene, count, settle)
     wall = set(engine.fixtures.container[:-1])
@@ -239,7 +233,7 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
 
 def rub(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle that lies against a flat of a wall, held by a gravity that is turned, while the wall is lifted."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene, radius=0.5)
     particle, half = scene.particle, math.pi / engine.cylinder.facets
     outwards = np.array([math.cos(half), math.sin(half), 0.0])
@@ -272,7 +266,7 @@ def rub(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any
 
 def inventory(data: dict[str, Any]) -> dict[str, Any]:
     """What an engine is made of before anything is poured."""
-    scene = load(data)
+    scene = scene_of(data)
     engine = build(scene)
     names = [type(one).__name__ for one in engine._omega.engines]
     collider, loop = engine._omega.engines[1], engine._omega.engines[2]
@@ -288,19 +282,19 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
-        "columns": set(Sampler(1.0, hooks=scene.hooks is not None).described),
+        "columns": set(Sampler(1.0, {EffectName.HOOKS} if scene.hooks is not None else set()).described),
     }
 
 
 def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """The phase itself, on one smarticle that lies on the floor."""
     phase = {"type": "remove-container", "speed_m_per_s": speed, "duration_s": duration}
-    scene = load(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
+    scene = scene_of(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
     engine = build(scene)
     lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
     add(engine, (0, 0, -lowest))
     bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].scene.phases[1].scene.phases[1].begin(scene, 1)
+    stage = scene.phases[1].begin(scene, 1)
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
     end = engine.fixtures.wall_bottom

@@ -68,7 +68,7 @@ def gait(
         "energy_before": start[2],
         "elastic": engine.motors._hinges.elastic_energy(),
         "work": ((tau[1:] + tau[:-1]) / 2 * np.diff(alpha, axis=0)).sum(axis=1).cumsum(),
-        "told": float(engine.motors.work.sum()),
+        "told": float(engine.motors.readings.work.sum()),
         "twisted": float((tau[-1] ** 2).sum() / (2 * scene.motor.stiffness_N_m_per_rad)),
         "angles": engine.state().angles - begun,
     }
@@ -80,7 +80,7 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
     engine.motors.articulate()
     touching, reached, gap = 0, [engine.state().angles[0]], 0.0
     for corner in np.radians(corners):
-        begun = engine.motors.deciding.commands[0].copy()
+        begun = engine.motors.readings.commands[0].copy()
         duration = max(np.abs(corner - begun).max() / speed, 1e-3)
         for _ in drive(engine, scene, duration, lambda t, a=begun, b=corner, d=duration: a + (b - a) * min(t / d, 1)):
             touching += own_contacts(engine)
@@ -103,7 +103,7 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
             kinetic_energy(engine),
             engine.motors.gaps().max(),
             *engine.state().angles[0],
-            *engine.motors.deciding.commands[0],
+            *engine.motors.readings.commands[0],
         )
         for _ in drive(engine, scene, duration, lambda _: [to, to])
     ]
@@ -116,14 +116,14 @@ def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
         "angles": table[:, 2:4],
         "commands": table[:, 4:],
         "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
-        "halted": engine.motors.deciding.halted,
+        "halted": engine.motors.readings.halted,
         "interval": scene.fidelity.control_interval_s,
     }
 
 
 def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
     """An articulated smarticle hits the floor; its energy from the impact on."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     engine = build(scene)
     cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
     cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
@@ -138,7 +138,7 @@ def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) ->
             break
         height, twist = (
             float(engine.state().positions[0, 2]),
-            engine.motors.deciding.commands - engine.motors._hinges.angles(),
+            engine.motors.readings.commands - engine.motors._hinges.angles(),
         )
         springs = engine.motors._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
         energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
@@ -152,7 +152,7 @@ def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) ->
 
 def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
     """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     law, particle = contact_law_of(scene), scene.particle
     dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
     interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
@@ -187,15 +187,15 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
 
     def follow(duration: float, targets: Targets) -> None:
         for _ in drive(engine, scene, duration, targets):
-            commands.append(engine.motors.deciding.commands[0])
+            commands.append(engine.motors.readings.commands[0])
             torques.append(engine.motors._hinges.torques()[0])
-            halted.append(engine.motors.deciding.halted[0])
+            halted.append(engine.motors.readings.halted[0])
 
     follow(0.02, lambda t: begun - 5 * t)
     marks = [len(commands)]
     if freed:
         hold(engine, range(3), still=False)
-    goal = begun - 0.1 if freed else engine.motors.deciding.commands[0] + back
+    goal = begun - 0.1 if freed else engine.motors.readings.commands[0] + back
     follow(0.1, lambda _: goal)
     return {
         "begun": begun,
@@ -233,7 +233,7 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
     return {
         "torques": np.array(torques),
         "angles": engine.state().angles[0] - begun[0],
-        "command": engine.motors.deciding.commands[0] - begun[0],
+        "command": engine.motors.readings.commands[0] - begun[0],
         "gap": engine.motors.gaps().max(),
         "limit": scene.torque_limit,
     }
@@ -241,20 +241,20 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
 
 def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
     """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
-    scene = cases.load(data)
+    scene = cases.scene_of(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
     engine = upright(scene, gravity=0.0, height=height)
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
-        motors = engine.motors
+        told = engine.motors.readings
         rows.append(
             (
                 time,
-                *motors.commands[0],
+                *told.commands[0],
                 *engine.motors._hinges.torques()[0],
-                *motors.halted[0],
+                *told.halted[0],
                 engine.motors.gaps().max(),
             )
         )

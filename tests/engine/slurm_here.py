@@ -62,7 +62,7 @@ class SlurmHere:
     environment: dict[str, str]
 
     def call(self, *command: str) -> str:
-        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, f"{command}: {done.stderr}{done.stdout}"
         return done.stdout
 
@@ -126,7 +126,7 @@ def _daemon(command: list[str], here: SlurmHere) -> Iterator[None]:
         finally:
             process.terminate()
             try:
-                process.wait(20)
+                process.wait(60)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
@@ -146,7 +146,7 @@ def _is_idle(here: SlurmHere) -> bool:
     return asked.stdout.strip() == "idle"
 
 
-def _wait_for(condition, what: str, here: SlurmHere, timeout_s: float = 60.0) -> None:  # type: ignore[no-untyped-def]
+def _wait_for(condition, what: str, here: SlurmHere, timeout_s: float = 300.0) -> None:  # type: ignore[no-untyped-def]
     deadline = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > deadline:

@@ -6,9 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cases
 import chain_cases
 import numpy as np
 import pytest
+from run_files import series
+from scenes import CHAIN, changed
 
 pytestmark = pytest.mark.engine
 
@@ -18,41 +21,32 @@ STIFFNESS, LIMIT = 0.1, 0.05  # N m/rad, N m
 
 def chain(**changes: Any) -> dict[str, Any]:
     """Plain data of a chain of robots; keys are those of the scene, `motor` and others are merged."""
-    data: dict[str, Any] = {
-        "schema_version": 1,
-        "seed": 3,
-        "count": 2,
-        "smarticle": {
-            "middle_length_m": 0.0467,
-            "aspect_ratio": 1.0,
-            "thickness_normal_m": 0.021,
-            "thickness_in_plane_m": 0.0095,
-            "density_kg_per_m3": 1250,
+    data = changed(
+        CHAIN,
+        {
+            "count": 2,
+            "plane.width_m": 0.0895,
+            "contact.friction_smarticle": 0.3,
+            "contact.friction_wall": 0.3,
+            "motor": {
+                "law": "servo",
+                "torque_limit_N_m": LIMIT,
+                "stiffness_N_m_per_rad": STIFFNESS,
+                "damping_N_m_s_per_rad": 1e-3,
+            },
+            "fidelity.pitch": 0.2,
+            "phases.1": {"type": "strain", "speed_m_per_s": 0.05, "distance_m": 0.02, "tied_at": "axis"},
         },
-        "plane": {"width_m": 0.0895},
-        "contact": {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 0.92},
-        "motor": {
-            "law": "servo",
-            "torque_limit_N_m": LIMIT,
-            "stiffness_N_m_per_rad": STIFFNESS,
-            "damping_N_m_s_per_rad": 1e-3,
-        },
-        "fidelity": {
-            "base": "standard",
-            "diameter_m": 0.0095,
-            "pitch": 0.2,
-            "stiffness_N_per_m": 7000,
-            "control_interval_s": 1e-4,
-        },
-        "phases": [
-            {"type": "arrange", "gap_m": 0.00105},
-            {"type": "strain", "speed_m_per_s": 0.05, "distance_m": 0.02, "tied_at": "axis"},
-        ],
-        "recording": {"series_interval_s": 1e-3, "frame_interval_s": 0.1, "checkpoint_interval_s": None},
-    }
+    )
     for key, value in changes.items():
         data[key] = {**data[key], **value} if isinstance(value, dict) else value
     return data
+
+
+def run(simulate: Simulate, data: dict[str, Any], out: Path) -> dict[str, np.ndarray]:
+    """A whole run; its series."""
+    assert simulate(cases.run, data, str(out))["error"] is None
+    return series(out)
 
 
 def test_a_servo_yields_like_a_damped_spring_and_then_holds_at_its_limit(simulate: Simulate) -> None:
@@ -101,7 +95,7 @@ def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path
     # Walls that the chain soon leans on, since it turns and widens a little.
     data = chain(plane={"width_m": 0.0624})
     data["phases"][1]["tied_at"] = "tip"
-    found = simulate(chain_cases.series, data, str(tmp_path / "run"))
+    found = run(simulate, data, tmp_path / "run")
     walls = found["channel_lower_force_N"] + found["channel_upper_force_N"]
     known = np.isfinite(walls[:, 0])
     balance = found["container_force_N"][known, :2] - walls[known, :2]
@@ -122,9 +116,9 @@ def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path
 def test_strings_and_servos_go_on_from_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
     data = chain()
     data["phases"][1]["distance_m"] = 0.01
-    whole = simulate(chain_cases.series, data, str(tmp_path / "whole"))
+    whole = run(simulate, data, tmp_path / "whole")
     data["recording"]["checkpoint_interval_s"] = 0.05
-    loaded = simulate(chain_cases.series, data, str(tmp_path / "loaded"))
+    loaded = run(simulate, data, tmp_path / "loaded")
     forces = [found["string_pulled_force_N"][5:, 0] for found in (whole, loaded)]
     # Contacts are added up in another order after a checkpoint, and no more than that.
     assert forces[0].max() > 0.1

@@ -119,10 +119,10 @@ def test_the_scenes_of_this_proof_differ_in_what_they_are_made_of(simulate: Simu
     [
         (data(SHAKE), True, {}),
         (data(recording={"energy": True}), False, {}),
-        (data(SHAKE, recording={"energy": True}), True, {"Fixtures.power": 1}),
+        (data(SHAKE, recording={"energy": True}), True, {"YadeFixtures.power": 1}),
         (data(HOLD), False, {}),
         (data(recording={"sphere_interval_s": 0.04, "checkpoint_interval_s": 0.1}), False, {}),
-        (data(hooks={}), False, {"Fixtures.feel": 1}),
+        (data(hooks={}), False, {"YadeFixtures.feel": 1}),
     ],
 )
 def test_python_is_called_in_every_step_for_hooks_and_for_work_only(
@@ -130,7 +130,7 @@ def test_python_is_called_in_every_step_for_hooks_and_for_work_only(
 ) -> None:
     calls = simulate(effect_cases.calls_per_step, scene, steps=100, moving=moving)
     # One call makes the step, whatever the scene.
-    assert calls == {"Account.step": 1, **expected}
+    assert calls == {"YadeAccount.step": 1, **expected}
 
 
 # -- (b) an effect of no strength changes nothing ------------------------------------------------------------------

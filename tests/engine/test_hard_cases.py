@@ -1,4 +1,4 @@
-"""Hard cases end right, or in an error that says why; never in nonsense. The cases are in `smarticles.verification.hard.cases`."""
+"""Hard cases end right, or in an error that says why; never in nonsense."""
 
 from __future__ import annotations
 

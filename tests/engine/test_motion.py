@@ -21,7 +21,7 @@ def test_mass_and_inertia_are_the_boxes_in_every_pose(
 ) -> None:
     data = scene_data({"smarticle.aspect_ratio": 0.6, **changes})
     found = simulate(cases.poses, data, count=12, seed=3, steps=40)
-    boxes = cases.load(data).smarticle.boxes
+    boxes = cases.scene_of(data).smarticle.boxes
     assert found["masses"] == pytest.approx(np.full(12, boxes.mass), rel=1e-14)
     # What was asked for is what is there, before any step.
     assert found["start"] == pytest.approx(found["asked"], abs=1e-14)

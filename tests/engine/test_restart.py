@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import TIMEOUT_S, complete, differing, finish, frame_times, results, start
+from processes import TIMEOUT_S, complete, differing, finish, frame_times, gate, results, start
 
 INTERVAL_S = 0.04  # between checkpoints
 FRAME_S = 0.02
@@ -141,12 +141,9 @@ def halfway(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Path]
     folder = tmp_path_factory.mktemp("halfway")
     scene = write_scene(folder / "scene.yaml", 4)
     complete(scene, folder / "whole")
-    process = start(scene, folder / "killed")
-    deadline = time.monotonic() + TIMEOUT_S
-    while not (folder / "killed" / "checkpoint.previous.zip").exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.kill()
-    finish(process)
+    # At its sixth checkpoint, when the fifth has made room already.
+    status, said = finish(start(scene, folder / "killed", gate("checkpoint.previous.zip", 5, "SIGKILL")))
+    assert status == -signal.SIGKILL, said
     return scene, folder / "whole", folder / "killed"
 
 
@@ -214,13 +211,7 @@ def test_a_run_asked_to_stop_ends_with_status_75_at_its_next_checkpoint(
 ) -> None:
     scene, whole, killed = halfway
     out = copy_of(killed, tmp_path / "out")
-    begun = len(frame_times(out))
-    process = start(scene, out)
-    deadline = time.monotonic() + TIMEOUT_S
-    while len(frame_times(out)) < begun + 3 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGUSR1)
-    status, said = finish(process)
+    status, said = finish(start(scene, out, gate("frames.pvd", 3, "SIGUSR1")))
     assert status == 75
     assert "stopped as requested at the checkpoint of t = " in said
     assert not (out / "done.json").exists()

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import re
 import signal
-import time
 from pathlib import Path
 
 import pytest
-from processes import TIMEOUT_S, complete, differing, finish, results, start
+from processes import complete, differing, finish, gate, results, start
 
 HEAD = """\
 schema_version: 1
@@ -69,28 +68,9 @@ PASSIVE = ("deposit", "relax")
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]  # skipped where there is no YADE
 
 
-def age(path: Path) -> int:
-    # A checkpoint is out of the way for a moment while the next one takes its place.
-    try:
-        return path.stat().st_mtime_ns
-    except FileNotFoundError:
-        return 0
-
-
 def kill_in(scene: Path, out: Path, phase: int) -> None:
-    """Run on, and kill after the first checkpoint that is taken in a phase."""
-    process = start(scene, out)
-    newest, log = out / "checkpoint.zip", out / "log.txt"
-    deadline = time.monotonic() + TIMEOUT_S
-    begun: int | None = None
-    while process.poll() is None and time.monotonic() < deadline:
-        if begun is None and log.exists() and f"phase {phase} " in log.read_text():
-            begun = age(newest)
-        if begun is not None and age(newest) > begun:
-            break
-        time.sleep(0.002)
-    process.kill()
-    status, said = finish(process)
+    """Run on, and kill when a second checkpoint is taken in a phase."""
+    status, said = finish(start(scene, out, gate("/checkpoint.zip", 2, "SIGKILL", after=f"phase {phase} ")))
     assert status == -signal.SIGKILL, said
 
 

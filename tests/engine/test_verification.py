@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from postprocess.statistics.convergence import observed_order
-from smarticles.verification.answer import Case, Check, Ladder
-from smarticles.verification.catalogue import CASES, LADDERS
+from smarticles.verification.case import Case, Ladder
+from smarticles.verification.check import Answer
 from smarticles.verification.known import floor, hinge, impact
+from smarticles.verification.known.cases import CASES, LADDERS
 from smarticles.verification.report import BAND
 
 pytestmark = pytest.mark.engine
@@ -19,15 +20,15 @@ pytestmark = pytest.mark.engine
 Simulate = Callable[..., Any]
 
 
-def told(checks: list[Check]) -> list[Check]:
+def told(checks: list[Answer]) -> list[Answer]:
     """The checks that fail; all of them have been made."""
     assert checks
-    return [check for check in checks if not check.ok]
+    return [check for check in checks if not check.good]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_known_answer(simulate: Simulate, case: Case) -> None:
-    assert told(simulate(case.measure)) == []
+    assert told(simulate(case.run)) == []
 
 
 # The second and the last step of each ladder, a factor of four apart, and fewer places of the onset within a step.
@@ -54,7 +55,7 @@ def test_order_is_the_schemes(simulate: Simulate, ladder: Ladder) -> None:
 
 @pytest.mark.parametrize("asked", [0.2, 0.9])
 @pytest.mark.parametrize("bars", [impact.bar_rebound, impact.bars_rebound])
-def test_rebound_of_bars(simulate: Simulate, bars: Callable[..., list[Check]], asked: float) -> None:
+def test_rebound_of_bars(simulate: Simulate, bars: Callable[..., list[Answer]], asked: float) -> None:
     assert told(simulate(bars, asked)) == []
 
 

@@ -63,7 +63,7 @@ def test_splitting_and_welding_in_flight_change_nothing(
         late = np.linalg.norm(SPIN) * done["dt"] * np.linalg.norm(SPIN) * done["size"]
         assert now["sphere_velocities"] == pytest.approx(before["sphere_velocities"], abs=late)
     assert abs(done["loss"]) < ROUNDING * before["e"]
-    boxes = cases.load(data(changes)).smarticle.boxes
+    boxes = cases.scene_of(data(changes)).smarticle.boxes
     assert done["moments"] == pytest.approx(np.sort(boxes.inertia), rel=1e-12)
 
 
@@ -90,7 +90,7 @@ def test_welding_takes_the_energy_of_relative_motion_and_nothing_else(
     assert done["loss"] == pytest.approx(done["relative"], abs=2e-7 * before["e"])
     # The inertia of the boxes at these angles, but for hinges that are open by the gap.
     assert np.degrees(after["angles"][0]) == pytest.approx([40, 70], abs=0.5)
-    lever = cases.load(data(changes)).smarticle.boxes.lengths.min() / 2
+    lever = cases.scene_of(data(changes)).smarticle.boxes.lengths.min() / 2
     assert done["tensor"] == pytest.approx(done["exact"], rel=4 * done["gap"] / lever + 1e-12)
     assert done["mass"] == pytest.approx(done["exact_mass"], rel=1e-12)
     # Spheres have the velocities of one body, for the contact laws of the next step; they had those of three.
@@ -192,7 +192,7 @@ def test_a_scene_with_all_kinds_of_actuation_runs_through(
     assert halted.min() >= 0
     assert halted.max() <= 1
     # Draft's softer pin, in a pile: 1 % of a diameter.
-    assert 0 < rows["joint_gap_m"].max() < 0.01 * cases.load(data).sphere_diameter
+    assert 0 < rows["joint_gap_m"].max() < 0.01 * cases.scene_of(data).sphere_diameter
     # All energy that the links ever have is less than what they fell through.
     assert rows["kinetic_energy_J"][rows["phase"] > 0].max() < 0.5 * rows["gravitational_energy_J"].max()
     # Where motors were halted they fell behind; told to hold the pace of the schedule they do not.

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import damping_ratio, restitution_of
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball
-from smarticles.verification.catalogue import CASES, LADDERS
+from smarticles.verification.check import Answer
+from smarticles.verification.known.cases import CASES, LADDERS
 from smarticles.verification.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
 
@@ -29,12 +29,12 @@ def test_both_orders_are_there_and_steps_fall() -> None:
 
 @pytest.mark.parametrize(("measured", "ok"), [(1.009, True), (1.011, False), (0.0, False), (math.nan, False)])
 def test_a_check_passes_within_its_tolerance_only(measured: float, ok: bool) -> None:
-    check = Check(quantity="q", unit="m", theory=1.0, measured=measured, tolerance=0.01, reason="")
-    assert check.ok is ok
+    check = Answer(quantity="q", unit="m", theory=1.0, measured=measured, tolerance=0.01, reason="")
+    assert check.good is ok
 
 
 def test_an_error_is_relative_to_the_scale_where_theory_is_zero() -> None:
-    check = Check(quantity="q", unit="m", theory=0.0, measured=0.02, tolerance=0.01, reason="", scale=2.0)
+    check = Answer(quantity="q", unit="m", theory=0.0, measured=0.02, tolerance=0.01, reason="", scale=2.0)
     assert check.error == 0.01
 
 

@@ -16,7 +16,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from smarticles.sweeps import make_folder
-from studies.shipped import study_file
+from studies.registry import study_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"dem", "postprocess", "smarticles", "studies", "templates"}

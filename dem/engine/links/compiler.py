@@ -142,7 +142,7 @@ class _Cache(NumbaCache):  # type: ignore[misc]
         try:
             if self._prepare():
                 found = super().load_overload(sig, target_context)
-        except Exception as error:  # noqa: BLE001 - whatever a broken file makes of unpickling
+        except Exception as error:
             self._give_up("read", error)
         if found is None:
             _announce()
@@ -153,7 +153,7 @@ class _Cache(NumbaCache):  # type: ignore[misc]
         try:
             if self._prepare():
                 super().save_overload(sig, data)
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:
             self._give_up("written", error)
 
     def _give_up(self, done: str, error: Exception) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numba
 
-from dem.body.particle import Particle, SphereChain, mean_width
 from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.links.adds import ADDS, ORDER
@@ -16,12 +15,8 @@ from dem.engine.links.stable_step import links_stable_time_step
 from dem.physics.contact import ContactLaw, contact_law
 from dem.physics.motor import MotorLaw
 
-# Spheres that stand for the swept segments where poses are drawn, and in pictures: so close that two of the chains
-# overlap by a thirtieth of a diameter at most before the segments do.
-PITCH = 0.35
 # Wall seconds per link, strand and step in a dense pile, one core, measured on a shaken pile of 270.
 COST_PER_LINK_STEP = 2.0e-7
-ARTICULATED_SHARE = 1.3
 
 
 class LinksKind:
@@ -29,6 +24,7 @@ class LinksKind:
 
     name = "links"
     damps_once_per_look = False
+    actuated_share = 1.3
 
     def version(self) -> str:
         """See the interface: the sources' own hash, and the compiler."""
@@ -49,23 +45,23 @@ class LinksKind:
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         """See the interface."""
         return links_stable_time_step(
-            links_particle(scene),
+            scene.particle,
             contact_law_of(scene),
             articulated=articulated,
             free=articulated and scene.motor.law in ("slip", "servo"),
             strings=scene.pulled_by,
         )
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+    def seconds_per_step(self, scene: Demand) -> float:
         """See the interface."""
         links = (3 if scene.smarticle.boxes.barb_length > 0 else 1) * scene.fidelity.rows**2
-        return COST_PER_LINK_STEP * links * scene.count * (ARTICULATED_SHARE if actuated else 1.0)
+        return COST_PER_LINK_STEP * links * scene.count
 
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
         """See the interface."""
         motor = scene.motor
         return LinksEngine(
-            particle=links_particle(scene),
+            particle=scene.particle,
             cylinder=scene.cylinder,
             law=contact_law_of(scene),
             gravity=scene.gravity_m_per_s2,
@@ -87,17 +83,6 @@ class LinksKind:
         )
 
 
-def links_particle(scene: Demand) -> Particle:
-    """One smarticle: the limit of ever finer chains, one strand of the mean width or several of t2.
-
-    A smooth round bar touches others at its own diameter, which chains of spheres do not: they need a thicker one.
-    """
-    smarticle, fidelity = scene.smarticle, scene.fidelity
-    thick, thin = smarticle.thickness_normal_m, smarticle.thickness_in_plane_m
-    diameter = fidelity.diameter_m or (mean_width(thick, thin) if fidelity.rows == 1 else thin)
-    return Particle(smarticle.boxes, SphereChain(rows=fidelity.rows, diameter=diameter, pitch=PITCH * diameter))
-
-
 def contact_law_of(scene: Demand) -> ContactLaw:
     """The contact law of a scene, of one link with another."""
-    return contact_law(links_particle(scene), scene.contact, scene.fidelity.stiffness_N_per_m)
+    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)

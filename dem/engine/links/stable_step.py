@@ -16,8 +16,8 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from dem.body.particle import Particle
-from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.arrays import PLANE
+from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shape import Shape, shape_of
 from dem.physics.contact import ContactLaw
 
@@ -71,9 +71,7 @@ def _step_of(
     kn, ks, cn, cw = law.normal_stiffness, law.tangential_stiffness, law.normal_damping, law.wall_damping
     cs = law.tangential_damping
     tip = [_motion_of(shape, row, end, z, free) for end in _ends(shape, row)[:1] for z in shape.offsets]
-    every = [
-        _motion_of(shape, row, end, z + shape.radius, free) for end in _ends(shape, row) for z in shape.offsets
-    ]
+    every = [_motion_of(shape, row, end, z + shape.radius, free) for end in _ends(shape, row) for z in shape.offsets]
     tips = sum((push.T @ push for push in tip), np.zeros_like(mass))
     heave = sum((push[2:].T @ push[2:] for push in every), np.zeros_like(mass))
     rub = sum((push[:2].T @ push[:2] for push in every), np.zeros_like(mass))

@@ -6,16 +6,16 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
-from dem.engine.links.contact.bars import push_hooks
 from dem.engine.links.compiler import kernel, part
+from dem.engine.links.contact.bars import push_hooks
 from dem.engine.links.contact.cords import pull
-from dem.engine.links.motion.moving import drift, kick
-from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
 from dem.engine.links.contact.pairs import push_apart
-from dem.engine.links.motion.poses import find_motion, find_spin, pose
 from dem.engine.links.contact.rims import push_rims
-from dem.engine.links.shape import Shape
 from dem.engine.links.contact.walls import push_sideways, push_up
+from dem.engine.links.motion.moving import drift, kick
+from dem.engine.links.motion.poses import find_motion, find_spin, pose
+from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
+from dem.engine.links.shape import Shape
 
 LOST, WORK = 0, 1  # places in `totals`
 NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, PIECE = range(7)  # places in `skins`

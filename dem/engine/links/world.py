@@ -209,7 +209,9 @@ class World:
         links = self.count * self.each
         capacity = max(capacity, 12 * links + 256, len(self.pairs.first))
         if capacity > len(self.pairs.first):
-            grown = (longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near"))
+            grown = (
+                longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near")
+            )
             first, second, slip, used, near = grown
             self.pairs = self.pairs._replace(first=first, second=second, slip=slip, used=used, near=near)
         longest = [self.shape.tip, 2 * self.shape.end, self.shape.tip]
@@ -270,10 +272,11 @@ class World:
         frames[..., 0] = np.einsum("nij,nkj->nki", axes[:, :, :2], along)
         frames[..., 1] = np.einsum("nij,nkj->nki", axes[:, :, :2], across)
         frames[..., 2] = axes[:, None, :, 2]
-        motion = np.repeat(bodies.motion[:, None], 3, axis=1) if not self.articulated else bodies.motion.reshape(n, 3, 6)
+        motion = (
+            np.repeat(bodies.motion[:, None], 3, axis=1) if not self.articulated else bodies.motion.reshape(n, 3, 6)
+        )
         velocities = motion[..., :3] + np.cross(motion[..., 3:], arms)
         return State(boxes, bodies.position[:, None] + arms, frames, velocities, motion[..., 3:].copy())
-
 
     def look(self) -> Contacts:
         """All contacts at this instant; nothing of the simulation is changed.

@@ -17,8 +17,7 @@ from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.yade.clump import Body, clump
-from dem.engine.yade.hinge_law import HingeLaw
-from dem.engine.yade.hinges import Hinges, add_nodes, hinge_nodes
+from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.engine.yade.library import Yade
 from dem.errors import refuse
 

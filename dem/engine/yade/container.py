@@ -1,4 +1,4 @@
-"""The container in YADE: flat facets around, a wall for the floor."""
+"""What holds smarticles in YADE: a container of flat facets on a floor, or the table and walls of motion in a plane."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dem.engine.yade.library import Yade
 from dem.setting.container import Cylinder
+from dem.setting.plane import Channel
 
 Array = NDArray[np.float64]
 
@@ -52,3 +53,21 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
         c, d = yade.vector(*above_end, other[1]), yade.vector(*above_start, other[1])
         yield yade.utils.facet([a, b, c], material=WALL_MATERIAL, fixed=True)
         yield yade.utils.facet([a, c, d], material=WALL_MATERIAL, fixed=True)
+
+
+def add_channel(yade: Yade, channel: Channel) -> list[int]:
+    """Add walls and table, the centrelines' plane at z = 0.
+
+    Only the inertia about z matters there, so that YADE may integrate rotations as those of a sphere.
+
+    Returns:
+        Ids of the lower and the upper wall, where there are walls, and of the table last.
+    """
+    bodies = []
+    if channel.width is not None:
+        # As the container's floor, each pushes to its own side whatever happens.
+        for side in (-1, 1):
+            place = side * channel.width / 2
+            bodies.append(yade.utils.wall(place, axis=1, sense=-side, material=WALL_MATERIAL))
+    bodies.append(yade.utils.wall(channel.table, axis=2, sense=1, material=WALL_MATERIAL))
+    return [int(yade.omega.bodies.append(body)) for body in bodies]

@@ -17,11 +17,10 @@ from dem.body.state import State
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Saved
 from dem.engine.yade.account import YadeAccount
-from dem.engine.yade.adds import ADDS
 from dem.engine.yade.assembly import Assembly
-from dem.engine.yade.construction import add_engines, add_materials
+from dem.engine.yade.construction import ADDS, add_engines, add_materials
 from dem.engine.yade.fixtures import YadeFixtures
-from dem.engine.yade.hinge_law import HingeLaw
+from dem.engine.yade.hinges import HingeLaw
 from dem.engine.yade.library import load_yade
 from dem.engine.yade.motors import YadeMotors
 from dem.engine.yade.overlaps import measure_overlaps

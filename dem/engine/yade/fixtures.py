@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.yade.channel import add_channel
-from dem.engine.yade.container import WALL_MATERIAL, add_container
+from dem.engine.yade.container import WALL_MATERIAL, add_channel, add_container
 from dem.engine.yade.library import Yade
 from dem.errors import RunError
 from dem.setting.container import Cylinder

@@ -8,13 +8,13 @@ vibrations. Both act between nodes that touch nothing else, so that contact know
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.particle import Boxes
-from dem.engine.yade.hinge_law import HingeLaw
 from dem.engine.yade.library import Yade
 
 Array = NDArray[np.float64]
@@ -24,10 +24,46 @@ NODE_RADIUS = 1e-4  # m; cancels in every force, but YADE wants one
 OFFSET = 1e-9  # m; a spring of exactly no length has no direction
 SHAFT_STIFFNESS = 1e-3  # N/m along the axis; the pin holds, this bond is for what the pin does not
 SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torque is stated in
+# YADE's rotations are first order and feed energy into the pin's fast vibrations, which undamped grow within a second
+# after a hard impact. A damper of a spring and a dashpot in a row takes it away and leaves slow motion alone.
+DAMPER_SHARE = 0.25  # of the pin's stiffness
+DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
+DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
 LOOKS_PER_TILT = 10  # looks of the motor control between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
 BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
+
+
+@dataclass(frozen=True, kw_only=True)
+class HingeLaw:
+    """Stiffness of the hinges.
+
+    Args:
+        pin_stiffness: against the links coming apart [N/m].
+        tilt_stiffness: against their leaving the common plane [N m/rad].
+        shaft_stiffness: twist stiffness of the motor's shaft [N m/rad].
+        torque_cap: torque at which a shaft slips [N m]; None: never.
+        shaft_damping: what the motors add to the shafts' stiffness [N m s/rad]; for the stable time step only.
+        damper_time: the dampers' time of relaxation where they are stiff [s]; at least a time step.
+    """
+
+    pin_stiffness: float
+    tilt_stiffness: float
+    shaft_stiffness: float
+    torque_cap: float | None
+    shaft_damping: float = 0.0
+    damper_time: float = DAMPER_TIME
+
+    @property
+    def damper_stiffness(self) -> float:
+        """Of the damper's spring, across the axis [N/m]."""
+        return DAMPER_SHARE * self.pin_stiffness
+
+    @property
+    def damper_viscosity(self) -> float:
+        """Of the damper's dashpot [N s/m]."""
+        return max(DAMPER_VISCOSITY, self.damper_stiffness * self.damper_time)
 
 
 def hinge_nodes(boxes: Boxes, link: int) -> Array:

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 from dem.engine.demand import Demand
 from dem.engine.effect import Adds, EffectName
-from dem.engine.yade.adds import ADDS
-from dem.engine.yade.construction import in_order
+from dem.engine.yade.construction import ADDS, in_order
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.hinge_law import DAMPER_TIME, HingeLaw
+from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
 from dem.physics.contact import ContactLaw, contact_law
@@ -19,8 +18,6 @@ from dem.physics.motor import MotorLaw
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
-# A step of articulated smarticles over one of welded ones: three bodies and four bonds each, and the motors' looks.
-ARTICULATED_SHARE = 1.7
 
 
 class YadeKind:
@@ -28,6 +25,8 @@ class YadeKind:
 
     name = "yade"
     damps_once_per_look = True
+    # Three bodies and four bonds each, and the motors' looks.
+    actuated_share = 1.7
 
     def version(self) -> str:
         """See the interface."""
@@ -55,10 +54,9 @@ class YadeKind:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
         return stable
 
-    def seconds_per_step(self, scene: Demand, *, actuated: bool) -> float:
+    def seconds_per_step(self, scene: Demand) -> float:
         """See the interface."""
-        share = ARTICULATED_SHARE if actuated else 1.0
-        return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count * share
+        return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
 
     def build(self, scene: Demand, time_step: float) -> YadeEngine:
         """See the interface."""

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
 from dem.body.particle import LINKS, Boxes, Particle
-from dem.engine.yade.hinge_law import HingeLaw
+from dem.engine.yade.hinges import HingeLaw
 from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from smarticles.verification.bench import add
-from smarticles.verification.hard.check import Check, above, below, near, says
+from smarticles.verification.bench import add, look, lying, scene_of, watched
+from smarticles.verification.check import Check, above, below, near, says
 from smarticles.verification.hard.extremes import narrowest
-from smarticles.verification.hard.hand import load, look, lying, watched
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, turn
 
@@ -68,7 +67,7 @@ def no_room(out: Path, *, count: int, seconds: float) -> list[Check]:
 def jammed(out: Path, *, count: int, seconds: float) -> list[Check]:
     """l/w = 0.4 in a container of radius 0.7 w, into which a straight one, 0.9 w to either side, does not fit."""
     data = scene(shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4})
-    data["container"] = {"radius_m": 0.7 * load(data).smarticle.middle_length_m}
+    data["container"] = {"radius_m": 0.7 * scene_of(data).smarticle.middle_length_m}
     run = whole(data, out)
     return [*run.sound(), *_jammed(run)]
 

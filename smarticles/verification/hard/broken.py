@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
-import dem.run.run
+from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
@@ -16,9 +15,8 @@ from dem.plan.steps import stable_step
 from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
-from smarticles.verification.bench import add, push
-from smarticles.verification.hard.check import Check, below, says
-from smarticles.verification.hard.hand import fastest, look, lying, watched
+from smarticles.verification.bench import add, fastest, look, lying, push, watched
+from smarticles.verification.check import Check, below, says
 from smarticles.verification.hard.runs import whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
 
@@ -133,8 +131,7 @@ def soft(out: Path, *, stiffness: float) -> list[Check]:
 def wrong_step(out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
     """A time step above the stable one, slipped past the check: the run fails, and names its last checkpoint."""
     data = scene(swing(seconds), count=count, recording={"checkpoint_interval_s": 0.02})
-    with patch.object(dem.run.run, "time_steps", lambda scene: (_too_long(scene, factor),) * len(scene.phases)):
-        run = whole(data, out)
+    run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
     return [
         Check(
             "kind of error",
@@ -155,15 +152,13 @@ def _too_long(described: Scene, factor: float) -> float:
 def late(out: Path) -> list[Check]:
     """A run that goes wrong after a while: the error has the time of the checkpoint before, and the file too."""
     data = scene({"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
-    advance = YadeEngine.advance
 
-    def spoilt(engine: YadeEngine, steps: int) -> None:
-        advance(engine, steps)
+    def spoil(engine: Engine) -> None:
         if engine.time > 0.55:
+            assert isinstance(engine, YadeEngine)  # hands are YADE's
             push(engine, 2, velocity=(0, 0, 100))
 
-    with patch.object(YadeEngine, "advance", spoilt):
-        run = whole(data, out)
+    run = whole(data, out, spoil=spoil)
     text = (out / FAILED).read_text(encoding="utf-8") if (out / FAILED).exists() else None
     return [
         says(run.text, "1 smarticle(s) (2): a speed above", "(last good checkpoint: t = 0.5000 s)"),

@@ -9,8 +9,8 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.plan.steps import stable_step, time_step
-from smarticles.verification.hard.check import Check, below, near, says
-from smarticles.verification.hard.hand import load
+from smarticles.verification.bench import scene_of
+from smarticles.verification.check import Check, below, near, says
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
 
@@ -75,7 +75,7 @@ def friction(out: Path, *, value: float, count: int) -> list[Check]:
 
 def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], float, float]:
     """The scene with its time step set to a share of the stable one [s], the step [s], and the stable one [s]."""
-    stable = stable_step(load(data))
+    stable = stable_step(scene_of(data))
     return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
 
 
@@ -101,10 +101,10 @@ def step_above(out: Path, *, share: float) -> list[Check]:
 
 def narrowest(data: dict[str, Any], margin: float) -> tuple[dict[str, Any], Check]:
     """The scene in a container by `margin` [1] wider than the least, and the check that a narrower one is refused."""
-    reach = load(data).particle.reach
+    reach = scene_of(data).particle.reach
     said = None
     try:
-        load({**data, "container": {"radius_m": 0.999 * reach}})
+        scene_of({**data, "container": {"radius_m": 0.999 * reach}})
     except InputError as error:
         said = str(error)
     return {**data, "container": {"radius_m": reach * (1 + margin)}}, says(said, f"use at least {reach:.4g} m")

@@ -27,7 +27,7 @@ from dem.errors import RunError
 from dem.plan.steps import stable_step
 from dem.run.run import _git_revision
 from dem.scene.scene import Scene
-from smarticles.verification.hard.hand import load, lying, watched
+from smarticles.verification.bench import lying, scene_of, watched
 from smarticles.verification.hard.scenes import scene, shape_change
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
@@ -72,7 +72,7 @@ class Setting:
         phases = [shape_change(1.5)] if self.articulated else []
         data = scene(*phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
         if self.keys == "at the wall":
-            data["container"] = {"radius_m": 1.05 * load(data).particle.reach}
+            data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
         if self.keys == "on hooks":
             data["hooks"] = {}
         return data
@@ -129,7 +129,7 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
 def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     """Let smarticles go at a factor of the stable step, and look at them; one row of the table."""
     data = setting.data
-    stable = stable_step(load(data))
+    stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
         described, engine, _ = watched(data, scratch, dt=factor * stable)
     engine.add(poses(setting, described, seed))

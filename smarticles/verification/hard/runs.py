@@ -3,31 +3,37 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
-from unittest.mock import patch
+from typing import Any
 
 import h5py
 import numpy as np
 
-import dem.run.build
-import dem.run.run
 from dem.body.state import State
-from dem.engine.yade.engine import YadeEngine
+from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
 from dem.physics.overlaps import Overlaps
+from dem.plan.steps import time_steps
+from dem.record.progress import ProgressWriter
+from dem.run import build, run
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
-from smarticles.verification.hard.check import Check, below, near
+from smarticles.verification.check import Check, below, near
 
 
+@dataclass(kw_only=True)
 class Noting(Watchdog):
-    """The same watchdog, which notes how near smarticles came to its limits."""
+    """The same watchdog, which notes how near smarticles came to its limits.
 
-    nearest: ClassVar[dict[str, float]] = {}
+    Args:
+        nearest: largest share of each limit.
+    """
+
+    nearest: dict[str, float] = field(default_factory=dict)
 
     def _note(self, limit: str, share: float) -> None:
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
@@ -50,6 +56,33 @@ class Noting(Watchdog):
         if np.isfinite(energy - self._ceiling):
             self._note("energy", (energy - self._ceiling) / self.energy)
         super().check_energy(state, energy=energy, **options)
+
+
+@dataclass
+class Timing(Recorder):
+    """The same recorder, which adds up the processor time of the watchdog's looks, and spoils what it looks at.
+
+    Args:
+        spent: processor time of all looks [s].
+        spoil: done to the engine before each record; None: nothing is.
+    """
+
+    spent: float = 0.0
+    spoil: Callable[[Engine], None] | None = None
+
+    def record(self, engine: Engine, phase: int) -> None:
+        """See `Recorder`."""
+        if self.spoil is not None:
+            self.spoil(engine)
+        super().record(engine, phase)
+
+    def watch(self, engine: Engine, state: State | None = None) -> None:
+        """See `Recorder`."""
+        begun = time.process_time()
+        try:
+            super().watch(engine, state)
+        finally:
+            self.spent += time.process_time() - begun
 
 
 @dataclass
@@ -103,7 +136,7 @@ class Watched:
         height = float(self.series["com_height_m"][-1])
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any look [d]", dem.run.build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            below("deepest contact at any look [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
             near(
                 "height of the centre of mass at the end [m]",
                 height,
@@ -115,39 +148,44 @@ class Watched:
         if rest is not None:
             checks.append(below("speed at the end [m/s]", float(self.series["max_speed_m_per_s"][-1]), rest))
         if "gap" in self.nearest:
-            gap = dem.run.build.GAP_LIMIT * self.nearest["gap"]
+            gap = build.GAP_LIMIT * self.nearest["gap"]
             checks.append(below("largest joint gap [d]", gap, 0.02))
         return checks
 
 
-def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
+def whole(
+    data: dict[str, Any],
+    out: Path,
+    *,
+    note: bool = True,
+    steps: Callable[[Scene], Sequence[float]] = time_steps,
+    spoil: Callable[[Engine], None] | None = None,
+) -> Watched:
     """Run a scene into a run directory.
 
     Args:
         data: the scene.
         out: the run directory.
         note: whether to note how near smarticles come to the watchdog's limits, which costs as much as the watchdog.
+        steps: time step of each phase [s]; by hand it is not refused.
+        spoil: done to the engine before each record.
     """
-    scene, spent = None, [0.0]
-    looked = Recorder.watch
+    built: list[tuple[Timing, Noting | None]] = []
 
-    def watch(recorder: Recorder, engine: YadeEngine, state: State | None = None) -> None:
-        begun = time.process_time()
-        try:
-            looked(recorder, engine, state)
-        finally:
-            spent[0] += time.process_time() - begun
+    def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
+        timing = Timing(**vars(build.build_recorder(scene, out, progress)), spoil=spoil)
+        noting = Noting(**vars(timing.watchdog)) if note else None
+        timing.watchdog = noting or timing.watchdog
+        built.append((timing, noting))
+        return timing
 
-    error = None
-    Noting.nearest = {}
+    scene, error = None, None
     begun = time.process_time()
     try:
         scene = parse_scene(data, source="case")
-        with (
-            patch.object(dem.run.build, "Watchdog", Noting if note else Watchdog),
-            patch.object(Recorder, "watch", watch),
-        ):
-            dem.run.run.run_scene(scene, out, command="stability", progress=False)
+        run.run_scene(
+            scene, out, command="stability", progress=False, builders=build.Builders(steps=steps, recorder=recorder)
+        )
     except (InputError, RunError) as caught:
         error = type(caught).__name__, str(caught)
     total = time.process_time() - begun
@@ -155,4 +193,5 @@ def whole(data: dict[str, Any], out: Path, *, note: bool = True) -> Watched:
     if (out / "series.h5").exists():
         with h5py.File(out / "series.h5") as file:
             series = {name: dataset[()] for name, dataset in file.items()}
-    return Watched(scene, error, series, dict(Noting.nearest), spent[0] / total)
+    nearest = {limit: share for _, noting in built if noting for limit, share in noting.nearest.items()}
+    return Watched(scene, error, series, nearest, sum(timing.spent for timing, _ in built) / total)

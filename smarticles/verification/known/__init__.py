@@ -1,1 +1,1 @@
-"""Small simulations whose answer is on paper."""
+"""Cases whose answer is on paper."""

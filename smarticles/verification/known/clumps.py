@@ -15,8 +15,8 @@ from dem.engine.yade.kind import contact_law_of
 from dem.physics.contact import restitution_of, typical_effective_mass
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import Array, G, add, build, push, scene
+from smarticles.verification.check import Answer
 from smarticles.verification.known.theory import falling_on_springs
 
 SPEED = 0.1  # m/s
@@ -138,12 +138,12 @@ def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImp
     )
 
 
-def flat_checks(*, rows: int, pitch: float) -> list[Check]:
+def flat_checks(*, rows: int, pitch: float) -> list[Answer]:
     """A flat impact against springs and dashpots side by side."""
     found = flat_impact(rows=rows, pitch=pitch)
     reason = "contact begins within a step, 1/400 of an undamped one; the sum over n contacts is that of one"
     return [
-        Check(
+        Answer(
             quantity="restitution, root of the energies",
             unit="1",
             theory=found.theory,
@@ -151,7 +151,7 @@ def flat_checks(*, rows: int, pitch: float) -> list[Check]:
             tolerance=0.02,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="time in contact",
             unit="s",
             theory=found.theory_contact,
@@ -159,7 +159,7 @@ def flat_checks(*, rows: int, pitch: float) -> list[Check]:
             tolerance=0.05,
             reason="the last of the contacts ends slowly, as its force comes down to zero",
         ),
-        Check(
+        Answer(
             quantity="depth under its own weight",
             unit="m",
             theory=found.theory_sunk,

@@ -13,7 +13,6 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import (
     BALL_MASS,
     BALL_RADIUS,
@@ -27,6 +26,7 @@ from smarticles.verification.bench import (
     push,
     scene,
 )
+from smarticles.verification.check import Answer
 
 FRICTION = 0.4
 
@@ -43,7 +43,7 @@ def resting(particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> 
 # -- sliding to rolling ------------------------------------------------------------------------------------------------
 
 
-def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Check]:
+def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
     """A round body thrown along the floor: friction slows it and makes it spin until it rolls.
 
     Args:
@@ -71,7 +71,7 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
     line = np.polyfit(time[sliding], slip[sliding], 1)
     late = time > 1.3 * begins
     return [
-        Check(
+        Answer(
             quantity="deceleration while it slides",
             unit="m/s²",
             theory=friction * G,
@@ -79,7 +79,7 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
             tolerance=1e-4,
             reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
         ),
-        Check(
+        Answer(
             quantity="time when rolling begins",
             unit="s",
             theory=begins,
@@ -87,7 +87,7 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
             tolerance=1e-4,
             reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
         ),
-        Check(
+        Answer(
             quantity="speed when it rolls",
             unit="m/s",
             theory=rolling,
@@ -95,7 +95,7 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
             tolerance=1e-4,
             reason="the tangential spring unwinds where sliding ends, and dies away",
         ),
-        Check(
+        Answer(
             quantity="slip when it rolls",
             unit="m/s",
             theory=0.0,
@@ -107,19 +107,19 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
     ]
 
 
-def ball_rolls() -> list[Check]:
+def ball_rolls() -> list[Answer]:
     """A solid ball: 5/7 of its speed."""
     law = ball_law(restitution=0.5, friction=FRICTION)
     return roll(ball(), law, speed=0.3, dt=math.pi * math.sqrt(BALL_MASS / STIFFNESS) / 100)
 
 
-def bar_rolls() -> list[Check]:
+def bar_rolls() -> list[Answer]:
     """A bar of many spheres, with the inertia of its box."""
     one = scene(fidelity="standard", smarticle={"aspect_ratio": 0})
     return roll(one.particle, contact_law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
-def slide(*, aspect_ratio: float, friction: float) -> list[Check]:
+def slide(*, aspect_ratio: float, friction: float) -> list[Answer]:
     """A smarticle lying flat is pushed along the floor, along its axis of symmetry, and stops."""
     speed = 0.3
     one = scene(smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
@@ -135,7 +135,7 @@ def slide(*, aspect_ratio: float, friction: float) -> list[Check]:
     sliding = np.array(times) < 0.8 * stops
     reason = "friction at the height of the floor makes it rock on its stiff contacts; seen every 2 ms"
     return [
-        Check(
+        Answer(
             quantity="deceleration",
             unit="m/s²",
             theory=friction * G,
@@ -143,7 +143,7 @@ def slide(*, aspect_ratio: float, friction: float) -> list[Check]:
             tolerance=5e-3,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="way until it stops",
             unit="m",
             theory=speed**2 / (2 * friction * G),
@@ -151,7 +151,7 @@ def slide(*, aspect_ratio: float, friction: float) -> list[Check]:
             tolerance=5e-3,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="speed after it stopped",
             unit="m/s",
             theory=0.0,
@@ -160,7 +160,7 @@ def slide(*, aspect_ratio: float, friction: float) -> list[Check]:
             reason="it sticks; the tangential springs' vibration dies away",
             scale=speed,
         ),
-        Check(
+        Answer(
             quantity="way across",
             unit="m",
             theory=0.0,
@@ -215,7 +215,7 @@ def two_high(law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 
     return engine
 
 
-def stack_at_rest() -> list[Check]:
+def stack_at_rest() -> list[Answer]:
     """Two balls on each other come to rest: the lower contact bears both, the upper one the upper ball."""
     engine = two_high(ball_law(restitution=0.2), dt=2e-5, sunk=False)
     engine.advance(5000)
@@ -223,7 +223,7 @@ def stack_at_rest() -> list[Check]:
     reason = "what is left of the vibration after 0.1 s, 40 periods of it"
     weight = BALL_MASS * G
     return [
-        Check(
+        Answer(
             quantity="overlap with the floor",
             unit="m",
             theory=2 * weight / STIFFNESS,
@@ -231,7 +231,7 @@ def stack_at_rest() -> list[Check]:
             tolerance=1e-6,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="overlap of the two",
             unit="m",
             theory=weight / STIFFNESS,
@@ -239,7 +239,7 @@ def stack_at_rest() -> list[Check]:
             tolerance=1e-6,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="force on the floor",
             unit="N",
             theory=-2 * weight,

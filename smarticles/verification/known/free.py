@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from dem.engine.yade.kind import contact_law_of
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import Array, G, add, body_rotations, build, push, scene
+from smarticles.verification.check import Answer
 from smarticles.verification.known.theory import free_rotation
 
 START = Rotation.from_rotvec([0.4, 0.2, -0.7])
@@ -41,13 +41,13 @@ def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array,
     return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
 
-def free_fall() -> list[Check]:
+def free_fall() -> list[Answer]:
     """The parabola."""
     dt, time, throw = 5e-5, 0.1, 0.3
     way, velocity, turned = fall(dt, time=time, throw=throw, centred=True)
     reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
     return [
-        Check(
+        Answer(
             quantity="rise after 0.1 s",
             unit="m",
             theory=throw * time - G * time**2 / 2,
@@ -55,7 +55,7 @@ def free_fall() -> list[Check]:
             tolerance=1e-11,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="velocity half a step before",
             unit="m/s",
             theory=throw - G * (time - dt / 2),
@@ -63,7 +63,7 @@ def free_fall() -> list[Check]:
             tolerance=1e-11,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="way across",
             unit="m",
             theory=0.0,
@@ -72,7 +72,7 @@ def free_fall() -> list[Check]:
             reason="nothing acts across",
             scale=abs(throw * time - G * time**2 / 2),
         ),
-        Check(
+        Answer(
             quantity="turn",
             unit="rad",
             theory=0.0,
@@ -120,7 +120,7 @@ def _misfit(found: Rotation, exact: Rotation) -> Array:
     return vectors
 
 
-def torque_free_spin() -> list[Check]:
+def torque_free_spin() -> list[Answer]:
     """A U about no axis in particular: orientation, energy, angular momentum, in the limit of small steps."""
     inertia = scene().smarticle.boxes.inertia
     times, coarse = np.linspace(0.02, 0.2, 10), 2e-5
@@ -139,7 +139,7 @@ def torque_free_spin() -> list[Check]:
     turned = float(np.linalg.norm(SPIN)) * times[-1]
     limit = "what is left of second order after extrapolation from 20 and 10 µs; the step's own error is of first order"
     return [
-        Check(
+        Answer(
             quantity="orientation after 1.4 turns, dt → 0",
             unit="rad",
             theory=0.0,
@@ -148,7 +148,7 @@ def torque_free_spin() -> list[Check]:
             reason=limit,
             scale=turned,
         ),
-        Check(
+        Answer(
             quantity="orientation after 1.4 turns, dt = 20 µs",
             unit="rad",
             theory=0.0,
@@ -157,7 +157,7 @@ def torque_free_spin() -> list[Check]:
             reason="YADE's rotation is of first order: some ω dt of the angle turned",
             scale=turned,
         ),
-        Check(
+        Answer(
             quantity="kinetic energy, dt → 0",
             unit="J",
             theory=energy,
@@ -165,7 +165,7 @@ def torque_free_spin() -> list[Check]:
             tolerance=1e-5,
             reason=limit,
         ),
-        Check(
+        Answer(
             quantity="kinetic energy after 0.2 s, dt = 20 µs",
             unit="J",
             theory=energy,
@@ -174,7 +174,7 @@ def torque_free_spin() -> list[Check]:
             reason="grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a "
             "second",
         ),
-        Check(
+        Answer(
             quantity="angular momentum, change of the vector, dt → 0",
             unit="kg m²/s",
             theory=0.0,
@@ -219,11 +219,11 @@ def _flip_times(steps: Sequence[float]) -> tuple[list[float], float]:
     return found, _between_flips(exact)
 
 
-def flips() -> list[Check]:
+def flips() -> list[Answer]:
     """The middle axis is unstable: the U flips over, again and again."""
     (coarse, fine), exact = _flip_times((2e-5, 1e-5))
     return [
-        Check(
+        Answer(
             quantity="time between two flips, dt → 0",
             unit="s",
             theory=exact,
@@ -231,7 +231,7 @@ def flips() -> list[Check]:
             tolerance=3e-3,
             reason="what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %",
         ),
-        Check(
+        Answer(
             quantity="time between two flips, dt = 20 µs",
             unit="s",
             theory=exact,

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
 from dem.scene.scene import Scene
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import Array, G, add, bodies, build_hinged, drive, hold, scene
+from smarticles.verification.check import Answer
 
 STRONG = 1.0  # N m; a limit that no torque here comes near
 VIBRATION = "the shaft has no damping: what a window over the vibration leaves of it"
@@ -48,7 +48,7 @@ def _barb(one: Scene) -> tuple[float, float, float]:
     return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
 
 
-def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Check]:
+def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
     """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays.
 
     Args:
@@ -70,7 +70,7 @@ def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Check]:
         gaps.append(engine.motors.gaps().max())
     theory = force / hinge_law(one).pin_stiffness
     return [
-        Check(
+        Answer(
             quantity="gap of a hinge, mean",
             unit="m",
             theory=theory,
@@ -78,7 +78,7 @@ def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Check]:
             tolerance=0.01,
             reason="the links' masses swing on the pin for a while, by per cents",
         ),
-        Check(
+        Answer(
             quantity="gap of a hinge, largest",
             unit="m",
             theory=theory,
@@ -89,7 +89,7 @@ def pull(*, aspect_ratio: float, fidelity: str, largest: float) -> list[Check]:
     ]
 
 
-def droop(*, aspect_ratio: float, fidelity: str) -> list[Check]:
+def droop(*, aspect_ratio: float, fidelity: str) -> list[Answer]:
     """Straight barbs under gravity, the middle link held: torques, angles and gaps."""
     one = hinged(aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0))
     engine = upright(one, gravity=G)
@@ -103,7 +103,7 @@ def droop(*, aspect_ratio: float, fidelity: str) -> list[Check]:
     mass, _, lever = _barb(one)
     moment = mass * G * lever
     return [
-        Check(
+        Answer(
             quantity="torque of a motor",
             unit="N m",
             theory=-moment,
@@ -111,7 +111,7 @@ def droop(*, aspect_ratio: float, fidelity: str) -> list[Check]:
             tolerance=0.01,
             reason=VIBRATION,
         ),
-        Check(
+        Answer(
             quantity="sag of a barb",
             unit="rad",
             theory=moment / one.motor.stiffness_N_m_per_rad,
@@ -119,7 +119,7 @@ def droop(*, aspect_ratio: float, fidelity: str) -> list[Check]:
             tolerance=0.01,
             reason=VIBRATION,
         ),
-        Check(
+        Answer(
             quantity="gap of a hinge",
             unit="m",
             theory=mass * G / hinge_law(one).pin_stiffness,
@@ -130,7 +130,7 @@ def droop(*, aspect_ratio: float, fidelity: str) -> list[Check]:
     ]
 
 
-def tilt(*, sweeps: int) -> list[Check]:
+def tilt(*, sweeps: int) -> list[Answer]:
     """Lying in the air, the middle link held, barbs sweep through 105° a number of times; then they hang out of plane.
 
     Bonds add up their moments step by step and turn them with half of the twist: a tilt that were left to them would be
@@ -155,7 +155,7 @@ def tilt(*, sweeps: int) -> list[Check]:
     found = np.average(tilts, axis=0, weights=np.hanning(len(tilts)))
     size = float(np.linalg.norm(expected[0]))
     return [
-        Check(
+        Answer(
             quantity="angle that was reached",
             unit="rad",
             theory=goal,
@@ -163,7 +163,7 @@ def tilt(*, sweeps: int) -> list[Check]:
             tolerance=0.03,
             reason=VIBRATION,
         ),
-        Check(
+        Answer(
             quantity="tilt out of the plane, worst component",
             unit="rad",
             theory=size,
@@ -184,7 +184,7 @@ def crossings(time: Array, value: Array) -> Array:
     return found
 
 
-def pendulum(*, aspect_ratio: float) -> list[Check]:
+def pendulum(*, aspect_ratio: float) -> list[Answer]:
     """Barbs that hang from a held middle link, their motors as good as free, let go at a small angle."""
     one = hinged(aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG)
     engine = upright(one, gravity=G)
@@ -200,7 +200,7 @@ def pendulum(*, aspect_ratio: float) -> list[Check]:
     for barb, sign in ((0, 1), (1, -1)):
         angle = sign * np.array(angles)[:, barb]
         checks += [
-            Check(
+            Answer(
                 quantity=f"period, barb {barb + 1}",
                 unit="s",
                 theory=period,
@@ -208,7 +208,7 @@ def pendulum(*, aspect_ratio: float) -> list[Check]:
                 tolerance=2e-3,
                 reason="the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for",
             ),
-            Check(
+            Answer(
                 quantity=f"amplitude, barb {barb + 1}",
                 unit="rad",
                 theory=amplitude,
@@ -293,7 +293,7 @@ def floating(one: Scene, *, held: bool, dt: float | None = None) -> YadeEngine:
     return engine
 
 
-def shaft_vibration(*, held: bool) -> list[Check]:
+def shaft_vibration(*, held: bool) -> list[Answer]:
     """Frequency √(k/I) of barbs on their shafts, against a held middle link and against a free one."""
     one = hinged(fidelity="standard", torque_limit_N_m=STRONG)
     engine = floating(one, held=held)
@@ -305,7 +305,7 @@ def shaft_vibration(*, held: bool) -> list[Check]:
     time: Array = engine.time_step * np.arange(1, len(turned) + 1, dtype=np.float64)
     frequency, _ = shaft_mode(one, held=held)
     return [
-        Check(
+        Answer(
             quantity="frequency",
             unit="Hz",
             theory=frequency / (2 * math.pi),
@@ -313,7 +313,7 @@ def shaft_vibration(*, held: bool) -> list[Check]:
             tolerance=3e-3,
             reason="the damper beside the pin, which theory leaves out, is a quarter as stiff",
         ),
-        Check(
+        Answer(
             quantity="amplitude",
             unit="rad",
             theory=0.01,

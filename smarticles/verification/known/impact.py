@@ -14,14 +14,12 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.physics.contact import ContactLaw, typical_effective_mass
 from dem.plan.steps import time_step
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import (
     BALL_MASS,
     BALL_RADIUS,
     STIFFNESS,
     UPRIGHT,
     Array,
-    G,
     add,
     ball,
     ball_law,
@@ -29,7 +27,8 @@ from smarticles.verification.bench import (
     push,
     scene,
 )
-from smarticles.verification.known.theory import bounced, dashpot_impact
+from smarticles.verification.check import Answer
+from smarticles.verification.known.theory import dashpot_impact
 
 CONTACT_TIME = math.pi * math.sqrt(BALL_MASS / STIFFNESS)  # s, of an elastic ball on the floor
 RESOLVED = 400  # steps in an elastic contact
@@ -81,12 +80,12 @@ def ball_impact(law: ContactLaw, *, speed: float, slip: float = 0.0, dt: float) 
     return touch(engine, most=10 * RESOLVED)
 
 
-def elastic_rebound() -> list[Check]:
+def elastic_rebound() -> list[Answer]:
     """A ball on an elastic floor."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     found = ball_impact(ball_law(), speed=speed, dt=dt)
     return [
-        Check(
+        Answer(
             quantity="contact time",
             unit="s",
             theory=CONTACT_TIME,
@@ -94,7 +93,7 @@ def elastic_rebound() -> list[Check]:
             tolerance=2 / RESOLVED,
             reason="counted in whole steps",
         ),
-        Check(
+        Answer(
             quantity="largest overlap",
             unit="m",
             theory=speed * math.sqrt(BALL_MASS / STIFFNESS),
@@ -102,7 +101,7 @@ def elastic_rebound() -> list[Check]:
             tolerance=1e-4,
             reason="second order: (ω dt)²/8 and what the onset within a step costs",
         ),
-        Check(
+        Answer(
             quantity="rebound speed",
             unit="m/s",
             theory=speed,
@@ -113,14 +112,14 @@ def elastic_rebound() -> list[Check]:
     ]
 
 
-def damped_rebound(restitution: float) -> list[Check]:
+def damped_rebound(restitution: float) -> list[Answer]:
     """A ball whose dashpot is sized for the restitution asked for."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     law = ball_law(restitution=restitution)
     found = ball_impact(law, speed=speed, dt=dt)
     exact = dashpot_impact(stiffness=STIFFNESS, damping=law.wall_damping, mass=BALL_MASS)
     return [
-        Check(
+        Answer(
             quantity="restitution, against the one asked for",
             unit="1",
             theory=restitution,
@@ -128,7 +127,7 @@ def damped_rebound(restitution: float) -> list[Check]:
             tolerance=0.01,
             reason=f"first order: the dashpot acts at once, but {ONSET}",
         ),
-        Check(
+        Answer(
             quantity="restitution, against the integrated impact",
             unit="1",
             theory=exact.restitution,
@@ -136,7 +135,7 @@ def damped_rebound(restitution: float) -> list[Check]:
             tolerance=0.01,
             reason=f"first order: the dashpot acts at once, but {ONSET}",
         ),
-        Check(
+        Answer(
             quantity="contact time",
             unit="s",
             theory=exact.duration,
@@ -147,7 +146,7 @@ def damped_rebound(restitution: float) -> list[Check]:
     ]
 
 
-def pair_rebound(restitution: float) -> list[Check]:
+def pair_rebound(restitution: float) -> list[Answer]:
     """Two balls meet head on in free space: the reduced mass is half of one."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     engine = build(ball(), ball_law(restitution=restitution), dt=dt)
@@ -158,7 +157,7 @@ def pair_rebound(restitution: float) -> list[Check]:
     engine.advance(4 * RESOLVED)
     after = engine.state().velocities
     return [
-        Check(
+        Answer(
             quantity="restitution",
             unit="1",
             theory=restitution,
@@ -166,7 +165,7 @@ def pair_rebound(restitution: float) -> list[Check]:
             tolerance=0.01,
             reason=f"first order: the dashpot acts at once, but {ONSET}",
         ),
-        Check(
+        Answer(
             quantity="momentum",
             unit="kg m/s",
             theory=-BALL_MASS * speed / 2,
@@ -177,7 +176,7 @@ def pair_rebound(restitution: float) -> list[Check]:
     ]
 
 
-def bar_rebound(restitution: float, *, resized: bool = False) -> list[Check]:
+def bar_rebound(restitution: float, *, resized: bool = False) -> list[Answer]:
     """An upright bar falls on its end: the force passes through the centre of mass, and the law is a scene's.
 
     Args:
@@ -195,7 +194,7 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Check]:
     found = touch(engine, most=10 * RESOLVED)
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.wall_damping, mass=mass)
     return [
-        Check(
+        Answer(
             quantity="restitution",
             unit="1",
             theory=restitution if resized else exact.restitution,
@@ -203,7 +202,7 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Check]:
             tolerance=0.03 if resized else 0.01,
             reason="contact begins and ends within a step, which is some 1/150 of it",
         ),
-        Check(
+        Answer(
             quantity="spin",
             unit="rad/s",
             theory=0.0,
@@ -215,7 +214,7 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Check]:
     ]
 
 
-def bars_rebound(restitution: float) -> list[Check]:
+def bars_rebound(restitution: float) -> list[Answer]:
     """Two upright bars in free space, end to end, with a scene's law."""
     one = scene(smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed = contact_law_of(one), one.smarticle.boxes.mass, 0.5
@@ -228,7 +227,7 @@ def bars_rebound(restitution: float) -> list[Check]:
     after = engine.state().velocities[:, 2]
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.normal_damping, mass=mass / 2)
     return [
-        Check(
+        Answer(
             quantity="restitution",
             unit="1",
             theory=exact.restitution,
@@ -236,7 +235,7 @@ def bars_rebound(restitution: float) -> list[Check]:
             tolerance=0.01,
             reason="contact begins and ends within a step, which is some 1/150 of it",
         ),
-        Check(
+        Answer(
             quantity="momentum left",
             unit="kg m/s",
             theory=0.0,
@@ -251,7 +250,7 @@ def bars_rebound(restitution: float) -> list[Check]:
 # -- clump on its tip --------------------------------------------------------------------------------------------------
 
 
-def tip_impact(restitution: float, turn: Sequence[float]) -> list[Check]:
+def tip_impact(restitution: float, turn: Sequence[float]) -> list[Answer]:
     """A welded smarticle meets a smooth floor with one sphere.
 
     Args:
@@ -280,7 +279,7 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Check]:
     # Seen along the spin of theory; what is across it is wrong altogether.
     along = spin / np.linalg.norm(spin)
     return [
-        Check(
+        Answer(
             quantity="velocity upwards",
             unit="m/s",
             theory=impulse / boxes.mass - speed,
@@ -289,7 +288,7 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Check]:
             reason=reason,
             scale=impulse / boxes.mass,
         ),
-        Check(
+        Answer(
             quantity="spin",
             unit="rad/s",
             theory=float(np.linalg.norm(spin)),
@@ -297,7 +296,7 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Check]:
             tolerance=0.01,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="spin across that of theory",
             unit="rad/s",
             theory=0.0,
@@ -307,100 +306,3 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Check]:
             scale=float(np.linalg.norm(spin)),
         ),
     ]
-
-
-# -- ladders -----------------------------------------------------------------------------------------------------------
-
-# The error varies with where in a step a contact begins and where it ends. Starts are spread over some steps, and
-# stiffness by a tenth so that the one does not fix the other, both evenly (a plastic-number sequence).
-PHASES = 16
-SPREAD = 8e-5  # m
-
-
-def _gap(number: int) -> float:
-    return 1e-4 + SPREAD * (0.754878 * number % 1)
-
-
-def _stiffer(law: ContactLaw, number: int) -> ContactLaw:
-    factor = 1 + 0.1 * (0.569840 * number % 1)
-    return dataclasses.replace(
-        law,
-        normal_stiffness=factor * law.normal_stiffness,
-        tangential_stiffness=factor * law.tangential_stiffness,
-    )
-
-
-def _roots(squares: Array) -> list[float]:
-    found: list[float] = np.sqrt(squares).tolist()
-    return found
-
-
-def bounce_errors(steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Error of the height of a ball after one bounce, root mean square over places of the onset in a step [m].
-
-    Args:
-        steps: [s].
-        restitution: [1].
-        phases: how many such places.
-    """
-    speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
-    for number in range(phases):
-        law, gap = _stiffer(ball_law(restitution=restitution), number), _gap(number)
-        exact = bounced(
-            gap=gap,
-            speed=speed,
-            time=time,
-            stiffness=law.normal_stiffness,
-            damping=law.wall_damping,
-            mass=BALL_MASS,
-            gravity=G,
-        )
-        for k, dt in enumerate(steps):
-            engine = build(ball(), law, dt=dt, gravity=G)
-            add(engine, (0, 0, BALL_RADIUS + gap))
-            push(engine, 0, velocity=(0, 0, -speed + G * dt / 2))
-            engine.advance(round(time / dt))
-            squares[k] += (float(engine.state().positions[0, 2]) - BALL_RADIUS - exact) ** 2
-    return _roots(squares / phases)
-
-
-def _collided(law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
-    """(S, 3) spheres of two smarticles that have collided once [m]."""
-    one = scene()
-    engine = build(one.particle, law, dt=dt)
-    add(engine, (0, 0, 0.1))
-    tilt = [0.5, 0.2, 0.6] if tilted else [0, 0, 0.6]
-    other = Rotation.from_rotvec(tilt)
-    near = other.apply(one.particle.centres)
-    # Above the first one along y, so near that the closest spheres touch after a way of a tenth of a millimetre.
-    apart = near[None] - one.particle.centres[:, None]
-    inside = 4 * one.particle.radius**2 - apart[..., 0] ** 2 - apart[..., 2] ** 2
-    lift = float((np.sqrt(np.maximum(inside, 0.0)) - apart[..., 1])[inside > 0].max())
-    speed = 0.2
-    add(engine, (0, lift + gap, 0.1), other)
-    push(engine, 1, velocity=(0, -speed, 0))
-    engine.advance(round(5.12e-3 / dt))
-    spheres: Array = engine.state().spheres(one.particle).reshape(-1, 3)
-    return spheres
-
-
-def collision_errors(steps: Sequence[float], *, smooth: bool, phases: int = PHASES) -> list[float]:
-    """Error of where two smarticles are after they collided once [m].
-
-    Args:
-        steps: [s].
-        smooth: in one plane, elastic and without friction; otherwise tilted, with the law of the scene.
-        phases: places of the onset in a step.
-    """
-    law = contact_law_of(scene())
-    if smooth:
-        law = dataclasses.replace(law, normal_damping=0.0, wall_damping=0.0, friction=0.0)
-    # No theory: against the same at a step eight times finer than the finest.
-    squares = np.zeros(len(steps))
-    for number in range(phases):
-        one, gap = _stiffer(law, number), _gap(number)
-        reference = _collided(one, min(steps) / 8, gap, tilted=not smooth)
-        for k, dt in enumerate(steps):
-            away = _collided(one, dt, gap, tilted=not smooth) - reference
-            squares[k] += float((away**2).sum(axis=1).mean())
-    return _roots(squares / phases)

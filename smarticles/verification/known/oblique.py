@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from smarticles.verification.answer import Check
 from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball, ball_law
+from smarticles.verification.check import Answer
 from smarticles.verification.known.impact import CONTACT_TIME, ONSET, RESOLVED, ball_impact
 
 FRICTION = 0.4
 
 
-def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Check]:
+def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Answer]:
     """A ball that slides on the floor as long as it touches it: the tangential impulse is μ times the normal one.
 
     Not quite, with a tangential dashpot: YADE holds the tangential spring to Coulomb's limit, and adds the dashpot's
@@ -41,7 +41,7 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
         reason = f"{ONSET}; and the estimate of the excess takes both speeds as constant while the spring is wound up"
         tolerance = 0.01 + 0.05 * excess / coulomb
     normal = BALL_MASS * (float(found.velocity[2]) + speed)
-    over = Check(
+    over = Answer(
         quantity="tangential impulse over μ times the normal one",
         unit="1",
         theory=1 + excess / coulomb,
@@ -53,7 +53,7 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
         return [over]
     return [
         over,
-        Check(
+        Answer(
             quantity="tangential velocity lost",
             unit="m/s",
             theory=impulse / BALL_MASS,
@@ -61,7 +61,7 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
             tolerance=tolerance,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="spin gained",
             unit="rad/s",
             theory=impulse * lever / inertia,
@@ -72,7 +72,7 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
     ]
 
 
-def sticking_impact() -> list[Check]:
+def sticking_impact() -> list[Answer]:
     """A ball that never slides: the tangential spring, tuned to half a vibration per contact, turns the slip around.
 
     The contact point moves on the mass m/(1 + m r²/I) = 2/7 m, so with ks = 2/7 kn both directions vibrate alike; the
@@ -85,7 +85,7 @@ def sticking_impact() -> list[Check]:
     # To both sides of the contact point the mass is felt at the lever, which is shorter than the radius by the overlap.
     reason = "the lever is shorter than the radius by the overlap, 0.7 %, and with it the vibration slower"
     return [
-        Check(
+        Answer(
             quantity="slip after, at the contact",
             unit="m/s",
             theory=-slip,
@@ -93,7 +93,7 @@ def sticking_impact() -> list[Check]:
             tolerance=0.02,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="tangential velocity after",
             unit="m/s",
             theory=slip - 2 * (2 / 7) * slip,
@@ -101,7 +101,7 @@ def sticking_impact() -> list[Check]:
             tolerance=0.02,
             reason=reason,
         ),
-        Check(
+        Answer(
             quantity="spin after",
             unit="rad/s",
             theory=2 * (2 / 7) * BALL_MASS * slip * BALL_RADIUS / inertia,

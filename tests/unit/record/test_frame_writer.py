@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
-from dem.record.frames import FrameWriter, frame_mesh, sphere_mesh
+from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frames import FrameWriter
 
 W, RATIO = 0.0117, 0.7
 BOXES = Boxes(middle_length=W, barb_length=RATIO * W, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)

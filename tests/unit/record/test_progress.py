@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dem.record import progress as module
-from dem.record.progress import Progress
+from dem.record.progress import ProgressWriter
 
 
 class Wall:
@@ -29,7 +29,7 @@ def last_line(text: str) -> str:
 
 
 def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
-    bar = Progress(tmp_path, 270, show=False)
+    bar = ProgressWriter(tmp_path, 270, show=False)
     bar.begin(index=2, phase="shake", start=3.0, now=3.0, end=8.0)
     wall.now += 5
     bar.update(time=4.5, phi=0.123, count=270)
@@ -53,7 +53,7 @@ def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
         data = json.loads((tmp_path / "progress.json").read_text())
         return data["time_s"], data["checkpoint_s"]
 
-    bar = Progress(tmp_path, 2, show=False)
+    bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
     bar.checkpointed(0.1)  # nothing else is known yet
     assert not (tmp_path / "progress.json").exists()
@@ -69,7 +69,7 @@ def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
 
 
 def test_unknown_phi_is_null(tmp_path: Path, wall: Wall) -> None:
-    bar = Progress(tmp_path, 2, show=False)
+    bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
     wall.now += 1
     bar.update(time=0.1, phi=float("nan"), count=1)
@@ -78,7 +78,7 @@ def test_unknown_phi_is_null(tmp_path: Path, wall: Wall) -> None:
 
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
-    bar = Progress(tmp_path, 2, show=False)
+    bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
 
     def told(time: float) -> bool:
@@ -98,7 +98,7 @@ def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall
 def test_line_shows_phase_share_time_phi_and_time_left(
     tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bar = Progress(tmp_path, 10, show=True)
+    bar = ProgressWriter(tmp_path, 10, show=True)
     bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
     wall.now += 30
     bar.update(time=3.0, phi=0.1234, count=10)
@@ -108,7 +108,7 @@ def test_line_shows_phase_share_time_phi_and_time_left(
 
 
 def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
-    bar = Progress(tmp_path, 20, show=True)
+    bar = ProgressWriter(tmp_path, 20, show=True)
     bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
     wall.now += 10
     bar.update(time=0.3, phi=float("nan"), count=10)
@@ -120,7 +120,7 @@ def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.Ca
 def test_end_of_a_phase_leaves_no_negative_time(
     tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str], time: float
 ) -> None:
-    bar = Progress(tmp_path, 10, show=True)
+    bar = ProgressWriter(tmp_path, 10, show=True)
     bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
     wall.now += 30
     bar.update(time=time, phi=0.1, count=10)
@@ -130,7 +130,7 @@ def test_end_of_a_phase_leaves_no_negative_time(
 
 
 def test_quiet_progress_draws_nothing(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
-    bar = Progress(tmp_path, 10, show=False)
+    bar = ProgressWriter(tmp_path, 10, show=False)
     bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
     wall.now += 10
     bar.update(time=0.1, phi=0.1, count=3)
@@ -139,7 +139,7 @@ def test_quiet_progress_draws_nothing(tmp_path: Path, wall: Wall, capsys: pytest
 
 
 def test_full_disk_does_not_stop_the_run_here(tmp_path: Path, wall: Wall) -> None:
-    bar = Progress(tmp_path / "gone", 10, show=False)
+    bar = ProgressWriter(tmp_path / "gone", 10, show=False)
     bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
     wall.now += 10
     bar.update(time=0.1, phi=0.1, count=3)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from dem.record.columns import COLUMNS
-from dem.record.series import SeriesWriter, packing_fraction
+from dem.record.packing import packing_fraction
+from dem.record.series import SeriesWriter
 
 UNITS = {
     "time_s": "s",

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import runpy
 from pathlib import Path
 
 import pytest
+import synthetic
 from command_cases import SCENE, SWEEP, Said, Smarticles, WriteRun
 
 from smarticles.main import main
-
-SYNTHETIC = Path(__file__).parents[1] / "postprocess" / "synthetic.py"
 
 
 @pytest.fixture
@@ -44,10 +42,9 @@ def scene_file(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def write_run() -> WriteRun:
     """Writes a finished run directory without running anything."""
-    module = runpy.run_path(str(SYNTHETIC), run_name="synthetic")
 
     def write(directory: Path, **run: object) -> Path:
-        written: Path = module["write_run"](directory, module["SyntheticRun"](**run))
+        written: Path = synthetic.write_run(directory, synthetic.SyntheticRun(**run))
         return written
 
     return write

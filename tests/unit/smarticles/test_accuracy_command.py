@@ -132,7 +132,7 @@ def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
     base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
-    monkeypatch.setattr("studies.accuracy.figure.draw", lambda *_, **__: [])
+    monkeypatch.setattr("studies.accuracy.figures.draw", lambda *_, **__: [])
     out = tmp_path / "ladder"
     written(base, out, smarticles, "--seeds", "1,2")
     finish(out, write_run)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from command_cases import Smarticles
+from syrupy.assertion import SnapshotAssertion
 
 from dem.errors import InputError, RunError
 from smarticles.main import build_parser, guarded
@@ -60,30 +61,34 @@ def test_version(smarticles: Smarticles) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "wrong", "way_out"),
     [
-        ([], "no command given; known: run, plan, "),
-        (["stduy"], "COMMAND: 'stduy' is not known; did you mean 'study'?"),
-        (["xyzzy"], "COMMAND: 'xyzzy' is not known; known: run, plan, "),
-        (["--colour"], "unknown option --colour; known: "),
-        (["run"], "the following arguments are required: SCENE.yaml, --out"),
-        (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "unknown option --sett; did you mean '--set'?"),
-        (["run", "s.yaml", "--out", "d", "more"], "one argument too many: 'more'"),
-        (["run", "s.yaml", "--ou", "d"], "the following arguments are required: --out"),
-        (["study", "gravitsh", "--out", "d"], "NAME: 'gravitsh' is not known; did you mean 'gravish'?"),
-        (["sweep", "s.yaml", "--submit", "slrum"], "--submit: 'slrum' is not known; did you mean 'slurm'?"),
-        (["resume", "d", "--jobs", "0"], "argument --jobs: must be a whole number from 1: got '0'"),
-        (["resume", "d", "--jobs", "two"], "argument --jobs: must be a whole number from 1: got 'two'"),
-        (["render", "d", "--time", "end"], "argument --time: invalid float value: 'end'"),
+        ([], "command", "known: run, plan, "),
+        (["stduy"], "COMMAND: 'stduy'", "'study'"),
+        (["xyzzy"], "COMMAND: 'xyzzy'", "known: run, plan, "),
+        (["--colour"], "--colour", "known: "),
+        (["run"], "SCENE.yaml, --out", ""),
+        (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "--sett", "'--set'"),
+        (["run", "s.yaml", "--out", "d", "more"], "'more'", ""),
+        (["run", "s.yaml", "--ou", "d"], "--out", ""),
+        (["study", "gravitsh", "--out", "d"], "NAME: 'gravitsh'", "'gravish'"),
+        (["sweep", "s.yaml", "--submit", "slrum"], "--submit: 'slrum'", "'slurm'"),
+        (["resume", "d", "--jobs", "0"], "--jobs", "from 1: got '0'"),
+        (["resume", "d", "--jobs", "two"], "--jobs", "from 1: got 'two'"),
+        (["render", "d", "--time", "end"], "--time", "'end'"),
     ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_bad_usage_is_status_2_and_one_line(words: list[str], message: str, smarticles: Smarticles) -> None:
+def test_bad_usage_is_status_2_and_one_line(
+    words: list[str], wrong: str, way_out: str, smarticles: Smarticles, snapshot: SnapshotAssertion
+) -> None:
     said = smarticles(*words)
-    assert said.status == 2
-    assert said.out == ""
+    assert (said.status, said.out) == (2, "")
     (line,) = said.err.splitlines()
-    assert line.startswith(f"smarticles: error: {message}")
+    assert wrong in line
+    assert way_out in line
     assert line.endswith("--help`")
+    assert line == snapshot
 
 
 class TestGuarded:
@@ -159,7 +164,7 @@ def test_signals_stop_in_an_orderly_way(number: signal.Signals) -> None:
 
     def action() -> int:
         os.kill(os.getpid(), number)
-        threading.Event().wait(10)
+        threading.Event().wait(300)
         return 0
 
     assert guarded(action) == 130

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
 from command_cases import SWEEP, Smarticles
 
-from templates.slurm import slurm
+from templates.slurm import queue as slurm
 from templates.sweep import folder as folder_module
 
 LARGE = ("--cluster", "example-large")
@@ -158,7 +157,7 @@ def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: P
 
 
 def test_status_of_a_thousand_runs(tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Less than 2 s: what it costs is counted in files read, since machines differ; the time has a wide margin."""
+    """Less than 2 s: what it costs is counted in files read, since machines differ."""
     out = tmp_path / "out"
     points = [{"name": f"s{k}", "scene_sha256": "x", "expected_s": 1.0, "values": {"seed": k}} for k in range(1000)]
     (out / "runs").mkdir(parents=True)
@@ -171,9 +170,6 @@ def test_status_of_a_thousand_runs(tmp_path: Path, smarticles: Smarticles, monke
     reads: list[Path] = []
     read = folder_module.read_json
     monkeypatch.setattr(folder_module, "read_json", lambda path: (reads.append(path), read(path))[1])
-    begun = time.monotonic()
     said = smarticles("status", out)
-    spent = time.monotonic() - begun
     assert said.out.splitlines()[-1] == "many: 1000 runs, 500 stopped, 500 done"
     assert len(reads) == 1 + 500 + 3 * 500
-    assert spent < 10

@@ -10,10 +10,10 @@ from command_cases import SWEEP, Smarticles, WriteRun
 
 from dem.errors import InputError
 from dem.record.rundir import claimed
-from studies.shipped import study_file
+from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.folder import create_folder, open_folder
-from templates.sweep.sweep import load_sweep, with_constants
+from templates.sweep.sweep_file import load_sweep, with_constants
 
 
 def finish(directory: Path) -> None:
@@ -329,7 +329,7 @@ def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
     def file_of(name: str, *, quick: bool = False) -> Path:
         return sweep_file
 
-    monkeypatch.setattr("studies.shipped.study_file", file_of)
+    monkeypatch.setattr("studies.registry.study_file", file_of)
     sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
     out = sweep_file.parent / "out"
     said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)

@@ -59,7 +59,7 @@ def test_answers_that_are_met(child: Any, smarticles: Smarticles, tmp_path: Path
     one = child()
     said = smarticles("verify", "--out", tmp_path / "new")
     assert said.status == 0, said.err
-    assert one.command[1:3] == ["-m", "smarticles.verification"]
+    assert one.command[1:4] == ["-m", "smarticles.verification", "known"]
     header = said.out.strip().splitlines()[0].split()
     assert header == ["case", "quantity", "unit", "theory", "measured", "error", "tolerance", "ok"]
     assert "20 contacts" in said.out

@@ -9,7 +9,7 @@ from sweep_cases import SCENE, SWEEP, MakeFolder, WriteSweep
 
 from templates.sweep.expand import expand
 from templates.sweep.folder import Folder, create_folder
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 
 @pytest.fixture

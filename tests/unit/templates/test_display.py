@@ -8,10 +8,10 @@ import pytest
 from rich.console import Console
 
 from templates.local.display import LiveDisplay, PlainDisplay, display_for, duration
-from templates.local.local import Outcome, Progress, Snapshot
+from templates.local.runner import Outcome, Snapshot, Standing
 from templates.sweep.folder import Entry
 
-SHAKEN = Progress(
+SHAKEN = Standing(
     name="lw0.70_seed1",
     wall_s=33.1,
     expected_s=60.0,
@@ -20,7 +20,7 @@ SHAKEN = Progress(
     end_s=5.5,
     phi=0.1234,
 )
-STARTING = Progress(name="lw0.40_seed1", wall_s=1.0, expected_s=80.0)
+STARTING = Standing(name="lw0.40_seed1", wall_s=1.0, expected_s=80.0)
 SNAPSHOT = Snapshot(total=9, ended=3, failed=1, running=(SHAKEN, STARTING), left_s=125.0)
 
 

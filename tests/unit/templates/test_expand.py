@@ -9,7 +9,7 @@ from sweep_cases import SCENE, SWEEP, WriteSweep
 
 from dem.errors import InputError
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep import load_sweep
+from templates.sweep.sweep_file import load_sweep
 
 COUNTS = "l_over_w,n,label\n0.4,494,long\n0.7,270,middle\n1.0,192,short\n"
 

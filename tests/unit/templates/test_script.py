@@ -195,12 +195,12 @@ class ByHand:
         )
 
     def signal_when_ready(self, process: subprocess.Popen[str], *runs: str) -> str:
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 300
         while not all((self.sweep / "runs" / run / "ready").exists() for run in runs):
             assert time.monotonic() < deadline
             time.sleep(0.02)
         process.send_signal(signal.SIGUSR1)
-        return process.communicate(timeout=60)[0]
+        return process.communicate(timeout=300)[0]
 
     def calls(self, run: str) -> list[str]:
         file = self.sweep / "runs" / run / "calls"
@@ -214,7 +214,7 @@ def by_hand(tmp_path: Path) -> ByHand:
 
 def test_a_task_runs_its_lines_of_the_list_side_by_side(by_hand: ByHand) -> None:
     process = by_hand.start("done1", "done2", "done3", "done4", "done5", task=1, per_task=2)
-    assert process.communicate(timeout=60)[0] == "task 1: 2 finished, 0 failed, 0 not finished\n"
+    assert process.communicate(timeout=300)[0] == "task 1: 2 finished, 0 failed, 0 not finished\n"
     assert process.returncode == 0
     ran = [run for run in ("done1", "done2", "done3", "done4", "done5") if by_hand.calls(run)]
     assert ran == ["done3", "done4"]
@@ -223,9 +223,9 @@ def test_a_task_runs_its_lines_of_the_list_side_by_side(by_hand: ByHand) -> None
 
 
 def test_what_ended_is_passed_over_and_what_began_is_resumed(by_hand: ByHand) -> None:
-    by_hand.start("done1", "fail2", "bad3").communicate(timeout=60)
+    by_hand.start("done1", "fail2", "bad3").communicate(timeout=300)
     (by_hand.sweep / "runs/done1/calls").unlink()
-    said = by_hand.start("done1", "fail2", "bad3").communicate(timeout=60)[0]
+    said = by_hand.start("done1", "fail2", "bad3").communicate(timeout=300)[0]
     assert said == "task 0: 1 finished, 1 failed, 1 not finished\n"
     assert by_hand.calls("done1") == []
     assert len(by_hand.calls("fail2")) == 1
@@ -234,7 +234,7 @@ def test_what_ended_is_passed_over_and_what_began_is_resumed(by_hand: ByHand) ->
 
 def test_a_failure_is_the_tasks_exit_status(by_hand: ByHand) -> None:
     process = by_hand.start("done1", "fail2")
-    process.communicate(timeout=60)
+    process.communicate(timeout=300)
     assert process.returncode == 1
 
 
@@ -269,5 +269,5 @@ def test_requeues_are_bounded(by_hand: ByHand) -> None:
 
 def test_a_signal_after_which_nothing_is_left_does_not_requeue(by_hand: ByHand) -> None:
     process = by_hand.start("fail1", "done2")
-    said = process.communicate(timeout=60)[0]
+    said = process.communicate(timeout=300)[0]
     assert "queued" not in said

@@ -11,10 +11,11 @@ import pytest
 from sweep_cases import MakeFolder
 
 from dem.errors import InputError, RunError
-from templates.slurm import slurm, submission
+from templates.slurm import queue as slurm
+from templates.slurm import submission
 from templates.slurm.cluster import load_cluster
+from templates.slurm.queue import STATES, QueueError, Task, parse_job_id, parse_queue
 from templates.slurm.request import Wishes, plan_request
-from templates.slurm.slurm import STATES, QueueError, Task, parse_job_id, parse_queue
 from templates.slurm.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
 from templates.sweep.folder import Folder, RunStatus
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from dem.engine.links.arrays import LOWER, Array, Bodies, Ground, Hooks, Law
 from dem.engine.links.compiler import part
-from dem.engine.links.shape import Shape
 from dem.engine.links.contact.walls import rub
+from dem.engine.links.shape import Shape
 
 TURNS = 60  # of a search that ends when it has the answer to the last digit, mostly after three
 FINE = 1e-15
@@ -69,7 +69,9 @@ def nearest_to_box(x: float, y: float, z: float, link: Array, half: Array) -> fl
 
 
 @part
-def meet_bar(x: float, y: float, z: float, link: Array, half: Array, radius: float, stiffness: float, out: Array) -> int:
+def meet_bar(
+    x: float, y: float, z: float, link: Array, half: Array, radius: float, stiffness: float, out: Array
+) -> int:
     """Points of contact of a link with a bar, and the springs there, as `dem.engine.links.contact.meeting.meet` has them.
 
     Args:
@@ -151,7 +153,15 @@ def _row(x: float, y: float, z: float, link: Array, half: Array, radius: float, 
 
 @part
 def push_hooks(
-    shape: Shape, law: Law, bodies: Bodies, ground: Ground, hooks: Hooks, hinged: Any, ledger: Any, dt: float, out: Array
+    shape: Shape,
+    law: Law,
+    bodies: Bodies,
+    ground: Ground,
+    hooks: Hooks,
+    hinged: Any,
+    ledger: Any,
+    dt: float,
+    out: Array,
 ) -> float:
     """Add the forces of the hooks.
 

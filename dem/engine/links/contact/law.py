@@ -44,8 +44,7 @@ def resist(
     """
     approach = vx * nx + vy * ny + vz * nz
     normal = load - law.damping * weight * approach
-    if normal < 0.0:
-        normal = 0.0
+    normal = max(normal, 0.0)
     tx, ty, tz = vx - approach * nx, vy - approach * ny, vz - approach * nz
     sx, sy, sz = slip[0], slip[1], slip[2]
     sx, sy, sz = (

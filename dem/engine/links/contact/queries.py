@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from dem.engine.links.arrays import LOWER, WALL, Array, Bodies, Ground, Indices, Pairs
-from dem.engine.links.contact.bars import meet_bar
 from dem.engine.links.compiler import kernel, part
+from dem.engine.links.contact.bars import meet_bar
 from dem.engine.links.contact.meeting import ENERGY, POINTS, meet
 from dem.engine.links.contact.rims import nearest_to_circle
 from dem.engine.links.shape import Shape

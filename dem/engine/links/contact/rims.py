@@ -7,8 +7,8 @@ from typing import Any
 
 from dem.engine.links.arrays import WALL, Array, Bodies, Ground, Law, Rims
 from dem.engine.links.compiler import part
-from dem.engine.links.shape import Shape
 from dem.engine.links.contact.walls import rub
+from dem.engine.links.shape import Shape
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SAMPLES, TURNS = 8, 32  # places along a link that are tried, and narrowings about the best: to 2e-7 of its length

@@ -165,7 +165,25 @@ def push_up(
             if low:
                 depth = radius - (z - floor)
                 press(
-                    shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, 0, FLOOR, depth, x, y, z, 0.0, 0.0, 1.0
+                    shape,
+                    law,
+                    bodies,
+                    ends,
+                    ground,
+                    hinged,
+                    ledger,
+                    dt,
+                    p,
+                    end,
+                    0,
+                    FLOOR,
+                    depth,
+                    x,
+                    y,
+                    z,
+                    0.0,
+                    0.0,
+                    1.0,
                 )
             if squared > least:
                 _wall(shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, x, y, z, lift, lifted)

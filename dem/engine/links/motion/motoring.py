@@ -157,7 +157,8 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
 @part
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
     """Generalised forces of contacts on the angles [N m]: all points move as an angle turns, as the centre of mass
-    does not."""
+    does not.
+    """
     axes, load, row = bodies.axes, bodies.load, bodies.plane[i]
     share = shape.barb_mass / shape.mass
     fx = axes[i, 0, 0] * load[i, 0] + axes[i, 1, 0] * load[i, 1] + axes[i, 2, 0] * load[i, 2]

@@ -24,6 +24,7 @@ from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
 
+
 @kernel
 def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
     """Work out the plane geometry of one smarticle.
@@ -81,7 +82,7 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
 
 @part
 def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
-    """p = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
+    """P = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
     wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
     return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
 

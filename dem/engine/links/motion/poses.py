@@ -9,7 +9,6 @@ from dem.engine.links.compiler import kernel, part
 from dem.engine.links.motion.planar import lay_out, rates, spin_of
 from dem.engine.links.shape import Shape
 
-
 SLIP = 2  # laws of motors from here on leave the angles free
 
 

@@ -1,0 +1,361 @@
+"""What a run directory says about its run: `run.json` with `done.json` or `failed.json`, written and read."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NoReturn
+
+from dem.errors import RunError
+from dem.record.files import cannot_read, write_json
+from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT
+
+_REMEDY = "give the directory of a run made by this version of `smarticles run`"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseRecord:
+    """One phase of a run.
+
+    Attributes:
+        index: Position in the run, as in `Frame.phase`.
+        type: Name of the kind of phase, e.g. "deposit", "relax", "shake".
+        time_step: Of the integration [s]; None where the manifest does not say.
+        start: Simulated time at which it began [s]; None unless the run is done.
+        end: Simulated time at which it ended [s]; None unless the run is done.
+        wall_time: Wall time it took [s]; None unless the run is done.
+        cpu_time: Processor time it took [s]; None unless the run is done and says so.
+    """
+
+    index: int
+    type: str
+    time_step: float | None = None
+    start: float | None = None
+    end: float | None = None
+    wall_time: float | None = None
+    cpu_time: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunManifest:
+    """What made a run and how it ended.
+
+    Attributes:
+        directory: The run directory.
+        name: Name of the scene.
+        scene_sha256: Hash of the resolved scene.
+        seed: Seed of all random numbers.
+        command: Command line of the run.
+        started: Wall-clock start, ISO 8601.
+        versions: Version of each program that took part.
+        threads: Threads the engine ran with.
+        fidelity: Name of the fidelity setting.
+        count: Number of smarticles of the scene.
+        aspect_ratio: Barb length over middle length, l/w [-].
+        middle_length: w [m].
+        barb_length: l [m].
+        thickness_normal: Thickness t1 along the normal of the smarticle's plane [m].
+        thickness_in_plane: Thickness t2 in the smarticle's plane [m].
+        smarticle_mass: Mass of one smarticle [kg].
+        solid_volume: Volume of one smarticle, t1 t2 (w + 2l) [m³].
+        container_radius: [m]; of the widest tier.
+        container_tiers: Cylinders of different radii that stand on each other.
+        planar: Whether all motion is confined to a plane, without a container.
+        channel_width: Distance of the two walls in the plane [m]; None without.
+        sphere_diameter: Diameter of the spheres that stand for a smarticle [m].
+        spheres_per_smarticle: Number of those spheres.
+        time_step: The shortest of its phases [s].
+        phases: The phases in order.
+        status: "done", "failed", "interrupted" or "unfinished".
+        cause: Why the run failed or was interrupted; None otherwise.
+        end_time: Simulated time at which the run ended [s]; None while unfinished.
+        steps: Time steps of a done run; None otherwise.
+        wall_time: Wall time of a done run [s]; None otherwise.
+    """
+
+    directory: Path
+    name: str
+    scene_sha256: str
+    seed: int
+    command: str
+    started: str
+    versions: Mapping[str, str]
+    threads: int
+    fidelity: str
+    count: int
+    aspect_ratio: float
+    middle_length: float
+    barb_length: float
+    thickness_normal: float
+    thickness_in_plane: float
+    smarticle_mass: float
+    solid_volume: float
+    container_radius: float
+    sphere_diameter: float
+    spheres_per_smarticle: int
+    time_step: float
+    phases: tuple[PhaseRecord, ...]
+    status: str
+    container_tiers: int = 1
+    planar: bool = False
+    channel_width: float | None = None
+    cause: str | None = None
+    end_time: float | None = None
+    steps: int | None = None
+    wall_time: float | None = None
+
+    def walled(self, phase: int) -> bool:
+        """Whether the container's wall is there in the phase of an index."""
+        return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
+
+    def fills_cylinder(self, phase: int) -> bool:
+        """Whether the pile fills one cylinder then, so that packing fractions have a meaning."""
+        return self.container_tiers == 1 and self.walled(phase)
+
+
+def manifest_data(run: RunManifest) -> dict[str, Any]:
+    """The content of `run.json`: what made a run; how it ended is in another file."""
+    plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
+    return {
+        "format": MANIFEST_FORMAT,
+        "name": run.name,
+        "scene_sha256": run.scene_sha256,
+        "seed": run.seed,
+        "command": run.command,
+        "started": run.started,
+        "versions": dict(run.versions),
+        "threads": run.threads,
+        "fidelity": run.fidelity,
+        "count": run.count,
+        "aspect_ratio": run.aspect_ratio,
+        "middle_length_m": run.middle_length,
+        "barb_length_m": run.barb_length,
+        "thickness_normal_m": run.thickness_normal,
+        "thickness_in_plane_m": run.thickness_in_plane,
+        "smarticle_mass_kg": run.smarticle_mass,
+        "solid_volume_m3": run.solid_volume,
+        "container_radius_m": run.container_radius,
+        "container_tiers": run.container_tiers,
+        "sphere_diameter_m": run.sphere_diameter,
+        "spheres_per_smarticle": run.spheres_per_smarticle,
+        "time_step_s": run.time_step,
+        "phases": [{"index": phase.index, "type": phase.type, "time_step_s": phase.time_step} for phase in run.phases],
+        **plane,
+    }
+
+
+def write_manifest(run: RunManifest) -> None:
+    """Write `run.json` into the directory of a run.
+
+    Raises:
+        RunError: it cannot be written.
+    """
+    write_json(run.directory / MANIFEST, manifest_data(run))
+
+
+def mark_done(
+    out: Path, *, time: float, steps: int, wall: float, cpu: float, phases: Sequence[Mapping[str, Any]]
+) -> None:
+    """Write `done.json`, the last file of a run.
+
+    Args:
+        out: the run directory.
+        time: simulated time at the end [s].
+        steps: made in all.
+        wall: wall time spent [s].
+        cpu: processor time spent [s].
+        phases: of each `index`, `type`, `start_s`, `end_s`, `wall_s`, `cpu_s`.
+
+    Raises:
+        RunError: it cannot be written.
+    """
+    (out / FAILED).unlink(missing_ok=True)
+    data = {"status": "done", "time_s": time, "steps": steps, "wall_s": wall, "cpu_s": cpu, "phases": list(phases)}
+    write_json(out / DONE, data)
+
+
+def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
+    """Write `failed.json`; silent where the disk is full, since the cause is on the terminal too.
+
+    Args:
+        out: the run directory.
+        status: "failed" or "interrupted".
+        cause: why.
+        time: simulated time that the run came to [s].
+        checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
+    """
+    try:
+        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
+    except RunError:
+        return
+
+
+@dataclass(frozen=True)
+class _Document:
+    """A JSON object with its file, so that every complaint can name both."""
+
+    path: Path
+    data: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> _Document:
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            cannot_read("manifest", path, error, _REMEDY)
+        if not isinstance(data, dict):
+            cannot_read("manifest", path, "it holds no JSON object", _REMEDY)
+        return cls(path, data)
+
+    def _get(self, key: str) -> Any:
+        try:
+            return self.data[key]
+        except KeyError:
+            cannot_read("manifest", self.path, f"key '{key}' is missing", _REMEDY)
+
+    def _refuse(self, key: str, value: object, wanted: str) -> NoReturn:
+        cannot_read("manifest", self.path, f"'{key}' must be {wanted}: got {value!r}", _REMEDY)
+
+    def text(self, key: str) -> str:
+        value = self._get(key)
+        if not isinstance(value, str):
+            self._refuse(key, value, "text")
+        return value
+
+    def integer(self, key: str, *, least: int = 0) -> int:
+        value = self._get(key)
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            self._refuse(key, value, f"a whole number, {least} or more")
+        return value
+
+    def number(self, key: str, *, positive: bool = False) -> float:
+        value = self._get(key)
+        wanted = "a finite number > 0" if positive else "a finite number >= 0"
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self._refuse(key, value, wanted)
+        if not math.isfinite(value) or value < 0 or (positive and value == 0):
+            self._refuse(key, value, wanted)
+        return float(value)
+
+    def phases(self) -> list[_Document]:
+        value = self._get("phases")
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self._refuse("phases", value, "a list of objects")
+        return [_Document(self.path, item) for item in value]
+
+
+def read_run(directory: Path | str) -> RunManifest:
+    """Reads what a run directory says about its run.
+
+    Args:
+        directory: A run directory; the run may be done, failed or still going on.
+
+    Returns:
+        The manifest.
+
+    Raises:
+        InputError: The directory or its manifest is missing, damaged or of another format.
+
+    Source:
+        ARCHITECTURE.md, "The run directory".
+
+    Example:
+        >>> read_run("runs/pile").status
+        'done'
+    """
+    directory = Path(directory)
+    if not directory.is_dir():
+        cannot_read("run directory", directory, "no such directory", _REMEDY)
+    run = _Document.read(directory / MANIFEST)
+    if run.data.get("format") != MANIFEST_FORMAT:
+        found = run.data.get("format")
+        cannot_read("manifest", run.path, f"'format' must be {MANIFEST_FORMAT}: got {found!r}", _REMEDY)
+    versions = run.data.get("versions", {})
+    if not isinstance(versions, dict):
+        cannot_read("manifest", run.path, "'versions' must be an object", _REMEDY)
+    phases = tuple(
+        PhaseRecord(
+            index=phase.integer("index"),
+            type=phase.text("type"),
+            # Runs of before each phase had its own do not say.
+            time_step=phase.number("time_step_s", positive=True) if phase.data.get("time_step_s") else None,
+        )
+        for phase in run.phases()
+    )
+    if [phase.index for phase in phases] != list(range(len(phases))):
+        cannot_read("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", _REMEDY)
+    return RunManifest(
+        directory=directory,
+        name=run.text("name"),
+        scene_sha256=run.text("scene_sha256"),
+        seed=run.integer("seed"),
+        command=run.text("command"),
+        started=run.text("started"),
+        versions=MappingProxyType({str(key): str(value) for key, value in versions.items()}),
+        threads=run.integer("threads"),
+        fidelity=run.text("fidelity"),
+        count=run.integer("count", least=1),
+        aspect_ratio=run.number("aspect_ratio"),
+        middle_length=run.number("middle_length_m", positive=True),
+        barb_length=run.number("barb_length_m"),
+        thickness_normal=run.number("thickness_normal_m", positive=True),
+        thickness_in_plane=run.number("thickness_in_plane_m", positive=True),
+        smarticle_mass=run.number("smarticle_mass_kg", positive=True),
+        solid_volume=run.number("solid_volume_m3", positive=True),
+        container_radius=run.number("container_radius_m", positive=True),
+        # Runs of before there were tiers do not say.
+        container_tiers=run.integer("container_tiers", least=1) if "container_tiers" in run.data else 1,
+        planar=run.data.get("planar") is True,
+        channel_width=run.number("channel_width_m", positive=True) if run.data.get("channel_width_m") else None,
+        sphere_diameter=run.number("sphere_diameter_m", positive=True),
+        spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
+        time_step=run.number("time_step_s", positive=True),
+        **_ending(directory, phases),
+    )
+
+
+def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
+    """The fields that depend on whether and how the run ended."""
+    # done.json first: a resumed run may have left an older failed.json behind.
+    if (directory / DONE).exists():
+        done = _Document.read(directory / DONE)
+        return {
+            "phases": _timed(phases, done),
+            "status": "done",
+            "end_time": done.number("time_s"),
+            "steps": done.integer("steps"),
+            "wall_time": done.number("wall_s"),
+        }
+    if (directory / FAILED).exists():
+        failed = _Document.read(directory / FAILED)
+        return {
+            "phases": phases,
+            "status": failed.text("status"),
+            "cause": failed.text("cause"),
+            "end_time": failed.number("time_s"),
+        }
+    return {"phases": phases, "status": "unfinished"}
+
+
+def _timed(planned: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseRecord, ...]:
+    timed = tuple(
+        PhaseRecord(
+            index=phase.integer("index"),
+            type=phase.text("type"),
+            time_step=planned[k].time_step if k < len(planned) else None,
+            start=phase.number("start_s"),
+            end=phase.number("end_s"),
+            wall_time=phase.number("wall_s"),
+            # Runs of before it was measured do not say.
+            cpu_time=phase.number("cpu_s") if "cpu_s" in phase.data else None,
+        )
+        for k, phase in enumerate(done.phases())
+    )
+    if [(phase.index, phase.type) for phase in timed] != [(phase.index, phase.type) for phase in planned]:
+        cause = f"its phases differ from those of run.json: {[phase.type for phase in timed]}"
+        cannot_read("manifest", done.path, cause, _REMEDY)
+    return timed

@@ -1,0 +1,42 @@
+"""Packing fraction by the second-highest centre of mass, the paper's definition: its one formula."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def second_highest(heights: NDArray[np.float64]) -> float:
+    """Of (N,) heights; NaN of fewer than two.
+
+    Example:
+        >>> second_highest(np.array([0.01, 0.04, 0.02, 0.03]))
+        0.03
+    """
+    return float(np.partition(heights, -2)[-2]) if len(heights) > 1 else math.nan
+
+
+def filled(count: int, *, solid_volume: float, radius: float, height: float) -> float:
+    """N V_s / (pi r² z): what so many smarticles fill of a cylinder [1].
+
+    Args:
+        count: smarticles.
+        solid_volume: of one smarticle [m³].
+        radius: of the container [m].
+        height: of the pile [m].
+    """
+    return float(count * solid_volume / (math.pi * radius**2 * height))
+
+
+def packing_fraction(heights: NDArray[np.float64], *, solid_volume: float, radius: float) -> float:
+    """φ by the second-highest centre of mass; NaN for fewer than two smarticles, and for none above the floor.
+
+    Args:
+        heights: (N,) centres of mass above the floor [m].
+        solid_volume: of one smarticle [m³].
+        radius: of the container [m].
+    """
+    height = second_highest(heights)
+    return filled(len(heights), solid_volume=solid_volume, radius=radius, height=height) if height > 0 else math.nan

@@ -1,0 +1,1 @@
+"""Lines and the space they take: of vertices alone, with no idea of frames and runs."""

@@ -1,0 +1,138 @@
+"""What a measure is, and all that there are.
+
+A measure is one module of this package with one tuple `MEASURES`: its name, what it takes of a frame or of a phase,
+and the columns of that with their units. Tables, `smarticles measure` and its CSV and JSON take them from here, so
+that a new one needs its module, a test, and a line in README.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from dem.record.series import Series
+
+_PACKAGE = __name__.rpartition(".")[0]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One column of a table.
+
+    Attributes:
+        label: What it is called.
+        unit: SI, or "-" for a pure number, "degree", "smarticles".
+
+    Example:
+        >>> Quantity("com height", "m").header
+        'com height [m]'
+    """
+
+    label: str
+    unit: str
+
+    @property
+    def header(self) -> str:
+        """Name of its column."""
+        return f"{self.label} [{self.unit}]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameMeasure:
+    """Something that each frame tells.
+
+    Attributes:
+        name: Of the measure; no other has it.
+        place: Among the columns of a table: those of lower places come first.
+        quantities: Its columns.
+        take: The values of a frame of a run, one per column; NaN where they have no meaning in this frame.
+        told_of: Whether a run has it at all; else its tables have no such columns.
+        definition: Where several measures define one quantity, by what name this one is chosen.
+        costly: Whether it takes tenths of a second per frame or more.
+    """
+
+    name: str
+    place: int
+    quantities: tuple[Quantity, ...]
+    take: Callable[[Frame, RunManifest], Sequence[float]]
+    told_of: Callable[[RunManifest], bool] = lambda _: True
+    definition: str | None = None
+    costly: bool = False
+
+    def columns(self, frame: Frame | None, run: RunManifest) -> dict[str, float]:
+        """Its values by column; NaN without a frame."""
+        values = [float("nan")] * len(self.quantities) if frame is None else self.take(frame, run)
+        return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseMeasure:
+    """Something that a whole phase tells.
+
+    Attributes:
+        name: Of the measure; no other has it.
+        phase: Type of the phases that tell it.
+        quantities: Its columns.
+        take: The values of a phase of an index, one per column.
+        told_of: Whether the series holds enough of a phase of an index; else there are no such columns.
+    """
+
+    name: str
+    phase: str
+    quantities: tuple[Quantity, ...]
+    take: Callable[[RunManifest, Series, int], Sequence[float]]
+    told_of: Callable[[Series, int], bool]
+
+    def columns(self, run: RunManifest, series: Series, phase: int) -> dict[str, float]:
+        """Its values by column; none where the phase is of another type or the series does not hold enough of it."""
+        if run.phases[phase].type != self.phase or not self.told_of(series, phase):
+            return {}
+        values = self.take(run, series, phase)
+        return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
+
+
+def in_space(run: RunManifest) -> bool:
+    """Whether smarticles move in space: in a plane all lie at one height, and each in the plane of all others."""
+    return not run.planar
+
+
+@cache
+def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
+    """All measures of this package, by module."""
+    package = import_module(_PACKAGE)
+    modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
+    measures = tuple(measure for module in modules for measure in getattr(module, "MEASURES", ()))
+    for kind in ("name", "header"):
+        told = [
+            text
+            for measure in measures
+            for text in ([measure.name] if kind == "name" else [quantity.header for quantity in measure.quantities])
+        ]
+        if repeated := {text for text in told if told.count(text) > 1}:
+            msg = f"measures share a {kind}: {', '.join(sorted(repeated))}"
+            raise ValueError(msg)
+    return measures
+
+
+def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
+    """What tables tell of frames, in the order of their columns.
+
+    Args:
+        definitions: Which of the measures that are chosen by a name are wanted, in this order.
+    """
+    known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
+    chosen = {measure.definition: measure for measure in known}
+    return (
+        *(measure for measure in known if measure.definition is None),
+        *(chosen[definition] for definition in definitions),
+    )
+
+
+def phase_measures() -> tuple[PhaseMeasure, ...]:
+    """What tables tell of whole phases."""
+    return tuple(measure for measure in registered() if isinstance(measure, PhaseMeasure))

@@ -1,0 +1,358 @@
+"""The canvas of a picture: container, lights and smarticles, drawn by VTK. The only module that imports PyVista.
+
+The three-dimensional part is drawn at twice its size and scaled down; caption and colour bar are
+set by matplotlib around it. No display is needed: VTK falls back to EGL.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from PIL import Image
+
+from dem.errors import InputError, RunError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
+from postprocess.measures.entanglement import entanglement
+from postprocess.measures.packing import packing_fraction
+from postprocess.pictures.camera import FIELD_OF_VIEW, MILLIMETRE, Look, channel, circle, fitted_camera, wall_corners
+from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.surroundings import DrawnHooks, Surroundings
+from postprocess.report import figures
+
+with warnings.catch_warnings():
+    # PyVista imports pyplot: see postprocess.report.figures.
+    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
+    import pyvista as pv
+    import pyvista.plotting
+
+from vtkmodules.vtkCommonCore import vtkLogger
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+_OVERSAMPLING = 2
+
+# Corners of a box (along, in plane, normal) and its faces, seen from outside.
+_CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
+_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+
+
+def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float) -> pv.PolyData:
+    """The links of all smarticles as one mesh of boxes.
+
+    The section of a straight smarticle, or of one without barbs, is turned about its length by an
+    angle that four vertices do not tell: some angle is taken. Links without length have no box.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        thickness_normal: t1, along the normal of the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m].
+
+    Returns:
+        Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
+        `vertices`, and `link`, 0 to 2.
+
+    Raises:
+        InputError: Bad vertices or thicknesses.
+    """
+    vertices = checked_vertices(vertices)
+    if not (thickness_normal > 0 and thickness_in_plane > 0):
+        msg = f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m"
+        raise InputError(msg)
+    lengths = link_lengths(vertices)
+    smarticle, link = np.nonzero(lengths > 1e-9 * lengths.sum(axis=1, keepdims=True))
+    start, end = vertices[smarticle, link], vertices[smarticle, link + 1]
+    along = end - start
+    across = np.cross(plane_frames(vertices)[smarticle, 2], along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    # Square to the link even where the four vertices are not quite in one plane.
+    normal = np.cross(along, across)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    edges = np.stack([along, thickness_in_plane * across, thickness_normal * normal], axis=1)
+    points = ((start + end) / 2)[:, None] + np.einsum("ce,bex->bcx", _CORNERS, edges)
+    faces: Any = _FACES + 8 * np.arange(len(points))[:, None, None]
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
+    mesh.cell_data["smarticle"] = np.repeat(smarticle, len(_FACES))
+    mesh.cell_data["link"] = np.repeat(link, len(_FACES))
+    return mesh
+
+
+class Canvas:
+    """Container, camera and lights of one picture or film; draws frame after frame."""
+
+    def __init__(
+        self,
+        run: RunManifest,
+        look: Look,
+        surroundings: Surroundings,
+        extent: NDArray[np.float64],
+        span: tuple[float, float],
+    ) -> None:
+        self._run = run
+        self._look = look
+        self._surroundings = surroundings
+        self._scale = ColourScale.of(look.colouring, *span)
+        self._wall: list[Any] = []  # what goes away with the container
+        self._ghost: Any = None  # what is left of it then
+        self._hooks: list[Any] = []  # the lower and the upper one
+        _check_graphics()
+        with _quiet_vtk():
+            width, height = look.panel
+            self._plotter: Any = pv.Plotter(
+                off_screen=True,
+                window_size=[_OVERSAMPLING * width, _OVERSAMPLING * height],
+                lighting="none",
+            )
+            self._build(extent)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._plotter.close()
+
+    def picture(self, frame: Frame, values: NDArray[Any]) -> Image.Image:
+        """One finished picture of a frame coloured by one value per smarticle."""
+        boxes = link_boxes(
+            frame.vertices - [0.0, 0.0, frame.floor_z],
+            thickness_normal=self._run.thickness_normal,
+            thickness_in_plane=self._run.thickness_in_plane,
+        )
+        boxes.points *= MILLIMETRE
+        boxes.cell_data["colour"] = self._scale.colours(values[boxes.cell_data["smarticle"]])
+        with _quiet_vtk():
+            self._plotter.add_mesh(
+                boxes,
+                scalars="colour",
+                rgb=True,
+                name="smarticles",
+                ambient=0.22,
+                diffuse=0.85,
+                specular=0.12,
+                specular_power=20,
+                show_edges=True,
+                edge_color="#101418",
+                edge_opacity=0.55,
+                line_width=0.5 * _OVERSAMPLING,
+                reset_camera=False,
+                render=False,
+            )
+            self._move(frame)
+            self._plotter.render()
+            pixels = self._plotter.screenshot(return_img=True)
+        panel = Image.fromarray(pixels).resize(self._look.panel, Image.Resampling.LANCZOS)
+        return self._composed(np.asarray(panel), self._caption(frame))
+
+    def _build(self, extent: NDArray[np.float64]) -> None:
+        plotter, axes = self._plotter, self._look.axes
+        radius = self._run.container_radius * MILLIMETRE
+        plotter.set_background("white")
+        if self._run.planar:
+            for wall in channel(extent, self._run):
+                self._add_outline(pv.MultipleLines(wall))
+        else:
+            self._add_container(radius, float(extent[:, 2].max()))
+        if self._surroundings.hooks is not None:
+            mesh = _cross(self._surroundings.hooks)
+            look = {"color": "#b3261e", "ambient": 0.25, "diffuse": 0.8, "render": False}
+            self._hooks = [plotter.add_mesh(mesh, **look) for _ in range(2)]
+        width, height = self._look.panel
+        position, focus = fitted_camera(extent, axes, width / height)
+        self._light(position, focus)
+        camera = plotter.camera
+        camera.view_angle = FIELD_OF_VIEW
+        camera.position = tuple(position)
+        camera.focal_point = tuple(focus)
+        camera.up = tuple(axes[1])
+        distance = float(np.linalg.norm(position - focus))
+        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + radius
+        camera.clipping_range = (max(distance - reach, distance / 1000), distance + reach)
+        plotter.enable_ssao(
+            radius=0.6 * self._run.middle_length * MILLIMETRE,
+            bias=0.4 * self._run.thickness_in_plane * MILLIMETRE,
+            kernel_size=64,
+            blur=True,
+        )
+
+    def _move(self, frame: Frame) -> None:
+        """Puts walls and hooks where they are in a frame."""
+        top = float(frame.vertices[..., 2].max()) - frame.floor_z
+        raised = self._surroundings.raised(frame.time, frame.phase, top)
+        for part in self._wall:
+            part.visibility = raised is not None
+            part.position = (0.0, 0.0, MILLIMETRE * (raised or 0.0))
+        if self._ghost is not None:
+            self._ghost.visibility = raised is None
+        if self._surroundings.hooks is not None:
+            for hook, height in zip(self._hooks, self._surroundings.hooks.heights(frame.time), strict=True):
+                hook.position = (0.0, 0.0, MILLIMETRE * height)
+
+    def _add_container(self, radius: float, top: float) -> None:
+        plotter, forward = self._plotter, self._look.axes[2]
+        floor = pv.Disc(inner=0, outer=radius, c_res=180)
+        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
+        corners = wall_corners(top, self._run, self._surroundings)
+        rims = _back_rims(corners, forward)
+        if rims is None:
+            for outer, height in corners[1:]:
+                self._add_outline(pv.MultipleLines(circle(outer, height)))
+            return
+        outline = _outline(rims)
+        self._wall = [
+            plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
+            self._add_outline(outline),
+        ]
+        if self._surroundings.removed is not None:
+            self._ghost = self._add_outline(outline, opacity=0.3)
+        self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
+
+    def _add_outline(self, lines: pv.PolyData, *, opacity: float = 1.0) -> Any:
+        return self._plotter.add_mesh(
+            lines,
+            opacity=opacity,
+            color="#7d8f9f",
+            line_width=1.8 * _OVERSAMPLING,
+            lighting=False,
+            render=False,
+        )
+
+    def _light(self, position: NDArray[np.float64], focus: NDArray[np.float64]) -> None:
+        right, up, forward = self._look.axes
+        distance = float(np.linalg.norm(position - focus))
+        for side, rise, strength in ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25)):
+            source = focus + distance * (side * right + rise * up - forward)
+            self._plotter.add_light(
+                pv.Light(
+                    position=tuple(source),
+                    focal_point=tuple(focus),
+                    intensity=strength,
+                    light_type="scene light",
+                )
+            )
+
+    def _caption(self, frame: Frame) -> tuple[str, str, str]:
+        run = self._run
+        count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
+        phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
+        title = run.name, f"l/w = {run.aspect_ratio:g}   N = {count}   t = {frame.time:.3f} s ({phase})"
+        if run.planar:
+            return (*title, "")  # neither packing nor crossings have a meaning there
+        packing = "φ undefined"
+        with suppress(UndefinedMeasureError):
+            if run.fills_cylinder(frame.phase):
+                phi = packing_fraction(
+                    frame.vertices,
+                    radius=run.container_radius,
+                    solid_volume=run.solid_volume,
+                    floor_z=frame.floor_z,
+                )
+                packing = f"φ = {phi.value:.3f} (definition {phi.definition})"
+        mean = entanglement(frame.vertices).mean
+        crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "⟨N⟩ undefined"
+        return (*title, f"{packing}   {crossings}")
+
+    def _composed(self, panel: NDArray[np.uint8], caption: tuple[str, str, str]) -> Image.Image:
+        """The drawn panel with its caption and colour bar."""
+        width, height = self._look.size
+        unit = min(width, height) / 100  # pixel; text scales with the picture
+        with figures.style():
+            figure = figures.blank_figure(width / 72, height / 72, dpi=72)
+            figure.figimage(panel, xo=0, yo=0, origin="upper")
+            rows = ((2.0, 2.4, "bold", figures.BLACK), (5.4, 1.85, "normal", figures.GREY))
+            for text, (below, points, weight, colour) in zip((caption[0], "\n".join(caption[1:])), rows, strict=True):
+                figure.text(
+                    2.6 * unit / width,
+                    1 - below * unit / height,
+                    text,
+                    fontsize=points * unit,
+                    weight=weight,
+                    color=colour,
+                    va="top",
+                    linespacing=1.35,
+                    parse_math=False,
+                )
+            self._scale.draw(figure, self._look.colouring.label, unit)
+            return Image.fromarray(figures.pixels(figure))
+
+
+def _back_rims(corners: Sequence[tuple[float, float]], forward: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The halves (m, n, 3) of a wall's rims that face the camera from behind; None seen from above."""
+    if math.hypot(forward[0], forward[1]) < 1e-9:
+        return None
+    middle = math.atan2(forward[1], forward[0])
+    angle = middle + np.linspace(-math.pi / 2, math.pi / 2, 91)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    return np.stack([radius * arc + [0.0, 0.0, height] for radius, height in corners])
+
+
+def _bands(rims: NDArray[np.float64]) -> pv.PolyData:
+    """The surface between successive rims (m, n, 3)."""
+    count, points = rims.shape[:2]
+    first = (points * np.arange(count - 1)[:, None] + np.arange(points - 1)).ravel()
+    faces: Any = np.stack([first, first + 1, first + points + 1, first + points], axis=1)
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(rims.reshape(-1, 3), faces)
+    return mesh
+
+
+def _outline(rims: NDArray[np.float64]) -> pv.PolyData:
+    """Both edges of a wall, and every rim of it but the lowest, (m, n, 3)."""
+    lines = [rims[:, 0], *rims[1:], rims[:, -1]]
+    first, *rest = (pv.MultipleLines(line) for line in lines)
+    mesh: pv.PolyData = first.append_polydata(*rest)
+    return mesh
+
+
+def _cross(hooks: DrawnHooks) -> pv.PolyData:
+    """The two bars of a hook, centred at the origin [mm]."""
+    long, thick = MILLIMETRE * hooks.length / 2, MILLIMETRE * hooks.side / 2
+    bars = [pv.Box((-x, x, -y, y, -thick, thick)) for x, y in ((long, thick), (thick, long))]
+    mesh: pv.PolyData = bars[0].append_polydata(bars[1])
+    return mesh
+
+
+def _check_graphics() -> None:
+    """Complains where VTK, instead of complaining, would end the process by a segmentation fault.
+
+    Raises:
+        RunError: There is neither a display nor a library to draw without one.
+    """
+    if sys.platform != "linux" or os.environ.get("DISPLAY"):
+        return
+    for library in ("libEGL.so.1", "libOSMesa.so.8"):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return
+    msg = (
+        "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
+    )
+    raise RunError(msg)
+
+
+@contextmanager
+def _quiet_vtk() -> Iterator[None]:
+    """Keeps VTK from warning, on standard error, that there is no display."""
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)

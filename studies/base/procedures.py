@@ -1,0 +1,96 @@
+"""Procedures: what a pile goes through, the points of studies that compare them, and how they are compared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+
+from postprocess.statistics.columns import ASPECT, SEEDS
+from postprocess.statistics.pairs import mean_difference
+from postprocess.statistics.points import mean_columns, ordered, seeds_of
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds
+from studies.base.runs import DEFINITION, Collected, MeasuredRun
+
+STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
+PROCEDURES: Mapping[str, str] = MappingProxyType(
+    {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
+)
+"""Procedure of each type of activity."""
+
+AMPLITUDE = 10.0
+"""θ of the internal oscillation where procedures are compared, as in the paper [deg]."""
+
+PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
+PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"
+
+NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
+    {
+        "procedure": lambda point: str(point[PROCEDURE]),
+        "θ": lambda point: "" if math.isnan(point[THETA]) else f"{point[THETA]:g}°",
+        "l/w": lambda point: f"{point[ASPECT]:g}",
+        "seeds": lambda point: str(point[SEEDS]),
+    }
+)
+"""What tells a point from others, for a person to read; see `points.told_means`."""
+
+
+def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
+    """Samples of one procedure; of the internal oscillation those that procedures are compared at."""
+    chosen = table[table[PROCEDURE] == procedure]
+    return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL else chosen
+
+
+def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
+    """One procedure less another, mean over pairs of the same aspect ratio and seed."""
+    return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
+
+
+def points(table: pd.DataFrame, quantities: Iterable[str]) -> pd.DataFrame:
+    """One row per procedure, aspect ratio and θ: means over seeds with their errors.
+
+    Args:
+        table: One row per run, or per sample of several runs.
+        quantities: Columns that are averaged.
+
+    Returns:
+        The table; `… SE` is the standard error, `… 95 %` the half-width of the confidence interval, `… seeds`
+        how many seeds have a value.
+    """
+    rows = []
+    for (procedure, aspect, theta), group in table.groupby([PROCEDURE, ASPECT, THETA], sort=True, dropna=False):
+        row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, ASPECT: aspect, **seeds_of(group)}
+        for quantity in quantities:
+            mean = mean_over_seeds(group[quantity])
+            row |= mean_columns(quantity, mean)
+            row[f"{quantity.rpartition(' [')[0]} seeds [-]"] = mean.count
+        rows.append(row)
+    return ordered(
+        pd.DataFrame(rows), [PROCEDURE, THETA, ASPECT], named=PROCEDURE, order=(STATIC, EXTERNAL, SHAPE, INTERNAL)
+    )
+
+
+def refuse_unlike(found: Collected) -> None:
+    """Refuses runs of one procedure that took different times, and a point's runs with the same seed.
+
+    Args:
+        found: Runs whose rows tell procedure, θ, aspect ratio and how long they were active.
+
+    Raises:
+        InputError: There are such.
+    """
+    found.refuse_mixture(
+        "duration",
+        lambda run: f"{run.row[PROCEDURE]} for {run.row[ACTIVE]:.3g} s",
+        within=lambda run: str(run.row[PROCEDURE]),
+    )
+    found.refuse_repeats("point", _named_point)
+
+
+def _named_point(run: MeasuredRun) -> str:
+    row = run.row
+    theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
+    return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"

@@ -1,0 +1,103 @@
+"""What the studies of shaken piles measure of a run: packing fraction and crossings before and after shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.manifest import RunManifest
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
+from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.runs import DEFINITION, duration
+
+SHAKEN = "time shaken [s]"
+
+QUICK_DEFINITIONS = tuple(name for name in DEFINITIONS if name != "voronoi")
+"""Definitions that take tenths of a second per frame at most; `voronoi` takes seconds."""
+
+STAGES: Mapping[str, str] = MappingProxyType(
+    {
+        "phi_0": "before shaking",
+        "phi_f": "at the end of shaking",
+        "phi_f relaxed": "after the relaxation that follows shaking",
+    }
+)
+"""When a packing fraction is taken; each is a mean over the last frames of its phase."""
+
+WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
+"""How the stages are averaged, for footers."""
+
+_SHAKE = "shake"
+
+
+def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, object]:
+    """One run's row: φ by each definition and the crossings before and after shaking, and what the run was.
+
+    Args:
+        run: A finished run.
+        definitions: Of the packing fraction; `DEFINITION` is always among them. The costly ones
+            are taken of the last frame alone, before and at the end of shaking.
+
+    Raises:
+        InputError: It was not shaken after another phase, or cannot be read.
+    """
+    shakes = [phase for phase in run.phases if phase.type == _SHAKE]
+    if not shakes or shakes[0].index == 0:
+        types = ", ".join(phase.type for phase in run.phases)
+        msg = f"{run.directory}: no shaking after another phase: its phases are {types}"
+        raise InputError(msg)
+    wanted = {"phi_0": shakes[0].index - 1, "phi_f": shakes[-1].index}
+    if shakes[-1].index < run.phases[-1].index:
+        wanted["phi_f relaxed"] = run.phases[-1].index
+    cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
+    summary = summarise_run(run.directory, definitions=cheap, phases=set(wanted.values()))
+    if summary.empty:
+        msg = f"{run.directory}: no frame of the phases around shaking; run it again"
+        raise InputError(msg)
+    table = summary.set_index("phase")
+    for phase in wanted.values():
+        if phase not in table.index:
+            kind = run.phases[phase].type
+            msg = f"{run.directory}: no frame of phase {phase} ({kind}); run it again"
+            raise InputError(msg)
+    row: dict[str, object] = {
+        ASPECT: round(run.aspect_ratio, 6),
+        SEED: run.seed,
+        "smarticles [-]": run.count,
+        "fidelity": run.fidelity,
+        SHAKEN: sum(map(duration, shakes)),
+    }
+    for definition in DEFINITIONS:
+        if definition in cheap:
+            for stage, phase in wanted.items():
+                row[f"{stage} {definition} [-]"] = table.loc[phase, f"phi {definition} [-]"]
+        elif definition in definitions:
+            change = packing_change(run.directory, definition=definition, last=1, activity={_SHAKE})
+            row[f"phi_0 {definition} [-]"] = change.before.value
+            row[f"phi_f {definition} [-]"] = change.after.value
+    for stage, phase in wanted.items():
+        row[f"{stage} {DEFINITION} SE in run [-]"] = table.loc[phase, f"phi {DEFINITION} SE [-]"]
+    for name, stage in zip(("before", "after", "relaxed"), STAGES, strict=True):
+        if stage in wanted:
+            row[f"crossings {name} [-]"] = table.loc[wanted[stage], "crossings mean [-]"]
+    row["escaped at the end [-]"] = table["escaped [-]"].iloc[-1]
+    row["frames averaged [-]"] = int(table.loc[list(wanted.values()), "frames averaged"].min())
+    row["scene_sha256"] = run.scene_sha256
+    row["run"] = run.directory.name
+    return row
+
+
+def measured_quantities(runs: pd.DataFrame) -> list[str]:
+    """What is averaged over seeds: names of columns without their unit."""
+    columns = [f"{stage} {definition}" for definition in DEFINITIONS for stage in STAGES]
+    columns += ["crossings before", "crossings after", "crossings relaxed"]
+    return [name for name in columns if f"{name} [-]" in runs.columns]
+
+
+def told_shaken(runs: pd.DataFrame) -> str:
+    """How long the runs were shaken, for footers."""
+    return ", ".join(sorted({f"{time:g}" for time in runs[SHAKEN].round(3)}, key=float)) + " s"

@@ -1,0 +1,246 @@
+"""The sweep file: which scenes one template makes.
+
+schema_version: 1
+name: friction                      # what the sweep is called
+template: scene.yaml.j2             # Jinja2 template of a scene, beside this file
+run_name: "mu{{ '%.1f' | format(friction) }}_seed{{ seed }}"
+constants: {count: 100}             # the same in every point
+points:                             # any of these; several are crossed with each other
+  table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file, all or some
+  list: [{friction: 0.4, count: 100}]                       # points written out
+  zip: {friction: [0.2, 0.4], count: [90, 100]}             # first with first, second with second
+  grid: {friction: [0.2, 0.4], count: [90, 100]}            # every combination
+derived: {half: "(count / 2) | round | int"}                # expressions, in order
+repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+                                    # `seed_by_seed: true` beside it: all points with the first seed come first
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from dem.errors import InputError, nearest
+from dem.scene.yaml_text import parse_yaml
+from templates.sweep.files import IDENTIFIER, parse_table, read_text
+from templates.sweep.refusal import Models, explain
+from templates.sweep.render import Value
+
+SEED = "seed"
+_RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
+
+
+def _names(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
+    for name in mapping:
+        if not IDENTIFIER.match(name) or name in _RESERVED:
+            msg = (
+                f"{name!r} cannot name a variable: use letters, digits and _, "
+                f"and none of {', '.join(sorted(_RESERVED))}"
+            )
+            raise ValueError(msg)
+    return mapping
+
+
+def _finite(value: Value) -> Value:
+    if isinstance(value, float) and not math.isfinite(value):
+        msg = f"{value!r} is not a finite number"
+        raise ValueError(msg)
+    if isinstance(value, list):
+        for item in value:
+            _finite(item)
+    return value
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Table(_Model):
+    """Points from the rows of a CSV file."""
+
+    file: str = Field(description="CSV file; a relative path starts at the sweep file")
+    only: dict[str, list[Value]] = Field(default={}, description="keep the rows whose column holds one of these values")
+
+
+class Points(_Model):
+    """Where the points come from. Several sources are crossed; later ones vary faster."""
+
+    table: Table | None = None
+    list_: list[dict[str, Value]] | None = Field(default=None, alias="list", min_length=1)
+    zip_: dict[str, list[Value]] | None = Field(default=None, alias="zip", min_length=1)
+    grid: dict[str, list[Value]] | None = Field(default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> Points:
+        if self.table is None and self.list_ is None and self.zip_ is None and self.grid is None:
+            msg = "no points: give at least one of table, list, zip, grid"
+            raise ValueError(msg)
+        for row in self.list_ or []:
+            if set(row) != set((self.list_ or [row])[0]):
+                msg = f"list: every point needs the same variables: got {row!r}"
+                raise ValueError(msg)
+        for columns in (self.zip_, self.grid, *(self.list_ or [])):
+            _names(columns or {})
+        for source, columns in (("zip", self.zip_), ("grid", self.grid)):
+            for name, values in (columns or {}).items():
+                _finite(values)
+                if not values:
+                    msg = f"{source}: {name} has no values"
+                    raise ValueError(msg)
+        lengths = {name: len(values) for name, values in (self.zip_ or {}).items()}
+        if len(set(lengths.values())) > 1:
+            msg = f"zip: lists of unequal length: got {lengths}"
+            raise ValueError(msg)
+        return self
+
+
+class Repeats(_Model):
+    """The same point with other random numbers."""
+
+    seeds: tuple[int, ...] = Field(min_length=1, description="seeds of the scene, one run each")
+    seed_by_seed: bool = Field(
+        default=False,
+        description="start every point with the first seed before any with the second, so that what is there when the "
+        "sweep is interrupted covers all points",
+    )
+
+    @field_validator("seeds")
+    @classmethod
+    def _unique(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        if len(set(seeds)) != len(seeds):
+            msg = f"a seed is given twice: got {list(seeds)}"
+            raise ValueError(msg)
+        return seeds
+
+
+class SweepFile(_Model):
+    """What a sweep file says, validated."""
+
+    schema_version: Literal[1]
+    name: str = Field(min_length=1)
+    template: str = Field(description="scene template; a relative path starts at the sweep file")
+    run_name: str = Field(description="Jinja2 text that names a run's directory")
+    constants: dict[str, Value] = {}
+    points: Points
+    derived: dict[str, str | int | float | bool] = {}
+    repeats: Repeats | None = None
+
+    @field_validator("constants", "derived")
+    @classmethod
+    def _variables(cls, mapping: dict[str, Value]) -> dict[str, Value]:
+        for value in _names(mapping).values():
+            _finite(value)
+        return mapping
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """A sweep file and everything it refers to.
+
+    Args:
+        path: the sweep file.
+        text: its text.
+        content: what it says.
+        template: path of the scene template.
+        template_text: its text.
+        table: rows of the table, those that are kept; empty without a table.
+        table_path: the table's file, or None.
+        table_text: the table's text, or None.
+    """
+
+    path: Path
+    text: str
+    content: SweepFile
+    template: Path
+    template_text: str
+    table: tuple[Mapping[str, Value], ...] = ()
+    table_path: Path | None = None
+    table_text: str | None = None
+
+
+def load_sweep(path: Path) -> Sweep:
+    """Read a sweep file, its template and its table.
+
+    Raises:
+        InputError: a file is missing or malformed, a key unknown, a value out of range.
+    """
+    text = read_text(path, "sweep file")
+    data = parse_yaml(text, str(path))
+    if not isinstance(data, dict):
+        msg = f"{path}: a sweep file holds keys such as template and points: got {data!r}"
+        raise InputError(msg)
+    try:
+        content = SweepFile.model_validate(data)
+    except ValidationError as error:
+        raise InputError(explain(error, path, _MODELS, "see `smarticles sweep --help`")) from error
+    template = path.parent / content.template
+    table, table_path, table_text = _read_table(path, content.points.table)
+    return Sweep(
+        path=path,
+        text=text,
+        content=content,
+        template=template,
+        template_text=read_text(template, "scene template"),
+        table=tuple(table),
+        table_path=table_path,
+        table_text=table_text,
+    )
+
+
+def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
+    """The same sweep with other values for some of its constants.
+
+    Raises:
+        InputError: the sweep has no such constant.
+    """
+    for name in constants:
+        if name not in sweep.content.constants:
+            msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sorted(sweep.content.constants))}"
+            raise InputError(msg)
+    content = sweep.content.model_copy(update={"constants": {**sweep.content.constants, **constants}})
+    return replace(sweep, content=content)
+
+
+def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], Path | None, str | None]:
+    if table is None:
+        return [], None, None
+    file = path.parent / table.file
+    text = read_text(file, "table")
+    rows = parse_table(text, str(file))
+    for row in rows:
+        try:
+            for value in _names(row).values():
+                _finite(value)
+        except ValueError as error:
+            msg = f"{file}: {error}"
+            raise InputError(msg) from error
+    for column, wanted in table.only.items():
+        if column not in rows[0]:
+            msg = f"{path}: points.table.only.{column}: no such column; {nearest(column, sorted(rows[0]))}"
+            raise InputError(msg)
+        present = [row[column] for row in rows]
+        for value in wanted:
+            if value not in present:
+                msg = (
+                    f"{path}: points.table.only.{column}: {value!r} is not in {file}; "
+                    f"it has {', '.join(map(str, present))}"
+                )
+                raise InputError(msg)
+        rows = [row for row in rows if row[column] in wanted]
+    if not rows:
+        msg = f"{path}: points.table.only: keeps no row of {file}; give fewer conditions"
+        raise InputError(msg)
+    return rows, file, text
+
+
+_MODELS: Models = {
+    (): SweepFile,
+    ("points",): Points,
+    ("points", "table"): Table,
+    ("repeats",): Repeats,
+}

@@ -1,0 +1,391 @@
+"""An engine in memory: what `dem.engine.interface` asks for, with physics that can be worked out by hand.
+
+Smarticles fall freely, without turning, through each other, until they stand on the floor; there they stay and go
+with it. Barbs do not turn whatever motors are told, and whom a string is tied to goes where the string goes. What the
+double was told is in `told`; what it shall tell may be set.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.chain import Tie
+from dem.body.particle import Particle
+from dem.body.placement import Poses
+from dem.body.state import State
+from dem.engine.demand import Demand
+from dem.engine.effect import Adds, EffectName
+from dem.engine.interface import Engine, MotorReadings, Saved
+from dem.engine.kinds import EngineKind
+from dem.errors import RunError
+from dem.physics.overlaps import Overlaps
+from dem.physics.strings import StringLaw
+from dem.setting.container import Cylinder
+
+Array = NDArray[np.float64]
+Told = list[tuple[Any, ...]]
+"""What an engine was told, in order: a name and numbers."""
+
+STABLE_STEP = 5e-4  # s; nothing here is unstable
+
+
+@dataclass(kw_only=True)
+class FixturesDouble:
+    """Floor, wall and hooks; the upper hook is pulled down by a spring, `hook_stiffness` [N/m], as it is raised."""
+
+    told: Told
+    top: float = math.inf
+    bottom: float = -0.001
+    upper_start: float | None = None
+    planar: bool = False
+    hook_stiffness: float = 0.0
+    floor: float = 0.0
+    velocity: float = 0.0
+    walled: bool = True
+    hook_sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    channel_sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    _shaken: tuple[float, float, float] | None = None
+    _clock: float = 0.0
+    _speeds: tuple[float, float] = (0.0, 0.0)  # of the wall and of the upper hook, against the floor
+    _moved: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def wall_bottom(self) -> float:
+        return self.floor + self.bottom + self._moved[0] if self.walled else math.inf
+
+    @property
+    def enclosed(self) -> bool:
+        return self.walled and not self.planar and self.wall_bottom < self.floor
+
+    @property
+    def raised(self) -> float | None:
+        return self._moved[1] if self.enclosed and self.upper_height - self.floor <= self.top else None
+
+    @property
+    def upper_height(self) -> float:
+        return self.floor + (self.upper_start or 0.0) + self._moved[1]
+
+    def shake(self, *, amplitude: float, frequency: float) -> None:
+        self.told.append(("shake", amplitude, frequency))
+        self._shaken, self._clock = (self.floor, amplitude, 2 * math.pi * frequency), 0.0
+
+    def lift_wall(self, speed: float) -> None:
+        self.told.append(("lift_wall", speed))
+        self._speeds = (speed, self._speeds[1])
+
+    def raise_upper(self, speed: float) -> None:
+        self.told.append(("raise_upper", speed))
+        self._speeds = (self._speeds[0], speed)
+
+    def stop(self) -> None:
+        self.told.append(("stop",))
+        self._shaken, self._speeds, self.velocity = None, (0.0, 0.0), 0.0
+
+    def remove_wall(self) -> None:
+        self.told.append(("remove_wall",))
+        self.walled = False
+
+    def step(self, dt: float) -> None:
+        """Go on by dt [s]."""
+        if self._shaken is not None:
+            start, amplitude, omega = self._shaken
+            self._clock += dt
+            self.floor = start + amplitude * math.sin(omega * self._clock)
+            self.velocity = amplitude * omega * math.cos(omega * self._clock)
+        self._moved = (self._moved[0] + self._speeds[0] * dt, self._moved[1] + self._speeds[1] * dt)
+        if len(self.hook_sums):
+            self.hook_sums = self.hook_sums - [[0, 0, 0], [0, 0, self.hook_stiffness * self._moved[1]]]
+
+
+@dataclass(kw_only=True)
+class MotorsDouble:
+    """Motors that hold what they are told, and turn nothing."""
+
+    told: Told
+    present: bool = False
+    articulated: bool = False
+    readings: MotorReadings | None = None
+    work: float = 0.0
+    angles: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def articulate(self) -> None:
+        assert self.present
+        if not self.articulated:
+            self.told.append(("articulate",))
+            self.articulated = True
+            self._hold(self.angles)
+
+    def weld(self) -> None:
+        if self.articulated:
+            self.told.append(("weld",))
+            self.articulated = False
+
+    def actuate(self, targets: Array, interval: float) -> None:
+        assert self.articulated
+        self.told.append(("actuate", interval))
+        self._hold(targets)
+
+    def _hold(self, angles: Array) -> None:
+        none = np.zeros_like(angles)
+        self.readings = MotorReadings(
+            schedule=angles, commands=angles, torques=none, work=none, halted=np.zeros(angles.shape, dtype=np.bool_)
+        )
+
+    def gaps(self) -> Array:
+        return np.zeros_like(self.angles)
+
+
+@dataclass(kw_only=True)
+class StringsDouble:
+    """Two strings of a tension, `tension` [N], that is the same however far they are pulled."""
+
+    told: Told
+    tension: float = 0.0
+    tied: bool = False
+    sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    pulled: float = 0.0
+    ties: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    places: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    """(N, 3, 3) centres of the links [m], kept up to date by the engine."""
+    velocities: dict[int, float] = field(default_factory=dict)
+    """Speed along x of each smarticle that a string is tied to [m/s]."""
+
+    def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
+        self.told.append(("tie", law.length, *speeds))
+        self.ties = np.array([self.places[tie.smarticle, tie.link] for tie in ties])
+        away = np.sign(self.ties[:, 0]) * np.array(speeds)
+        self.velocities = {tie.smarticle: float(speed) for tie, speed in zip(ties, away, strict=True)}
+        self.tied, self.pulled, self.sums = True, 0.0, np.zeros((len(ties), 3))
+
+    def untie(self) -> None:
+        if self.tied:
+            self.told.append(("untie",))
+        self.tied, self.velocities = False, {}
+
+    def step(self, dt: float) -> None:
+        """Go on by dt [s]."""
+        if not self.tied:
+            return
+        along = np.outer(list(self.velocities.values()), [1.0, 0.0, 0.0])
+        self.ties, self.pulled = self.ties + along * dt, self.pulled + float(np.abs(along).sum()) * dt
+        self.sums = self.sums + np.outer(np.sign(self.ties[:, 0]), [self.tension, 0.0, 0.0])
+
+
+@dataclass
+class AccountDouble:
+    """Energies, exact."""
+
+    container_work: float = 0.0
+    added: float = 0.0
+    dissipated: float = 0.0
+
+    @property
+    def given(self) -> float:
+        return self.added + self.container_work
+
+    def elastic(self) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+@dataclass(kw_only=True)
+class EngineDouble:
+    """See `dem.engine.interface.Engine`, and above."""
+
+    particle: Particle
+    cylinder: Cylinder
+    gravity: float
+    time_step: float
+    planar: bool = False
+    stops_at: int | None = None
+    """Step at which it stops by itself."""
+    drift: float = 0.0
+    """Speed at which those that stand slide along x [m/s]."""
+    deepest: float = 0.0
+    """Depth of the deepest contact of each smarticle that stands [m]."""
+    time: float = 0.0
+    steps: int = 0
+    told: Told = field(default_factory=list)
+    account: AccountDouble = field(default_factory=AccountDouble)
+
+    def __post_init__(self) -> None:
+        self.fixtures = FixturesDouble(told=self.told, top=self.cylinder.height, planar=self.planar)
+        self.motors = MotorsDouble(told=self.told)
+        self.strings = StringsDouble(told=self.told)
+        self.positions = np.zeros((0, 3))
+        self.velocities = np.zeros((0, 3))
+        self._rotations = np.zeros((0, 3, 3))
+        self._standing = np.zeros(0, dtype=np.bool_)
+        self._seconds = 0.0
+        self.stands = np.zeros(0)
+        """(N,) heights above the floor at which centres of mass come to rest: the lowest sphere touches it [m]."""
+
+    @classmethod
+    def of(cls, scene: Demand, time_step: float) -> EngineDouble:
+        """The double that a scene calls for."""
+        engine = cls(
+            particle=scene.particle,
+            cylinder=scene.cylinder,
+            gravity=scene.gravity_m_per_s2,
+            time_step=time_step,
+            planar=scene.channel is not None,
+        )
+        engine.motors.present = scene.actuates
+        engine.fixtures.bottom = scene.cylinder.bottom
+        if scene.hooks is not None:
+            engine.fixtures.upper_start = scene.hooks.upper_height_m
+            engine.fixtures.hook_sums = np.zeros((2, 3))
+        if scene.channel is not None and scene.channel.width is not None:
+            engine.fixtures.channel_sums = np.zeros((2, 3))
+        return engine
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    def set_time_step(self, time_step: float) -> None:
+        self.time_step = time_step
+
+    def advance(self, steps: int) -> None:
+        target = self.steps + max(0, steps)
+        while self.steps < target:
+            if self.steps == self.stops_at:
+                msg = f"the double stopped at step {self.steps} of {target}"
+                raise RunError(msg)
+            self._step()
+
+    def _step(self) -> None:
+        dt, carried, floor = self.time_step, self._standing, self.fixtures.floor
+        falling = ~carried
+        self.fixtures.step(dt)
+        self.strings.step(dt)
+        self.time, self.steps = self.time + dt, self.steps + 1
+        self._seconds += dt * self.count
+        if self.planar:
+            self.velocities[:] = 0.0
+            for k, velocity in self.strings.velocities.items():
+                self.velocities[k, 0] = velocity
+                self.positions[k, 0] += dt * velocity
+                self.strings.places[k, :, 0] += dt * velocity
+            return
+        if self.fixtures.floor == floor and not (self.drift or self.velocities.any() or falling.any()):
+            return
+        ground, before = self.fixtures.floor + self.stands, self._energy(carried)
+        along = [self.drift, 0.0, self.fixtures.velocity]
+        self.positions[carried, 0] += self.drift * dt
+        self.positions[carried, 2], self.velocities[carried] = ground[carried], along
+        self.account.container_work += self._energy(carried) - before
+        if not falling.any():
+            return
+        self.positions[falling] += dt * self.velocities[falling] - [0.0, 0.0, self.gravity * dt**2 / 2]
+        self.velocities[falling, 2] -= self.gravity * dt
+        landed = falling & (self.positions[:, 2] <= ground)
+        if landed.any():
+            before = self._energy(landed)
+            self.positions[landed, 2], self.velocities[landed] = ground[landed], along
+            self.account.dissipated += before - self._energy(landed)
+            self._standing = carried | landed
+
+    def _energy(self, which: NDArray[np.bool_]) -> float:
+        heights, speeds = self.positions[which, 2], self.velocities[which]
+        return float(self.particle.boxes.mass * (self.gravity * heights.sum() + (speeds**2).sum() / 2))
+
+    # -- smarticles --------------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        return len(self.positions)
+
+    def add(self, poses: Poses) -> None:
+        self.told.append(("add", len(poses.positions)))
+        n, boxes = len(poses.positions), self.particle.boxes
+        self.positions = np.concatenate([self.positions, poses.positions])
+        self.velocities = np.concatenate([self.velocities, np.zeros((n, 3))])
+        turned = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
+        self._rotations = np.concatenate([self._rotations, turned])
+        lowest = (self._rotations[:, 2] @ self.particle.centres.T).min(axis=1)
+        self.stands = self.particle.radius - lowest
+        self._standing = np.concatenate([self._standing, np.zeros(n, dtype=np.bool_)])
+        self.account.added += boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
+        self.motors.angles = np.tile(boxes.angles, (self.count, 1))
+        self.strings.places = self.state().link_positions
+
+    def state(self) -> State:
+        still = np.zeros_like(self.positions)
+        return State.rigid(self.particle.boxes, self.positions.copy(), self._rotations, self.velocities.copy(), still)
+
+    @property
+    def gravity_impulse(self) -> float:
+        return self._seconds * self.particle.boxes.mass * self.gravity
+
+    def unbalanced_force(self) -> float:
+        return float((~self._standing).mean()) if self.count and self.gravity else math.inf
+
+    def neighbours(self) -> NDArray[np.int64]:
+        return np.zeros(self.count, dtype=np.int64)
+
+    def touches(self) -> NDArray[np.int64]:
+        return self._standing.astype(np.int64)
+
+    def overlaps(self, limit: float) -> Overlaps:
+        deep = self._standing & (self.deepest > limit)
+        return Overlaps(self.deepest, deep, 0.0)
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    def save(self, scratch: Path) -> Saved:
+        kept = {name: value for name, value in vars(self).items() if name not in ("particle", "cylinder", "told")}
+        parts = {name: vars(kept.pop(name)) for name in ("fixtures", "motors", "strings", "account")}
+        content = {name: {key: value for key, value in part.items() if key != "told"} for name, part in parts.items()}
+        time, steps = kept.pop("time"), kept.pop("steps")
+        return Saved(content=pickle.dumps((kept, content)), memory={"time": time, "steps": steps})
+
+    def load(self, saved: Saved, scratch: Path) -> None:
+        kept, parts = pickle.loads(saved.content)
+        vars(self).update(kept | dict(saved.memory))
+        for name, values in parts.items():
+            vars(getattr(self, name)).update(values)
+
+
+class KindDouble:
+    """See `dem.engine.kinds.EngineKind`; `built` are the engines that it has built."""
+
+    name = "double"
+    damps_once_per_look = False
+    actuated_share = 1.0
+    built: list[EngineDouble]
+
+    def __init__(self) -> None:
+        self.built = []
+
+    def version(self) -> str:
+        return "1"
+
+    def threads(self) -> int:
+        return 1
+
+    def adds(self, effect: EffectName) -> Adds:
+        return Adds()
+
+    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
+        return tuple(engines)
+
+    def stable_step(self, scene: Demand, *, articulated: bool) -> float:
+        return STABLE_STEP
+
+    def seconds_per_step(self, scene: Demand) -> float:
+        return 1e-6
+
+    def build(self, scene: Demand, time_step: float) -> EngineDouble:
+        self.built.append(EngineDouble.of(scene, time_step))
+        return self.built[-1]
+
+
+def _conforms(engine: EngineDouble, kind: KindDouble) -> tuple[Engine, EngineKind]:
+    """For the type checker alone: the doubles are what they stand for."""
+    return engine, kind

@@ -1,0 +1,125 @@
+"""What the engine wrote is what `postprocess` reads: frames, series and measures have the engine's own numbers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import handover_cases
+import numpy as np
+import pytest
+
+from dem.record.columns import EVERY
+from postprocess import measure_run, read_frames, read_run, read_series, summarise_run
+from postprocess.scene_file import read_phases
+
+pytestmark = pytest.mark.engine
+
+PHASES = ["deposit", "relax", "shake", "internal-oscillation"]
+SCENE: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "handover",
+    "seed": 5,
+    "count": 6,
+    "fidelity": "draft",
+    "phases": [
+        {"type": "deposit", "per_layer": 3},
+        {"type": "relax", "duration_s": 0.04},
+        {"type": "shake", "duration_s": 0.08, "frequency_hz": 30, "peak_acceleration_g": 2},
+        {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 0.08},
+    ],
+    "recording": {"frame_interval_s": 0.02, "checkpoint_interval_s": 0.04, "energy": True},
+}
+
+
+@pytest.fixture(scope="module")
+def handed(worker: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str, Any]]]:
+    """A run directory, and the engine's numbers at every sample of its series."""
+    out = tmp_path_factory.mktemp("handover") / "run"
+    notes: list[dict[str, Any]] = worker.submit(handover_cases.noted, SCENE, str(out)).result(300)
+    return out, notes
+
+
+def test_frames_hold_the_engine_s_numbers_to_the_bit(handed: tuple[Path, list[dict[str, Any]]]) -> None:
+    out, notes = handed
+    said = {note["time"]: note for note in notes}
+    frames = read_frames(out)
+    assert len(frames) > 10
+    assert {frame.phase for frame in frames} == {0, 1, 2, 3}
+    driven = 0
+    for frame in frames:
+        note = said[frame.time]
+        assert (frame.phase, frame.floor_z, frame.count) == (note["phase"], note["floor"], note["count"])
+        for ours, theirs in (
+            (frame.vertices, note["vertices"]),
+            (frame.link_velocity, note["velocities"]),
+            (frame.link_angular_velocity, note["spins"]),
+            (frame.contacts, note["contacts"]),
+            (frame.cell_data["angle_rad"][:, [0, 2]], note["angles"]),
+        ):
+            np.testing.assert_array_equal(ours, theirs)
+        torques = frame.cell_data["motor_torque_N_m"][:, [0, 2]]
+        if note["torques"] is None:
+            assert np.isnan(torques).all()
+        else:
+            driven += 1
+            np.testing.assert_array_equal(torques, note["torques"])
+    assert driven > 2
+    assert any(frame.contacts.any() for frame in frames)
+
+
+def test_series_hold_the_engine_s_numbers_and_the_units_of_their_columns(
+    handed: tuple[Path, list[dict[str, Any]]],
+) -> None:
+    out, notes = handed
+    series = read_series(out)
+    assert series.time.tolist() == [note["time"] for note in notes]
+    for name, key in (
+        ("phase", "phase"),
+        ("count", "count"),
+        ("container_z_m", "floor"),
+        ("kinetic_energy_J", "kinetic_energy"),
+    ):
+        assert series[name].tolist() == [note[key] for note in notes]
+    poured = [k for k, note in enumerate(notes) if note["count"]]
+    assert series["com_height_m"][poured] == pytest.approx([notes[k]["heights"].mean() for k in poured], rel=1e-12)
+    last = notes[-1]
+    second = np.sort(last["heights"])[-2]
+    assert series["packing_fraction"][-1] == pytest.approx(
+        6 * last["volume"] / (math.pi * last["radius"] ** 2 * second), rel=1e-12
+    )
+    assert series.units == {name: EVERY[name].unit for name in series.data}
+    assert "motor_work_J" in series.data
+
+
+def test_manifest_and_scene_tell_of_the_same_run(handed: tuple[Path, list[dict[str, Any]]]) -> None:
+    out, notes = handed
+    run = read_run(out)
+    assert (run.status, run.name, run.count, run.seed) == ("done", "handover", 6, 5)
+    assert [phase.type for phase in run.phases] == PHASES == [phase.type for phase in read_phases(out)]
+    assert (run.smarticle_mass, run.solid_volume) == (notes[-1]["mass"], notes[-1]["volume"])
+    assert run.container_radius == notes[-1]["radius"]
+    assert run.end_time is not None
+    # The last sample is nearer to the end than two samples are to each other.
+    assert 0 <= run.end_time - notes[-1]["time"] < notes[-1]["time"] - notes[-2]["time"]
+    for before, after in zip(run.phases, run.phases[1:], strict=False):
+        assert before.end == after.start
+    assert all(phase.time_step is not None and phase.time_step >= run.time_step > 0 for phase in run.phases)
+
+
+def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]]) -> None:
+    out, notes = handed
+    said, table, series = {note["time"]: note for note in notes}, measure_run(out, costly="never"), read_series(out)
+    for _, row in table.iterrows():
+        note = said[row["time [s]"]]
+        # Hinges give way by a little, and vertices stand for both links that meet there.
+        near = 1e-9 if note["torques"] is None else 1e-5
+        assert row["com height [m]"] == pytest.approx(note["heights"].mean(), rel=near)
+        assert row["contacts mean [-]"] == note["contacts"].mean()
+        assert row["kinetic energy [J]"] == note["kinetic_energy"]
+        phi = series["packing_fraction"][series.nearest(row["time [s]"])]
+        assert row["phi second-highest-com [-]"] == pytest.approx(phi, rel=near)
+    summary = summarise_run(out, costly="never")
+    assert summary["phase type"].tolist() == PHASES
+    assert summary["phi second-highest-com [-]"].gt(0).all()

@@ -1,0 +1,221 @@
+"""Each phase while it runs, against an engine in memory: what it tells the engine and when, and how long it takes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from double import EngineDouble
+from scenes import chain, small
+
+from dem.errors import RunError
+from dem.phases.phase import CHECK_INTERVAL, Stage
+from dem.scene.scene import Scene
+
+DT = 2e-4
+DEPOSIT = {"type": "deposit", "per_layer": 5}
+
+
+def begin(*phases: dict[str, Any], **changes: Any) -> tuple[Scene, EngineDouble]:
+    """A scene of a pour and some phases, and its engine with three smarticles that stand on the floor."""
+    scene = small({"phases": [DEPOSIT, *phases], "count": 3, **changes})
+    engine = EngineDouble.of(scene, DT)
+    perform(scene.phases[0].begin(scene, 0), engine)
+    engine.told.clear()
+    return scene, engine
+
+
+def perform(stage: Stage, engine: EngineDouble, fresh: Callable[[], Stage] | None = None) -> dict[str, Any]:
+    """Let a stage run to its end, by `fresh` taken anew from its memory at every look; what it remembers in the end."""
+    while wait := stage.proceed(engine):
+        engine.advance(max(1, round(wait / engine.time_step)))
+        if fresh is not None:
+            memory, stage = json.loads(json.dumps(stage.memory)), fresh()
+            stage.memory = memory
+    return stage.memory
+
+
+def run_phase(scene: Scene, engine: EngineDouble, index: int = 1) -> float:
+    """Run a phase; how long it took [s]."""
+    begun = engine.time
+    perform(scene.phases[index].begin(scene, index), engine)
+    return engine.time - begun
+
+
+# -- every phase -------------------------------------------------------------------------------------------------------
+
+SWING = {"type": "internal-oscillation", "theta_deg": 4, "duration_s": 0.05}
+PHASES: list[dict[str, Any]] = [
+    {"type": "relax", "duration_s": 0.05},
+    {"type": "shake", "duration_s": 0.05},
+    SWING,
+    {"type": "shape-change", "opening_s": 0.27, "closing_s": 0.27},
+    {"type": "actuate", "barbs": {"type": "ramp", "to_deg": 80, "duration_s": 0.05}},
+    {"type": "remove-container", "duration_s": 0.05},
+    {"type": "remove-container", "duration_s": 0.05, "speed_m_per_s": 0.3},
+    {"type": "pull-hook", "distance_m": 1e-3, "speed_m_per_s": 0.02, "force_limit_N": 1.0},
+]
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=[phase["type"] for phase in PHASES])
+def test_a_phase_takes_the_time_that_it_says_and_remembers_all_that_it_needs(phase: dict[str, Any]) -> None:
+    ends = []
+    for anew in (False, True):
+        scene, engine = begin(phase, hooks={})
+        begun = engine.time
+
+        def stage(scene: Scene = scene) -> Stage:
+            return scene.phases[1].begin(scene, 1)
+
+        perform(stage(), engine, stage if anew else None)
+        known = scene.phases[1].known_duration
+        assert known is not None
+        assert engine.time - begun == pytest.approx(known, abs=DT)
+        ends.append((engine.steps, engine.told))
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=[phase["type"] for phase in PHASES])
+def test_a_phase_without_motors_is_welded_and_one_with_motors_articulated(phase: dict[str, Any]) -> None:
+    scene, engine = begin(SWING, phase, hooks={})
+    run_phase(scene, engine, 1)
+    assert engine.motors.articulated
+    run_phase(scene, engine, 2)
+    assert engine.motors.articulated is scene.phases[2].actuates
+
+
+# -- pour --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> None:
+    scene = small({"count": 12})
+    engine = EngineDouble.of(scene, DT)
+    assert scene.phases[0].known_duration is None
+    duration = run_phase(scene, engine, 0)
+    assert engine.told == [("add", 5), ("add", 5), ("add", 2)]
+    assert engine.touches().all()
+    # Three falls of less than 2w, each looked at every 10 ms, and 50 ms of rest.
+    assert 3 * 0.01 < duration < 3 * 0.12
+    assert engine.positions[:, 2] == pytest.approx(engine.stands)
+
+
+def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
+    poses = []
+    for anew in (False, True):
+        scene = small({"count": 12})
+        engine = EngineDouble.of(scene, DT)
+        perform(
+            scene.phases[0].begin(scene, 0),
+            engine,
+            (lambda scene=scene: scene.phases[0].begin(scene, 0)) if anew else None,
+        )
+        poses.append(engine.state().link_positions)
+    assert np.array_equal(*poses)
+
+
+def test_a_layer_that_does_not_come_down_is_told() -> None:
+    scene = small({"gravity_m_per_s2": 1e-4})
+    with pytest.raises(RunError, match=r"a layer of 5 had not come down 2 s after .* phases\.0\.landed_speed_m_per_s"):
+        run_phase(scene, EngineDouble.of(scene, 1e-3), 0)
+
+
+@pytest.mark.parametrize(
+    ("drift", "unbalanced", "said"),
+    [(0.1, 0.0, "speed 0.1 m/s (limit 0.02 m/s)"), (0.0, 0.3, "unbalanced force 0.3 (limit 0.05)")],
+)
+def test_a_pile_that_does_not_settle_is_told_with_its_residuals(
+    monkeypatch: pytest.MonkeyPatch, drift: float, unbalanced: float, said: str
+) -> None:
+    # Each of the two by itself keeps a pile from counting as settled.
+    monkeypatch.setattr(EngineDouble, "unbalanced_force", lambda _: unbalanced)
+    scene = small({"phases.0.settle.timeout_s": 0.1})
+    engine = EngineDouble.of(scene, DT)
+    engine.drift = drift
+    with pytest.raises(RunError, match=r"not settled after 0\.1 s: .*; raise phases\.0\.settle\.timeout_s") as caught:
+        run_phase(scene, engine, 0)
+    assert said in str(caught.value)
+
+
+def test_what_does_not_fit_is_told_with_how_many_did() -> None:
+    # On the double nobody lies on another: it is the reach of those that stand that leaves no room for a layer more.
+    scene = small({"container.height_m": 0.035})
+    with pytest.raises(RunError, match=r"10 smarticles do not fit: after 5 the next layer would reach .* lower count"):
+        run_phase(scene, EngineDouble.of(scene, DT), 0)
+
+
+# -- container ---------------------------------------------------------------------------------------------------------
+
+
+def test_shaking_tells_amplitude_and_frequency_and_stops() -> None:
+    scene, engine = begin({"type": "shake", "duration_s": 0.1, "frequency_hz": 25, "peak_acceleration_g": 3})
+    run_phase(scene, engine)
+    amplitude = 3 * 9.81 / (2 * np.pi * 25) ** 2
+    assert engine.told == [("shake", pytest.approx(amplitude), 25), ("stop",)]
+
+
+def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
+    scene, engine = begin({"type": "remove-container", "duration_s": 0.5})
+    run_phase(scene, engine)
+    assert engine.told == [("remove_wall",)]
+    scene, engine = begin({"type": "remove-container", "duration_s": 0.5, "speed_m_per_s": 0.1})
+    top = engine.state().vertices[..., 2].max() + scene.particle.radius
+    stage, bottoms = scene.phases[1].begin(scene, 1), []
+    while wait := stage.proceed(engine):
+        if engine.fixtures.walled:
+            bottoms.append(engine.fixtures.wall_bottom)
+        engine.advance(round(wait / DT))
+    assert engine.told == [("lift_wall", 0.1), ("remove_wall",)]
+    assert bottoms[-1] < top < bottoms[-1] + 0.1 * CHECK_INTERVAL * 1.01
+
+
+def test_a_wall_that_is_not_clear_stays_and_a_shake_after_it_is_refused() -> None:
+    scene, engine = begin({"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, {"type": "shake"})
+    run_phase(scene, engine)
+    assert engine.told == [("lift_wall", 0.01), ("stop",)]
+    assert engine.fixtures.walled
+    with pytest.raises(RunError, match=r"the wall is still around the pile, its edge .* lengthen that phase's"):
+        run_phase(scene, engine, 2)
+
+
+# -- motors and strings ------------------------------------------------------------------------------------------------
+
+
+def test_motors_look_once_in_each_control_period_and_once_more_at_the_end() -> None:
+    ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
+    scene, engine = begin({"type": "actuate", "barbs": ramp})
+    assert run_phase(scene, engine) == pytest.approx(0.01, abs=DT)
+    interval = scene.fidelity.control_interval_s
+    assert engine.told == [("articulate",), *[("actuate", interval)] * (round(0.01 / interval) + 1)]
+    assert engine.motors.readings is not None
+    assert np.degrees(engine.motors.readings.commands) == pytest.approx(88)
+
+
+def strained(**changes: Any) -> tuple[EngineDouble, float]:
+    scene = chain({"phases.1.distance_m": 0.05, "phases.1.speed_m_per_s": 0.5, **changes})
+    engine = EngineDouble.of(scene, scene.fidelity.control_interval_s)
+    run_phase(scene, engine, 0)
+    assert engine.told == [("add", 6)]
+    engine.told.clear()
+    return engine, run_phase(scene, engine, 1)
+
+
+def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> None:
+    # It would part at 21 mm.
+    engine, duration = strained(**{"phases.1.distance_m": 0.01})
+    assert [told for told in engine.told if told[0] != "actuate"] == [
+        ("articulate",),
+        ("tie", 0.1, 0.0, 0.5),
+        ("untie",),
+    ]
+    assert duration == pytest.approx(0.01 / 0.5, abs=1e-4)
+
+
+def test_straining_ends_when_the_chain_has_parted() -> None:
+    engine, duration = strained()
+    assert engine.told[-1] == ("untie",)
+    # The last one is drawn out of the next by two thicknesses and a gap; looked at every 10 ms.
+    needed = (2 * 0.0095 + 0.00105) / 0.5
+    assert needed <= duration <= needed + CHECK_INTERVAL + 1e-4

@@ -1,0 +1,262 @@
+"""The motors' arithmetic: laws on paper, work against exact integrals, memory bit for bit."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dem.physics.motor import MotorLaw, Motors
+
+HALT = MotorLaw(torque_limit=1.6e-5, speed_limit=6.0, stiffness=3e-3, law="halt")
+SLIP = replace(HALT, law="slip")
+PERIOD, STEP = 2e-4, 4e-5  # s
+ADVANCE = 3e-3 * 6.0 * PERIOD  # k ω Δt [N m]
+
+
+def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors | None = None) -> Motors:
+    """A barb that something holds at an angle, and a motor that is told to go elsewhere."""
+    angles = np.full((1, 2), angle)
+    motors = motors or Motors(law, angles)
+    for _ in range(looks):
+        motors.look(angles, np.full((1, 2), target), PERIOD, STEP)
+    return motors
+
+
+# -- speed -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_jump_of_the_target_is_followed_at_the_speed_limit(sign: int) -> None:
+    law = replace(HALT, torque_limit=1.0)
+    motors = Motors(law, np.zeros((2, 2)))
+    seen = []
+    for _ in range(30):
+        motors.look(np.zeros((2, 2)), np.full((2, 2), sign * 0.02), PERIOD, STEP)
+        seen.append(motors.commands[1, 0])
+    steps = np.diff([0.0, *seen])
+    whole = int(0.02 // (6 * PERIOD))
+    assert steps[:whole] == pytest.approx(np.full(whole, sign * 6 * PERIOD), rel=1e-12)
+    assert seen[-1] == sign * 0.02
+    assert (np.diff(seen[whole + 1 :]) == 0).all()
+
+
+def test_slow_schedule_is_followed_exactly_and_each_barb_its_own() -> None:
+    motors = Motors(replace(HALT, torque_limit=1.0), np.array([[0.1, 0.2], [0.3, 0.4]]))
+    for look in range(1, 6):
+        targets = np.array([[0.1 + 1e-4 * look, 0.2 - 2e-4 * look], [0.3, 0.4 + 3e-4 * look]])
+        torques = motors.look(np.array([[0.1, 0.2], [0.3, 0.4]]), targets, PERIOD, STEP)
+        assert motors.commands == pytest.approx(targets, rel=1e-14)
+        assert torques == pytest.approx(3e-3 * (targets - [[0.1, 0.2], [0.3, 0.4]]), abs=1e-18)
+        assert (motors.torques == torques).all()
+
+
+def test_a_motor_that_halts_falls_behind_its_schedule_by_what_it_did_not_go() -> None:
+    motors = held(HALT, 0.0, 0.1, 40)
+    # It stopped at the first look that found τ_max, 1.6e-5 N m / 3e-3 N m/rad, in steps of 6 rad/s for one period.
+    stopped = math.ceil(1.6e-5 / 3e-3 / (6 * PERIOD)) * 6 * PERIOD
+    assert motors.schedule == pytest.approx(np.full((1, 2), 0.1))
+    assert motors.schedule - motors.commands == pytest.approx(np.full((1, 2), 0.1 - stopped), rel=1e-12)
+    again = Motors(HALT, np.zeros((1, 2)))
+    again.restore(motors.memory)
+    assert again.memory == motors.memory
+    motors.engage(np.full((1, 2), 0.3))
+    assert (motors.schedule == motors.commands).all()
+
+
+# -- the halting law ---------------------------------------------------------------------------------------------------
+
+
+@given(st.floats(-1, 1), st.floats(1e-3, 60), st.floats(1e-6, 1e-3), st.sampled_from([1, -1]))
+def test_halting_motor_stops_within_one_periods_advance(angle: float, speed: float, limit: float, sign: int) -> None:
+    law = replace(HALT, speed_limit=speed, torque_limit=limit)
+    looks = math.ceil(limit / (3e-3 * speed * PERIOD)) + 3
+    if looks > 5000:
+        return
+    motors = held(law, angle, angle + sign * 10.0, looks)
+    assert (np.abs(motors.torques) >= limit * (1 - 1e-9)).all()
+    assert (np.abs(motors.torques) < limit + 3e-3 * speed * PERIOD * (1 + 1e-9)).all()
+    assert motors.halted.all()
+    stopped = motors.commands.copy()
+    assert (held(law, angle, angle + sign * 10.0, 50, motors).commands == stopped).all()
+
+
+def test_halting_motor_gives_way_at_once_and_goes_on_when_freed() -> None:
+    motors = held(HALT, 0.5, 1.0, 40)
+    stopped = motors.commands.copy()
+    assert motors.halted.all()
+    # Told to go back: it does, although the torque is still above the limit.
+    motors.look(np.full((1, 2), 0.5), np.full((1, 2), 0.4), PERIOD, STEP)
+    assert motors.commands == pytest.approx(stopped - 6 * PERIOD, rel=1e-12)
+    assert not motors.halted.any()
+    # Held again, then free: the barb follows, the torque is gone, and the motor goes on.
+    motors = held(HALT, 0.5, 1.0, 40, motors)
+    assert motors.halted.all()
+    motors.look(motors.commands.copy(), np.full((1, 2), 1.0), PERIOD, STEP)
+    assert not motors.halted.any()
+    assert motors.commands[0, 0] > stopped[0, 0]
+
+
+def test_halting_motor_that_is_overpowered_holds_its_command() -> None:
+    # A load that turns the barb against the motor: any torque is taken, none moves the command away.
+    motors = Motors(HALT, np.zeros((1, 2)))
+    for look in range(100):
+        torques = motors.look(np.full((1, 2), -1e-3 * look), np.full((1, 2), 0.5), PERIOD, STEP)
+    assert torques == pytest.approx(3e-3 * (motors.commands + 0.099), rel=1e-12)
+    assert (torques > 10 * HALT.torque_limit).all()
+    assert (motors.commands < 0.02).all()
+
+
+def test_one_barb_halts_alone() -> None:
+    motors = Motors(HALT, np.zeros((2, 2)))
+    angles = np.zeros((2, 2))
+    for look in range(40):
+        angles[0, 1] = 1.15e-3 * look  # this one is free to follow
+        motors.look(angles.copy(), np.full((2, 2), 1.0), PERIOD, STEP)
+    assert motors.halted.tolist() == [[True, False], [True, True]]
+
+
+def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> None:
+    stall = replace(HALT, law="stall")
+    motors = held(stall, 0.5, 1.0, 40)
+    stopped = motors.commands.copy()
+    assert motors.halted.all()
+    # Told to go back, where a halting motor would: it stays, as the load stays.
+    held(stall, 0.5, 0.0, 40, motors)
+    assert (motors.commands == stopped).all()
+    assert motors.halted.all()
+    # The barb yields a little: now it goes.
+    held(stall, 0.501, 0.0, 1, motors)
+    assert (motors.commands == stopped - 6 * PERIOD).all()
+    assert not motors.halted.any()
+
+
+# -- the slipping law --------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=40))
+def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
+    motors, free = Motors(SLIP, np.zeros((1, 2))), Motors(replace(HALT, torque_limit=1.0), np.zeros((1, 2)))
+    for angle in angles:
+        at = np.full((1, 2), angle)
+        torques = motors.look(at, np.full((1, 2), 0.02), PERIOD, STEP)
+        unlimited = free.look(at, np.full((1, 2), 0.02), PERIOD, STEP)
+        assert (np.abs(torques) <= SLIP.torque_limit).all()
+        # Below the limit it is the spring that the other law has as well; the command follows the schedule anyway.
+        assert torques == pytest.approx(np.clip(unlimited, -1.6e-5, 1.6e-5), abs=1e-20)
+        assert (motors.commands == free.commands).all()
+
+
+# -- work --------------------------------------------------------------------------------------------------------------
+
+
+def test_work_against_a_held_command_is_the_springs() -> None:
+    # The command stays; the barb is turned by hand along any path: ∫ k (c - α) dα depends on its ends alone.
+    motors = Motors(HALT, np.zeros((1, 2)))
+    path = np.array([0.0, 0.001, 0.004, -0.002, -0.003, 0.002, 0.002, 0.002])
+    for angle in path:
+        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
+    assert motors.work == pytest.approx(np.full((1, 2), -3e-3 * 0.002**2 / 2), rel=1e-12)
+
+
+def test_work_of_a_slipping_motor_is_limit_times_way() -> None:
+    motors = Motors(SLIP, np.zeros((1, 2)))
+    for angle in np.linspace(0, 0.5, 2001):  # wound up after 5.3 mrad
+        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
+    wound = 1.6e-5 / 3e-3
+    expected = -(1.6e-5 * (0.5 - wound) + 1.6e-5 * wound / 2)
+    assert motors.work == pytest.approx(np.full((1, 2), expected), rel=1e-3)
+
+
+@pytest.mark.parametrize("law", [replace(HALT, torque_limit=1.0), SLIP])
+def test_work_is_the_energy_that_a_barb_gains(law: MotorLaw) -> None:
+    # A barb of its own, integrated as YADE does: velocities half a step after angles, the torque at every step, a look
+    # every five. What the motor tells must be the kinetic energy at the half step after the look.
+    inertia, steps = 9e-10, 5
+    motors, angle, speed, energies, works = Motors(law, np.zeros((1, 2))), 0.0, 0.0, [], []
+    for look in range(1000):
+        motors.look(np.full((1, 2), angle), np.full((1, 2), 3.0 * PERIOD * (look + 1)), PERIOD, STEP)
+        works.append(motors.work[0, 0])
+        energies.append(inertia * speed**2 / 2)
+        for _ in range(steps):
+            angle += speed * STEP
+            torque = law.stiffness * (motors.commands[0, 0] - angle)
+            limit = law.torque_limit if law.law == "slip" else math.inf
+            speed += float(np.clip(torque, -limit, limit)) / inertia * STEP
+    # Energy goes back and forth, twice the mean of a swing about ω. A hundredth of that: trapezia over five steps of a
+    # vibration of ninety. Counting a torque from the look on, half a step early, would add k ω² dt/2 all the time.
+    assert np.ptp(energies) == pytest.approx(2 * inertia * 3.0**2, rel=0.1)
+    early = law.stiffness * 3.0**2 * STEP / 2 * 1000 * PERIOD
+    assert early > 4 * np.ptp(energies)
+    assert np.array(works) == pytest.approx(np.array(energies), abs=0.1 * np.ptp(energies))
+
+
+def test_engaging_forgets_torque_but_not_work() -> None:
+    motors = held(HALT, 0.5, 1.0, 40)
+    motors.look(np.full((1, 2), 0.502), np.full((1, 2), 1.0), PERIOD, STEP)
+    work = motors.work.copy()
+    assert (work > 0).all()
+    motors.engage(np.full((1, 2), 0.7))
+    assert (motors.commands == 0.7).all()
+    assert (motors.torques == 0).all()
+    assert not motors.halted.any()
+    motors.look(np.full((1, 2), 0.7), np.full((1, 2), 0.7), PERIOD, STEP)
+    assert (motors.work == work).all()  # the way in between was not the motor's
+
+
+# -- memory ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", [HALT, SLIP])
+def test_memory_through_json_keeps_every_bit(law: MotorLaw) -> None:
+    rng = np.random.default_rng(3)
+    way = np.cumsum(rng.normal(size=(60, 4, 2)), axis=0) * 2e-3
+    motors = Motors(law, way[0])
+    for angles in way[:30]:
+        motors.look(angles, angles + rng.normal(size=(4, 2)) * 0.01, PERIOD, STEP)
+    assert motors.halted.any()
+    assert not motors.halted.all()
+    again = Motors(law, np.zeros((4, 2)))
+    again.restore(json.loads(json.dumps(motors.memory)))
+    assert again.halted.tolist() == motors.halted.tolist()
+    assert again.memory == motors.memory
+    for angles in way[30:]:
+        for one in (motors, again):
+            one.look(angles, way[-1], PERIOD, STEP)
+        for name in ("commands", "angles", "torques", "work", "halted"):
+            first, second = getattr(motors, name), getattr(again, name)
+            assert first.dtype == second.dtype, name
+            assert first.tobytes() == second.tobytes(), name
+
+
+def test_memory_is_a_copy() -> None:
+    motors = Motors(HALT, np.zeros((1, 2)))
+    memory = motors.memory
+    held(HALT, 0.0, 1.0, 10, motors)
+    assert memory["commands"] == [[0.0, 0.0]]
+
+
+# -- servos ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_servo_is_a_damped_spring_capped_as_a_whole_each_with_its_own_strength() -> None:
+    law = MotorLaw(torque_limit=0.05, speed_limit=6.0, stiffness=0.1, law="servo", damping=1e-3)
+    home, strengths = np.full((1, 2), 1.5), np.array([[1.0, 0.8]])
+    motors = Motors(law, home, strengths)
+    torques = motors.look(home - 0.2, home, 1e-4, 1e-4, np.full((1, 2), -2.0))
+    assert torques == pytest.approx(np.array([[0.1 * 0.2 + 2e-3, 0.08 * 0.2 + 2e-3]]))
+    assert not motors.halted.any()
+    torques = motors.look(home - 0.49, home, 1e-4, 1e-4, np.full((1, 2), -2.0))
+    assert torques == pytest.approx(np.array([[0.05, 0.04]]))
+    # It remembers where it is to be, however far it was turned.
+    assert (motors.commands == home).all()
+    kept = Motors(law, home, strengths)
+    kept.restore(motors.memory)
+    after = [m.look(home - 0.1, home, 1e-4, 1e-4, np.zeros((1, 2))) for m in (motors, kept)]
+    assert (after[0] == after[1]).all()
+    assert (motors.work == kept.work).all()

@@ -1,0 +1,75 @@
+"""What is told of a scene before it runs: intervals longer than the run, hooks that one smarticle can hold."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from scenes import small
+
+from dem.plan.advice import warnings_of
+from dem.plan.outlook import plan
+
+DEPOSIT, RELAX, PULL = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}, {"type": "pull-hook"}
+W = 0.0117
+
+
+def test_a_plain_scene_has_no_warnings() -> None:
+    assert warnings_of(small()) == ()
+    assert plan(small()).warnings == ()
+
+
+def test_length_of_a_run_is_estimated_where_a_pour_is_in_it() -> None:
+    planned, phases = plan(small()), small().phases
+    length = sum(phase.expected_duration(10) for phase in phases)
+    # Two layers of 0.1 s, 0.2 s to settle, 0.1 s of rest, 0.2 s of shaking.
+    assert length == pytest.approx(0.7)
+    assert length == pytest.approx(sum(phase.estimate_s for phase in planned.phases))
+    assert [phase.known_duration for phase in phases] == [None, 0.1, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
+)
+def test_an_interval_longer_than_the_run_is_told(key: str, left_out: str) -> None:
+    assert warnings_of(small({f"recording.{key}": 0.68})) == ()
+    scene = small({f"recording.{key}": 10.0})
+    (told,) = plan(scene).warnings
+    assert told == (
+        f"recording.{key}: 10 s is longer than the whole run, about 0.7 s, so that {left_out}; shorten it, or lengthen "
+        "the run"
+    )
+    assert told == warnings_of(scene)[0]
+    assert f"warning: {told}" in plan(scene).to_text().splitlines()
+    assert json.loads(json.dumps(plan(scene).to_dict()))["warnings"] == [told]
+
+
+def test_samples_further_apart_than_a_pour_are_told() -> None:
+    recording = {"series_interval_s": 1.0, "frame_interval_s": 1.0, "checkpoint_interval_s": None}
+    told = warnings_of(small({"phases": [DEPOSIT], "recording": recording}))
+    assert [line.partition(":")[0] for line in told] == ["recording.series_interval_s", "recording.frame_interval_s"]
+    assert "one sample is taken, at the start" in told[0]
+
+
+def hooked(phases: list[dict[str, Any]], **hooks: float) -> tuple[str, ...]:
+    return warnings_of(small({"hooks": hooks, "phases": phases}))
+
+
+def test_hooks_that_one_smarticle_can_hold_are_told() -> None:
+    (told,) = hooked([DEPOSIT, RELAX, PULL])
+    assert told == (
+        "hooks.upper_height_m: the hooks are 0.0055 m from outside to outside, less than a smarticle's inner length, "
+        "0.0104 m: one smarticle can hold both hooks, and then only the contacts give way; set them at least 0.00995 m "
+        "apart, or give pull-hook a force_limit_N"
+    )
+    # A pull that stops in time, and hooks that stay where they are, pull nothing apart.
+    assert hooked([DEPOSIT, RELAX, PULL | {"force_limit_N": 0.2}]) == ()
+    assert hooked([DEPOSIT, RELAX]) == ()
+
+
+def test_hooks_that_are_far_enough_apart_are_not() -> None:
+    enough = W - small().sphere_diameter - 0.5e-3
+    for apart, count in ((0.99 * enough, 1), (1.01 * enough, 0)):
+        found = hooked([DEPOSIT, RELAX, PULL], lower_height_m=5e-3, upper_height_m=5e-3 + apart)
+        assert len(found) == count

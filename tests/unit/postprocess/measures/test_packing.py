@@ -1,0 +1,217 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem.errors import InputError
+from postprocess import DEFINITIONS, UndefinedMeasureError, packing_fraction
+from postprocess.geometry.region import Region, inner_region
+from postprocess.geometry.voronoi import local_packing
+from postprocess.geometry.voxel import solid_fraction
+
+T1, T2 = 0.11, 0.05
+SOLID = T1 * T2 * 2.4
+# Links of a U overlap at its two hinges, by a quarter of t2² each.
+UNION = SOLID - T1 * T2**2 / 2
+
+
+def lattice(shape, cell, *, radius, layers, floor_z=0.0, turn=None, axis=(0.0, 0.0)):
+    """Equal smarticles at every point of a rectangular lattice inside a cylinder."""
+    a, b, c = cell
+    steps = np.arange(-int(radius / min(a, b)) - 1, int(radius / min(a, b)) + 2)
+    grid = np.stack(np.meshgrid(steps * a, steps * b, (np.arange(layers) + 0.5) * c), axis=-1)
+    places = grid.reshape(-1, 3)
+    places = places[np.hypot(places[:, 0], places[:, 1]) < radius]
+    form = shape(1.0, 0.7) - shape(1.0, 0.7).mean(axis=0)
+    if turn is not None:
+        form = form @ turn.T
+    return form + places[:, None] + [*axis, floor_z]
+
+
+CELL = (1.2, 0.9, 0.8)
+DENSITY = SOLID / math.prod(CELL)
+FLOOR, AXIS = 3.0, (2.0, -1.0)
+
+
+@pytest.fixture(scope="module")
+def pile(shape):
+    """Smarticles of known density, turned oddly, in a cylinder of radius 4 off the origin."""
+    turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
+    return lattice(shape, CELL, radius=4.0, layers=6, floor_z=FLOOR, turn=turn, axis=AXIS)
+
+
+def phi(pile, definition, **changes):
+    arguments = {
+        "radius": 4.0,
+        "solid_volume": SOLID,
+        "floor_z": FLOOR,
+        "axis": AXIS,
+        "thickness_normal": T1,
+        "thickness_in_plane": T2,
+        "spacing": 0.25 if definition == "voronoi" else None,
+    }
+    return packing_fraction(pile, definition=definition, **(arguments | changes))
+
+
+def test_every_definition_names_itself_and_finds_the_lattice_density(pile):
+    # Loose, since the wall and the surface of so small a lattice are ragged and the cuts of the
+    # voxels split its layers; the exact tests of both follow below.
+    allowed = {"second-highest-com": 0.15, "top-percentile": 0.15, "voxel": 0.15, "voronoi": 0.04}
+    assert set(allowed) == set(DEFINITIONS)
+    for definition, tolerance in allowed.items():
+        result = phi(pile, definition)
+        assert result.definition == definition
+        wanted = DENSITY * (UNION / SOLID if definition == "voxel" else 1)
+        assert result.value == pytest.approx(wanted, rel=tolerance)
+        assert result.height == pytest.approx(6 * 0.8, rel=0.1)
+
+
+def test_voxels_find_the_lattice_density(shape):
+    # Cuts a whole number of layers apart, so that it does not matter where they split them, and
+    # an inner radius of many cells.
+    turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
+    pile = lattice(shape, CELL, radius=8.0, layers=5, turn=turn)
+    region = Region(radius=6.5, bottom=1.1, top=1.1 + 2 * CELL[2])
+    value = solid_fraction(pile, region, thickness_normal=T1, thickness_in_plane=T2)
+    assert value == pytest.approx(DENSITY * UNION / SOLID, rel=0.02)
+
+
+def test_definitions_have_one_line_each():
+    for meaning in DEFINITIONS.values():
+        assert meaning
+        assert "\n" not in meaning
+
+
+def test_second_highest_centre_of_mass_by_hand(shape):
+    flat = shape(1.0)
+    vertices = [flat + np.array([0, 0, z]) for z in (1.0, 9.0, 3.0, 2.0)]
+    result = packing_fraction(vertices, radius=2.0, solid_volume=0.1, floor_z=0.5)
+    assert result.definition == "second-highest-com"
+    assert result.height == pytest.approx(2.5)
+    # No factor for the radius: r² as given.
+    assert result.value == pytest.approx(4 * 0.1 / (math.pi * 4 * 2.5))
+
+
+def test_top_percentile_by_hand():
+    bar = np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, 3], [0, 0, 4]])
+    bars = [bar + np.array([x, 0, 0]) for x in (0, 1)]
+    result = packing_fraction(bars, radius=2.0, solid_volume=0.1, definition="top-percentile")
+    assert result.height == pytest.approx(3.8)
+    assert result.value == pytest.approx(0.2 / (math.pi * 4 * 3.8))
+    lower = packing_fraction(bars, radius=2.0, solid_volume=0.1, definition="top-percentile", percentile=50)
+    assert lower.height == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("rotation", [(0, 0, 0), (0.5, 0.1, 1.3)])
+def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
+    turn = Rotation.from_rotvec(rotation).as_matrix()
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
+    value = solid_fraction(
+        [shape(1.0, 0.7) @ turn.T],
+        region,
+        thickness_normal=T1,
+        thickness_in_plane=T2,
+        pitch=T2 / 5,
+    )
+    assert value * region.volume == pytest.approx(UNION, rel=0.01)
+
+
+def test_voxels_tell_the_two_thicknesses_apart(shape):
+    # A slab thinner than the box is tall cuts t1 (along z here) but not t2.
+    slab = Region(radius=2.0, bottom=-T2 / 2, top=T2 / 2)
+    sizes = {"thickness_normal": T1, "thickness_in_plane": T2, "pitch": T2 / 8}
+    value = solid_fraction([shape(1.0, 0.7)], slab, **sizes)
+    assert value * slab.volume == pytest.approx(UNION * T2 / T1, rel=0.02)
+
+
+def test_voxels_inside_solid_are_all_full():
+    bar = np.array([[[-2.0, 0, 0], [-1, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    inside = Region(radius=0.4, bottom=-0.4, top=0.4)
+    value = solid_fraction(bar, inside, thickness_normal=1, thickness_in_plane=1, pitch=0.02)
+    assert value == pytest.approx(1.0, rel=0.01)
+
+
+def test_voxels_count_overlaps_once(shape):
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
+    sizes = {"thickness_normal": T1, "thickness_in_plane": T2}
+    once = solid_fraction([shape(1.0)], region, **sizes)
+    assert solid_fraction([shape(1.0), shape(1.0)], region, **sizes) == once
+
+
+def test_voxels_of_bars_without_barbs(shape):
+    region = Region(radius=2.0, bottom=-2.0, top=2.0)
+    bar = [shape(1.0, 0.0)]
+    value = solid_fraction(bar, region, thickness_normal=T1, thickness_in_plane=T2, pitch=T2 / 5)
+    assert value * region.volume == pytest.approx(T1 * T2, rel=0.01)
+
+
+def test_voronoi_cells_of_a_lattice_are_its_cells(pile):
+    # Wall, floor and lid further off than any void of the lattice is wide.
+    container = Region(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
+    region = inner_region(container, inner=0.4, low=0.4, high=0.6)
+    local = local_packing(pile, container, region, solid_volume=SOLID, spacing=0.25)
+    assert 10 < local.interior.sum() < len(pile) / 4
+    assert local.volumes[local.interior] == pytest.approx(math.prod(CELL), rel=1e-6)
+    assert local.value == pytest.approx(DENSITY, rel=1e-6)
+
+
+def test_voronoi_cells_fill_the_container(scene):
+    # Dense enough that images in wall, floor and lid close every cell.
+    count, rng = 150, np.random.default_rng(0)
+    angle, distance = rng.uniform(0, 2 * np.pi, count), 0.8 * np.sqrt(rng.uniform(0, 1, count))
+    places = [distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.2, 1.8, count)]
+    vertices = 0.2 * scene(count, 2, box=0.0) + np.stack(places, axis=1)[:, None]
+    container = Region(radius=1.0, bottom=0.0, top=2.0)
+    local = local_packing(vertices, container, container, solid_volume=1.0, spacing=0.05)
+    assert local.interior.all()
+    # The wall is a polygon around the circle, so the sum comes out a little high.
+    assert local.volumes.sum() == pytest.approx(container.volume, rel=0.05)
+    assert local.volumes.sum() >= container.volume
+
+
+def test_denser_pile_packs_denser(pile):
+    floor = np.array([*AXIS, FLOOR])
+    centre = pile.mean(axis=1, keepdims=True) - floor
+    squeezed = pile + centre * np.array([0, 0, -0.2])
+    for definition in DEFINITIONS:
+        ratio = phi(squeezed, definition).value / phi(pile, definition).value
+        assert ratio == pytest.approx(1.25, rel=0.06)
+
+
+@pytest.mark.parametrize("definition", DEFINITIONS)
+def test_too_few_smarticles_have_no_packing_fraction(shape, definition):
+    for vertices in (np.empty((0, 4, 3)), [shape()]):
+        with pytest.raises(UndefinedMeasureError, match="at least 2 smarticles"):
+            phi(vertices, definition)
+
+
+@pytest.mark.parametrize("definition", DEFINITIONS)
+def test_pile_below_its_floor_is_refused(pile, definition):
+    with pytest.raises(UndefinedMeasureError, match="no height above its floor"):
+        phi(pile, definition, floor_z=50.0)
+
+
+@pytest.mark.parametrize("definition", ["voxel", "voronoi"])
+def test_empty_inner_region_is_refused_instead_of_zero(shape, definition):
+    ring = [shape(1.0) + np.array([3, 0, z]) for z in (3.5, 4.0, 5.0)]
+    with pytest.raises(UndefinedMeasureError, match="inner region"):
+        phi(np.array(ring), definition, axis=(0.0, 0.0), inner=0.3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"definition": "guess"}, "unknown definition .* 'guess': .*'voxel'"),
+        ({"radius": 0.0}, "radius must be above 0 m: got 0.0 m"),
+        ({"solid_volume": float("nan")}, "solid_volume must be above 0 m³"),
+        ({"definition": "voxel", "thickness_normal": None}, "needs thickness_normal"),
+        ({"definition": "voxel", "spacing": 1.0}, "pitch"),
+        ({"definition": "voronoi", "spacing": -1.0}, "spacing of the points"),
+        ({"definition": "voxel", "inner": 1.5}, "inner must be"),
+        ({"definition": "voronoi", "low": 0.9}, "low and high"),
+    ],
+)
+def test_bad_arguments(pile, changes, message):
+    with pytest.raises(InputError, match=message):
+        phi(pile, **({"definition": "top-percentile"} | changes))

@@ -1,0 +1,74 @@
+"""A measure is one file with one registration: tables have its columns, and nothing else names it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from synthetic import SyntheticRun, write_run
+
+from postprocess import measure_run, measures, summarise_run
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
+from postprocess.measures.registry import frame_measures, registered
+
+SOURCE = """
+from postprocess.measures.registry import FrameMeasure, Quantity
+
+MEASURES = (
+    FrameMeasure(
+        name="newest",
+        place=55,
+        quantities=(Quantity("newest height", "m"), Quantity("{other}", "-")),
+        take=lambda frame, run: (frame.vertices[..., 2].max(), float(run.count)),
+    ),
+)
+"""
+
+
+@pytest.fixture
+def add_measure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Adds a module to the package for the time of a test."""
+
+    def add(other: str) -> None:
+        (tmp_path / "newest.py").write_text(SOURCE.replace("{other}", other))
+        monkeypatch.setattr(measures, "__path__", [*measures.__path__, str(tmp_path)])
+        registered.cache_clear()
+
+    yield add
+    sys.modules.pop("postprocess.measures.newest", None)
+    registered.cache_clear()
+
+
+def test_a_new_file_is_a_new_measure_in_every_table(tmp_path: Path, add_measure) -> None:
+    run = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=2))
+    before = list(measure_run(run, costly="never").columns)
+    add_measure("newest share")
+    table = measure_run(run, costly="never")
+    new = ["newest height [m]", "newest share [-]"]
+    at = before.index("contacts mean [-]") + 1
+    assert list(table.columns) == [*before[:at], *new, *before[at:]]
+    assert (table["newest share [-]"] == 12).all()
+    assert table["newest height [m]"].gt(0).all()
+    assert "newest height SE [m]" in summarise_run(run, costly="never")
+
+
+def test_columns_that_are_there_already_are_refused(add_measure) -> None:
+    add_measure("contacts mean")
+    with pytest.raises(ValueError, match=r"measures share a header: contacts mean \[-\]"):
+        registered()
+
+
+def test_every_measure_has_a_name_and_units() -> None:
+    assert len(registered()) > 8
+    for measure in registered():
+        assert measure.name
+        assert measure.quantities
+        assert all(quantity.label and quantity.unit for quantity in measure.quantities)
+
+
+def test_definitions_come_last_in_the_order_asked_for() -> None:
+    names = [measure.name for measure in frame_measures(["voxel", "second-highest-com"])]
+    assert names[-2:] == ["phi voxel", "phi second-highest-com"]
+    costly = {m.definition for m in frame_measures(list(DEFINITIONS)) if m.costly}
+    assert costly == set(COSTLY_DEFINITIONS)

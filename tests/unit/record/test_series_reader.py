@@ -1,0 +1,83 @@
+import h5py
+import numpy as np
+import pytest
+
+from dem.errors import InputError
+from postprocess import read_series
+
+
+def test_series_holds_values_units_and_descriptions(run):
+    series = read_series(run)
+    np.testing.assert_allclose(series.time, [0, 0.1, 0.2])
+    np.testing.assert_allclose(series["container_force_N"][2], [0.2, 0.4, 0.6])
+    assert series.units["kinetic_energy_J"] == "J"
+    assert series.descriptions["phase"] == "index of the phase in the scene"
+    assert (series.scene_sha256, series.seed, len(series)) == ("abc", 7, 3)
+    assert series.nearest(0.14) == 1
+    with pytest.raises(ValueError, match="read-only"):
+        series.time[0] = 1
+
+
+def test_series_of_a_scene_that_actuates_holds_a_column_per_barb(run):
+    angles = np.radians([[90.0, 90.0], [80.0, 100.0], [0.0, -5.0]])
+    with h5py.File(run / "series.h5", "a") as file:
+        file.create_dataset("angle_rad", data=angles).attrs.update({"unit": "rad", "description": ""})
+    series = read_series(run)
+    np.testing.assert_array_equal(series["angle_rad"], angles)
+    assert series.units["angle_rad"] == "rad"
+
+
+def test_unknown_name_lists_what_there_is(run):
+    with pytest.raises(InputError, match=r"no series 'heat'; choose one of: .*kinetic_energy_J"):
+        read_series(run)["heat"]
+
+
+def test_missing_series(tmp_path):
+    with pytest.raises(InputError, match=r"series\.h5: no such file"):
+        read_series(tmp_path)
+
+
+@pytest.mark.parametrize("kept", [0, 20, 0.5, 0.9])
+def test_truncated_series(run, kept):
+    path = run / "series.h5"
+    data = path.read_bytes()
+    path.write_bytes(data[: kept if isinstance(kept, int) else int(kept * len(data))])
+    with pytest.raises(InputError, match=r"cannot read series .*series\.h5: ") as error:
+        read_series(run)
+    assert "\n" not in str(error.value)
+
+
+def _drop(name):
+    def change(file):
+        del file[name]
+
+    return change
+
+
+def _replace(name, values):
+    def change(file):
+        del file[name]
+        file.create_dataset(name, data=values).attrs.update({"unit": "-", "description": ""})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_drop("time_s"), "dataset 'time_s' is missing"),
+        (_drop("phase"), "dataset 'phase' is missing"),
+        (_replace("phase", np.zeros(2)), "'phase' has shape"),
+        (_replace("kinetic_energy_J", np.zeros((3, 4))), "'kinetic_energy_J' has shape"),
+        (_replace("kinetic_energy_J", np.zeros((2, 2))), "'kinetic_energy_J' has shape"),
+        (lambda file: file.attrs.__delitem__("seed"), "attribute 'seed' is missing"),
+        (lambda file: file.attrs.__setitem__("format", 9), "'format' must be 1: got 9"),
+        (lambda file: file["phase"].attrs.__delitem__("unit"), "KeyError"),
+    ],
+)
+def test_series_that_breaks_the_contract(run, change, message):
+    with h5py.File(run / "series.h5", "a") as file:
+        change(file)
+    with pytest.raises(InputError, match=message) as error:
+        read_series(run)
+    assert "\n" not in str(error.value)

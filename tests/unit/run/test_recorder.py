@@ -1,0 +1,117 @@
+"""What is due at a sample: rows, frames, spheres, and the watchdog's looks; from an engine in memory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from double import EngineDouble
+from scenes import small
+from scipy.spatial.transform import Rotation
+
+from dem.body.placement import Poses
+from dem.errors import RunError
+from dem.record.progress import ProgressWriter
+from dem.run.build import build_recorder
+from dem.run.recorder import WATCH_STEPS, Recorder
+from dem.scene.scene import Scene
+
+RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.012, "sphere_interval_s": 0.02}
+DT = 3e-4
+
+
+def start(out: Path, heights: Sequence[float] = (0.02, 0.03), **changes: Any) -> tuple[Scene, EngineDouble, Recorder]:
+    scene = small({"recording": RECORDING | {"checkpoint_interval_s": None}, **changes})
+    engine = EngineDouble.of(scene, DT)
+    positions = np.array([[0.0, 0.0, height] for height in heights]).reshape(-1, 3)
+    engine.add(Poses(positions, (Rotation.identity(),) * len(heights)))
+    return scene, engine, build_recorder(scene, out, ProgressWriter(out, scene.count, show=False))
+
+
+def take(engine: EngineDouble, recorder: Recorder, samples: int) -> None:
+    for _ in range(samples):
+        engine.advance(recorder.next_step - engine.steps)
+        recorder.record(engine, 0)
+
+
+def files(out: Path) -> dict[str, list[str]]:
+    return {name: sorted(path.name for path in (out / name).iterdir()) for name in ("frames", "spheres")}
+
+
+def test_samples_are_taken_at_the_steps_nearest_to_their_times(tmp_path: Path) -> None:
+    _, engine, recorder = start(tmp_path)
+    recorder.record(engine, 0)
+    steps = []
+    for sample in range(1, 30):
+        steps.append(recorder.next_step)
+        take(engine, recorder, 1)
+        assert abs(engine.time - sample * 0.004) <= DT / 2 + 1e-12
+    assert steps[:3] == [13, 27, 40]
+    # Another step from now on: the grid of samples stays.
+    engine.set_time_step(7e-5)
+    recorder.schedule(engine)
+    take(engine, recorder, 1)
+    assert abs(engine.time - 30 * 0.004) <= 7e-5 / 2 + 1e-12
+
+
+def test_frames_and_spheres_are_taken_every_so_many_samples_where_there_is_something(tmp_path: Path) -> None:
+    _, engine, recorder = start(tmp_path, heights=())
+    take(engine, recorder, 3)
+    assert not (tmp_path / "frames").exists()
+    engine.add(Poses(np.array([[0.0, 0.0, 0.03]]), (Rotation.identity(),)))
+    take(engine, recorder, 10)
+    # Samples 0 to 12: frames at 3, 6, 9, 12, spheres at 5 and 10.
+    assert {name: len(found) for name, found in files(tmp_path).items()} == {"frames": 4, "spheres": 2}
+    recorder.series.write()
+    with h5py.File(tmp_path / "series.h5") as file:
+        assert len(file["time_s"]) == 13
+        assert file["count"][:].tolist() == [0] * 3 + [1] * 10
+
+
+def test_it_goes_on_from_its_memory_and_takes_away_what_came_after(tmp_path: Path) -> None:
+    scene, engine, recorder = start(tmp_path)
+    take(engine, recorder, 8)
+    memory, columns, saved = json.loads(json.dumps(recorder.memory)), recorder.series.columns, engine.save(tmp_path)
+    take(engine, recorder, 8)
+    ends = files(tmp_path), recorder.series.columns
+    again = build_recorder(scene, tmp_path, ProgressWriter(tmp_path, scene.count, show=False))
+    engine = EngineDouble.of(scene, DT)
+    engine.load(saved, tmp_path)
+    again.restore(memory, columns)
+    assert {name: len(found) for name, found in files(tmp_path).items()} == {"frames": 3, "spheres": 2}
+    take(engine, again, 8)
+    assert files(tmp_path) == ends[0]
+    for name, column in ends[1].items():
+        assert np.array_equal(again.series.columns[name], column, equal_nan=True), name
+
+
+def test_the_watchdog_looks_every_so_many_steps_and_after_the_frame_is_written(tmp_path: Path) -> None:
+    _, engine, recorder = start(tmp_path, heights=[0.02] * 3)
+    every = round(WATCH_STEPS * DT / 0.004)
+    assert every > 10
+    take(engine, recorder, 2 * every)  # samples 0 to 2 every - 1: looks at 0 and at every
+    assert engine.touches().all()
+    engine.deepest = recorder.watchdog.depth * 1.1
+    frames = len(files(tmp_path)["frames"])
+    recorder.frame_every = 1
+    with pytest.raises(RunError, match=r"smarticle\(s\) \(0, 1, 2\): contacts more than .* deep"):
+        recorder.record(engine, 0)
+    assert len(files(tmp_path)["frames"]) == frames + 1
+
+
+def test_energy_from_nowhere_is_seen_against_what_was_given(tmp_path: Path) -> None:
+    _, engine, recorder = start(tmp_path)
+    recorder.watch(engine)
+    engine.fixtures.shake(amplitude=5e-4, frequency=30)
+    for _ in range(20):  # the container's work is known, and so is what the impact takes
+        engine.advance(50)
+        recorder.watch(engine)
+    engine.fixtures.stop()
+    engine.velocities[:, 2] = 3.0
+    with pytest.raises(RunError, match="an energy that has risen by"):
+        recorder.watch(engine)

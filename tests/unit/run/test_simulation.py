@@ -1,0 +1,241 @@
+"""Whole runs on an engine in memory: what dem does is the same whichever engine computes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from double import EngineDouble, KindDouble
+from scenes import CHAIN, SMALL, changed
+
+from dem.errors import InputError, RunError
+from dem.plan.outlook import plan
+from dem.plan.steps import time_steps
+from dem.run.run import RunOutcome, run_scene
+from dem.run.simulation import Simulation, StopRequestedError
+from dem.scene.reading import load_scene, parse_scene, scene_hash
+from dem.scene.scene import Scene
+
+SWING = {"type": "internal-oscillation", "theta_deg": 4, "duration_s": 0.05}
+DEPOSIT, RELAX = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}
+SHAKE, PULL = {"type": "shake", "duration_s": 0.05}, {"type": "pull-hook", "distance_m": 2e-3, "speed_m_per_s": 0.02}
+REMOVE = {"type": "remove-container", "duration_s": 0.3, "speed_m_per_s": 0.1}
+RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04, "energy": True}
+SCENES = {
+    "rested": (SMALL, {"phases": [DEPOSIT, RELAX]}),
+    "shaken": (SMALL, {"phases": [DEPOSIT, SHAKE, RELAX]}),
+    "actuated": (SMALL, {"phases": [DEPOSIT, SWING, RELAX, SWING]}),
+    "pulled and lifted": (SMALL, {"phases": [DEPOSIT, PULL, REMOVE, SHAKE], "hooks": {}}),
+    "strained": (CHAIN, {"phases.1.speed_m_per_s": 0.1}),
+}
+
+
+def scene_of(name: str, **changes: Any) -> Scene:
+    data, more = SCENES[name]
+    recording = RECORDING | ({"series_interval_s": 1e-3} if data is CHAIN else {})
+    return parse_scene(changed(data, {**more, "recording": recording, **changes}), source=name)
+
+
+@pytest.fixture
+def kind(monkeypatch: pytest.MonkeyPatch) -> KindDouble:
+    """The engine of every scene is the double."""
+    kind = KindDouble()
+    monkeypatch.setattr("dem.engine.yade.kind.YadeKind", lambda: kind)
+    return kind
+
+
+def run(scene: Scene, out: Path, **how: Any) -> RunOutcome | None:
+    return run_scene(scene, out, command="test", progress=False, **how)
+
+
+def series(out: Path) -> dict[str, bytes]:
+    with h5py.File(out / "series.h5") as file:
+        return {name: dataset[()].tobytes() for name, dataset in file.items()}
+
+
+def frames(out: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in (out / "frames").iterdir()}
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Makes the next run stop as if the machine had failed, right after so many checkpoints."""
+
+    def at(number: int) -> None:
+        left = [number]
+        taken = Simulation._checkpoint
+
+        def checkpoint(simulation: Simulation) -> None:
+            taken(simulation)
+            left[0] -= 1
+            if not left[0]:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(Simulation, "_checkpoint", checkpoint)
+
+    return at
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_writes_what_every_run_writes(kind: KindDouble, tmp_path: Path, name: str) -> None:
+    scene, out = scene_of(name), tmp_path / "run"
+    outcome = run(scene, out)
+    assert outcome is not None
+    (engine,) = kind.built
+    assert (outcome.time_s, outcome.steps) == (engine.time, engine.steps)
+    assert load_scene(out / "scene.yaml") == scene
+    manifest, done = (json.loads((out / file).read_text()) for file in ("run.json", "done.json"))
+    assert manifest["scene_sha256"] == scene_hash(scene)
+    assert manifest["versions"]["double"] == "1"
+    assert "yade" not in manifest["versions"]
+    assert [phase["type"] for phase in done["phases"]] == [phase.kind for phase in scene.phases]
+    for phase, entry, following in zip(scene.phases, done["phases"], [*done["phases"][1:], None], strict=True):
+        if phase.known_duration is not None and phase.kind != "strain":  # which ends when the chain parts
+            assert entry["end_s"] - entry["start_s"] == pytest.approx(phase.known_duration, abs=engine.time_step)
+        assert entry["end_s"] == (done["time_s"] if following is None else following["start_s"])
+    with h5py.File(out / "series.h5") as file:
+        assert file["count"][-1] == scene.count
+        assert abs(file["time_s"][-1] - outcome.time_s) <= scene.recording.series_interval_s
+        assert {index for index, phase in enumerate(done["phases"]) if phase["end_s"] > phase["start_s"]} == set(
+            file["phase"][1:].tolist()
+        )
+    assert len(frames(out)) > 3
+    assert plan(scene).phases[0].time_step_s == time_steps(scene)[0] == manifest["phases"][0]["time_step_s"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_that_is_gone_on_with_gives_the_same_bits(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, name: str
+) -> None:
+    scene = scene_of(name)
+    run(scene, tmp_path / "straight")
+    for _ in range(2):
+        interrupted(1)
+        with pytest.raises(KeyboardInterrupt):
+            run(scene, tmp_path / "resumed", resume=(tmp_path / "resumed").exists())
+    assert json.loads((tmp_path / "resumed" / "failed.json").read_text())["status"] == "interrupted"
+    interrupted(10_000)
+    run(scene, tmp_path / "resumed", resume=True)
+    assert len(kind.built) == 4
+    assert kind.built[-1].steps == kind.built[0].steps
+    assert series(tmp_path / "straight") == series(tmp_path / "resumed")
+    assert frames(tmp_path / "straight") == frames(tmp_path / "resumed")
+    assert not (tmp_path / "resumed" / "failed.json").exists()
+
+
+def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
+    scene = scene_of("rested")
+    run(scene, tmp_path)
+    assert run(scene, tmp_path, resume=True) is None
+    assert len(kind.built) == 1
+
+
+def test_another_scene_or_another_version_does_not_go_on(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupted(2)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene_of("rested"), tmp_path)
+    with pytest.raises(InputError, match=r"was made from another scene .* run the changed scene in another directory"):
+        run(scene_of("rested", seed=2), tmp_path, resume=True)
+    monkeypatch.setattr(kind, "name", "another")
+    with pytest.raises((InputError, RunError), match="double 1"):
+        run(scene_of("rested"), tmp_path, resume=True)
+
+
+def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, step = scene_of("rested"), EngineDouble._step
+
+    def signalled(engine: EngineDouble) -> None:
+        step(engine)
+        if engine.steps == 150:
+            os.kill(os.getpid(), signal.SIGUSR1)
+
+    monkeypatch.setattr(EngineDouble, "_step", signalled)
+    before = signal.getsignal(signal.SIGUSR1)
+    with pytest.raises(StopRequestedError, match=r"stopped as requested at the checkpoint of t = 0\.0[48]"):
+        run(scene, tmp_path)
+    assert signal.getsignal(signal.SIGUSR1) is before
+    failed = json.loads((tmp_path / "failed.json").read_text())
+    assert failed["status"] == "interrupted"
+    assert failed["checkpoint_s"] == failed["time_s"]
+
+
+def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build = kind.build
+
+    def frail(scene: Scene, time_step: float) -> EngineDouble:
+        engine = build(scene, time_step)
+        engine.stops_at = 500
+        return engine
+
+    monkeypatch.setattr(kind, "build", frail)
+    with pytest.raises(RunError, match=r"the double stopped at step 500 of \d+ \(last good checkpoint: t = 0\.\d+ s"):
+        run(scene_of("shaken"), tmp_path)
+    failed = json.loads((tmp_path / "failed.json").read_text())
+    assert failed["status"] == "failed"
+    assert failed["time_s"] == pytest.approx(kind.built[0].time)
+    assert 0 < failed["time_s"] - failed["checkpoint_s"] <= RECORDING["checkpoint_interval_s"]
+    assert not (tmp_path / "done.json").exists()
+    with h5py.File(tmp_path / "series.h5") as file:
+        assert failed["time_s"] - file["time_s"][-1] <= 0.004
+
+
+def test_a_defect_of_ours_is_told_in_the_run_directory(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(EngineDouble, "unbalanced_force", lambda engine: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run(scene_of("rested"), tmp_path)
+    assert "unexpected ZeroDivisionError" in json.loads((tmp_path / "failed.json").read_text())["cause"]
+
+
+def test_the_same_scene_is_the_same_run(kind: KindDouble, tmp_path: Path) -> None:
+    for out in ("one", "other"):
+        run(scene_of("actuated"), tmp_path / out)
+    assert series(tmp_path / "one") == series(tmp_path / "other")
+    assert kind.built[0].told == kind.built[1].told
+
+
+# -- directories that are not a run's ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("held", "what"),
+    [
+        ({"run.json": "{}", "frames.pvd": "x"}, "a run and is left as it is; go on with it by --resume, or choose"),
+        ({"notes.txt": "mine"}, "files (notes.txt, …) and is left as it is; choose"),
+    ],
+)
+def test_a_directory_that_holds_something_is_left_as_it_is(
+    kind: KindDouble, tmp_path: Path, held: dict[str, str], what: str
+) -> None:
+    for name, text in held.items():
+        (tmp_path / name).write_text(text)
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    with pytest.raises(InputError) as caught:
+        run(scene_of("rested"), tmp_path)
+    assert str(caught.value) == f"--out {tmp_path}: holds {what} another directory"
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
+    assert not kind.built
+
+
+@pytest.mark.usefixtures("kind")
+def test_out_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    out = tmp_path / "taken"
+    out.write_text("mine")
+    with pytest.raises(InputError) as caught:
+        run(scene_of("rested"), out)
+    assert str(caught.value) == f"--out {out}: cannot be made (File exists); choose another directory"
+    assert out.read_text() == "mine"

@@ -1,0 +1,215 @@
+"""Each reason for which the watchdog stops a run, with its literal text; and a healthy state that passes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scenes import make_boxes
+
+from dem.body.state import State
+from dem.errors import RunError
+from dem.physics.overlaps import Held, Overlaps
+from dem.run.watchdog import Watchdog
+from dem.setting.container import Cylinder
+
+BOXES = make_boxes()
+WATCHDOG = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed=5.0)
+
+
+def healthy() -> State:
+    positions = np.array([[0.0, 0.0, 0.01], [0.02, 0.0, 0.02], [0.0, -0.023, 0.099], [0.0, 0.0, 0.001]])
+    velocities = np.array([[0.0, 0.0, -4.9], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    return State.rigid(BOXES, positions, np.tile(np.eye(3), (4, 1, 1)), velocities, np.zeros((4, 3)))
+
+
+def check(state: State, floor: float = 0.0) -> None:
+    WATCHDOG.check(state, floor=floor, time=1.25)
+
+
+def test_healthy_states_pass() -> None:
+    check(healthy())
+    none = np.empty((0, 3))
+    check(State.rigid(BOXES, none, np.empty((0, 3, 3)), none, none))  # nothing poured yet
+    lifted = healthy()
+    lifted.positions[:, 2] += 5.0
+    check(lifted, floor=5.0)  # heights are above the floor, wherever it is
+
+
+def broken_position(state: State) -> None:
+    state.positions[1, 0] = math.nan
+
+
+def broken_velocity(state: State) -> None:
+    state.link_velocities[1, 2, 2] = math.inf
+
+
+def fast(state: State) -> None:
+    state.link_velocities[1, 2] = [0.0, 3.0, -4.1]  # a barb, not the whole
+
+
+def through_the_wall(state: State) -> None:
+    state.positions[1, :2] = [0.02, 0.02]
+
+
+def through_the_floor(state: State) -> None:
+    state.positions[1, 2] = -1e-6
+
+
+def over_the_wall(state: State) -> None:
+    state.positions[1, 2] = 0.101
+
+
+CAUSES: list[tuple[Callable[[State], None], str]] = [
+    (broken_position, "a position or velocity that is no number; lower fidelity.time_step_fraction"),
+    (broken_velocity, "a position or velocity that is no number; lower fidelity.time_step_fraction"),
+    (
+        fast,
+        "a speed above 5 m/s (fastest 5.08 m/s), which nothing in this scene explains; "
+        "lower fidelity.time_step_fraction",
+    ),
+    (through_the_wall, "left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+    (through_the_floor, "left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+    (over_the_wall, "thrown out over the wall of 0.1 m; raise container.height_m or shake less"),
+]
+
+
+@pytest.mark.parametrize(("harm", "text"), CAUSES, ids=[harm.__name__ for harm, _ in CAUSES])
+def test_each_cause_stops_the_run(harm: Callable[[State], None], text: str) -> None:
+    state = healthy()
+    harm(state)
+    with pytest.raises(RunError) as caught:
+        check(state)
+    assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
+
+
+def test_many_smarticles_are_counted_and_the_first_named() -> None:
+    positions = np.full((8, 3), -0.01)
+    state = State.rigid(BOXES, positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
+    with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
+        check(state)
+
+
+def test_broken_hinge_is_named_with_its_gap() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, gap=2e-4)
+    gaps = np.full((4, 2), 1e-6)
+    dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+    dog.check(healthy(), floor=0.0, time=1.25, gaps=None)  # welded
+    for bad in (3e-4, math.nan):
+        gaps[2, 1] = bad
+        with pytest.raises(RunError, match=r"1\.2500 s: 1 smarticle\(s\) \(2\): links more than 0\.0002 m apart"):
+            dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+
+
+def test_deep_contacts_are_named() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
+    deep = np.zeros(4, dtype=bool)
+    dog.check_depths(Overlaps(5.9e-4, deep, 0.0), time=1.25)
+    deep[[1, 3]] = True
+    with pytest.raises(RunError) as caught:
+        dog.check_depths(Overlaps(7e-4, deep, 0.0), time=1.25)
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
+        "pass through each other or through the container; raise fidelity.stiffness_N_per_m, or load the pile less"
+    )
+
+
+@pytest.mark.parametrize(
+    ("between", "way_out"),
+    [
+        (("the lower hook", "the upper hook"), "set hooks.upper_height_m and lower_height_m further apart than w"),
+        (("the upper hook", "the wall"), "give the hook more room: a smaller hooks.length_m or a wider container"),
+    ],
+)
+def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
+    between: tuple[str, str], way_out: str
+) -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
+    deep = np.array([False, True, False, True])
+    with pytest.raises(RunError) as caught:
+        dog.check_depths(Overlaps(7e-4, deep, 0.0, (Held(3, between, 0.0051),)), time=1.25)
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
+        f"pass through each other or through the container; smarticle 3 is held by {between[0]} and {between[1]}, "
+        f"which have moved apart by 0.0051 m; {way_out}"
+    )
+
+
+@pytest.mark.parametrize("where", [(0.0, 0.0, -1e-6), (0.0235, 0.0, 0.05)])
+def test_a_single_sphere_that_is_outside_is_seen(where: tuple[float, float, float]) -> None:
+    state = healthy()
+    spheres = np.repeat(state.positions[:, None], 7, axis=1)
+    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    spheres[2, 3] = [0.05, 0.0, 0.1001]  # over the rim: allowed for a barb
+    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    spheres[2, 3] = where
+    with pytest.raises(RunError, match=r"1 smarticle\(s\) \(2\): left through the wall or the floor"):
+        WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+
+
+def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
+    """Energy less work [J] and what springs hold [J], look by look."""
+    for energy, elastic in energies:
+        dog.check_energy(healthy(), energy=energy, elastic=elastic, time=1.25)
+
+
+def test_energy_may_fall_and_springs_may_give_back_what_they_held() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    # Falls on to springs, which throw it back; then less and less.
+    looks(dog, (5.0, 0.0), (2.0, 3.0), (4.9, 0.0), (1.0, 2.0), (2.9, 0.0), (2.0, 0.0), (0.5, 0.0), (0.5, 0.0))
+    # What is within the limit, again and again, is not summed up.
+    looks(dog, *[(0.59, 0.0), (0.5, 0.0)] * 10)
+
+
+def test_energy_from_nowhere_stops_the_run() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    looks(dog, (5.0, 0.0), (0.5, 0.2))
+    with pytest.raises(RunError) as caught:
+        looks(dog, (0.81, 0.0))
+    # Of four smarticles, one is three times as fast as the next.
+    assert str(caught.value) == (
+        "at t = 1.2500 s: 1 smarticle(s) (0): an energy that has risen by 0.11 J more than gravity, motors and springs "
+        "explain (limit 0.1 J); these are the fastest, up to 4.9 m/s; lower fidelity.time_step_fraction"
+    )
+
+
+def test_energy_that_rises_slowly_is_seen_however_slowly() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    with pytest.raises(RunError, match="an energy that has risen by"):
+        looks(dog, *[(1.0 + 0.003 * n, 0.0) for n in range(40)])
+
+
+def test_unknown_work_forgets_what_was_seen() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
+    looks(dog, (1.0, 0.0), (math.nan, 0.0), (9.0, 0.0), (9.05, 0.0))
+    with pytest.raises(RunError, match="risen by"):
+        looks(dog, (9.2, 0.0))
+
+
+TIERED = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),)), speed=5.0)
+
+
+def at(*position: float) -> State:
+    still = np.zeros((1, 3))
+    return State.rigid(BOXES, np.array([position], dtype=float), np.eye(3)[None], still, still)
+
+
+def test_it_knows_a_wall_that_is_gone_and_a_hook_that_is_raised() -> None:
+    far, high = at(0.2, 0.0, 0.01), at(0.0, 0.0, 0.11)
+    for state in (far, high):
+        with pytest.raises(RunError):
+            TIERED.check(state, floor=0.0, time=1.0)
+        TIERED.check(state, floor=0.0, time=1.0, raised=None)
+    TIERED.check(high, floor=0.0, time=1.0, raised=0.02)
+    with pytest.raises(RunError, match="left through the wall"):
+        TIERED.check(far, floor=0.0, time=1.0, raised=0.02)
+    with pytest.raises(RunError, match="left through the wall or the floor"):
+        TIERED.check(at(0.2, 0.0, -0.01), floor=0.0, time=1.0, raised=None)  # the floor stays
+
+
+def test_it_knows_the_tiers() -> None:
+    TIERED.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
+    with pytest.raises(RunError, match="left through the wall"):
+        TIERED.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)

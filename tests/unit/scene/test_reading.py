@@ -1,0 +1,137 @@
+"""Files and overrides that are no scene, and refusals that take a number from it; see `test_bad_scenes.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scenes import small
+
+from dem.errors import InputError
+from dem.scene.reading import load_scene, parse_scene
+
+SceneData = Callable[..., dict[str, Any]]
+
+GOOD = "schema_version: 1\nseed: 1\ncount: 10\nphases: [{type: deposit}]\n"
+
+W_IN_MM = (
+    "smarticle.middle_length_m: 11.7 means 11.7 m, which no smarticle scene needs; "
+    "lengths are in metres: for 11.7 mm write 0.0117"
+)
+
+
+def test_container_narrower_than_a_smarticle(scene_data: SceneData) -> None:
+    reach = small().particle.reach
+    with pytest.raises(InputError) as caught:
+        parse_scene(scene_data({"container.radius_m": 0.005}), source="bad.yaml")
+    assert str(caught.value) == (
+        f"bad.yaml: container.radius_m: 0.005 m is narrower than a smarticle, whose farthest point is {reach:.4g} m "
+        f"from its centre of mass; use at least {reach:.4g} m"
+    )
+    small({"container.radius_m": 1.01 * reach})
+
+
+def test_several_errors_show_the_first_and_how_many_more(scene_data: SceneData) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_scene(scene_data({"seed": -1, "count": 0}), source="bad.yaml")
+    assert str(caught.value) == "bad.yaml: seed: -1 is out of range; use at least 0 (and 1 more)"
+
+
+@pytest.mark.parametrize(("data", "kind"), [([1], "list"), ("text", "str"), (3, "int")], ids=["list", "text", "3"])
+def test_file_that_is_no_mapping(data: Any, kind: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_scene(data, source="bad.yaml")
+    assert str(caught.value) == f"bad.yaml: a scene is a mapping of keys to values, got {kind}"
+
+
+def test_missing_key(scene_data: SceneData) -> None:
+    data = scene_data()
+    del data["seed"]
+    with pytest.raises(InputError) as caught:
+        parse_scene(data, source="bad.yaml")
+    assert str(caught.value) == "bad.yaml: seed: missing; it has no default"
+
+
+def refused(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
+    """The message with which a file is refused, the folder cut off."""
+    path = folder / "bad.yaml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError) as caught:
+        load_scene(path, overrides)
+    message = str(caught.value)
+    assert len(message.splitlines()) == 1
+    return message.replace(f"{folder}/", "")
+
+
+def test_key_given_twice(tmp_path: Path) -> None:
+    assert refused(tmp_path, GOOD + "seed: 2\n").startswith("bad.yaml: not valid YAML: key 'seed' is given twice")
+    nested = GOOD + "smarticle: {aspect_ratio: 0.4, aspect_ratio: 0.7}\n"
+    assert "key 'aspect_ratio' is given twice" in refused(tmp_path, nested)
+
+
+def test_file_that_is_no_yaml(tmp_path: Path) -> None:
+    message = refused(tmp_path, "a: [1\nb")
+    assert message.startswith("bad.yaml: not valid YAML: while parsing a flow sequence")
+    assert "line 2" in message
+    assert "could not determine a constructor" in refused(tmp_path, GOOD + "name: !!python/object:os.system x\n")
+
+
+def test_binary_file(tmp_path: Path) -> None:
+    assert refused(tmp_path, b"\x89HDF\r\n\xff\xfe") == "bad.yaml: is not a text file; give the path of a scene file"
+    assert refused(tmp_path, b"a: \x00b").startswith("bad.yaml: not valid YAML: unacceptable character #x0000")
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(tmp_path / "none.yaml")
+    assert str(caught.value) == (
+        f"{tmp_path}/none.yaml: cannot be read (No such file or directory); give the path of a scene file"
+    )
+    with pytest.raises(InputError) as caught:
+        load_scene(tmp_path)
+    assert str(caught.value) == f"{tmp_path}: cannot be read (Is a directory); give the path of a scene file"
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("seed", "--set seed: write KEY=VALUE, e.g. --set phases.1.duration_s=2"),
+        ("=3", "--set =3: write KEY=VALUE, e.g. --set phases.1.duration_s=2"),
+        (
+            "phases.3.duration_s=1",
+            "--set phases.3.duration_s=1: there is no '3' in the scene; lists are numbered from 0",
+        ),
+        ("count.x=1", "--set count.x=1: there is no 'x' to set; lists are numbered from 0"),
+        ("seed=[1", "--set seed=[1: the value is not valid YAML"),
+        ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
+        ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
+        ("smarticle.middle_length_m=11.7", f"bad.yaml: {W_IN_MM}"),
+        ("contact.friction_wall=.nan", "bad.yaml: contact.friction_wall: nan is not a finite number; give one"),
+    ],
+)
+def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
+    message = refused(tmp_path, GOOD, [override])
+    assert message.startswith(expected) if expected.endswith(": ") else message == expected
+
+
+def test_nested_too_deeply(tmp_path: Path) -> None:
+    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read"
+
+
+def test_impossible_date(tmp_path: Path) -> None:
+    assert refused(tmp_path, GOOD + "name: 2020-99-99\n") == "bad.yaml: not valid YAML: month must be in 1..12"
+    assert refused(tmp_path, GOOD, ["name=2020-99-99"]) == "--set name=2020-99-99: the value is not valid YAML"
+
+
+@pytest.mark.parametrize("overrides", [[], ["seed=1"]])
+def test_empty_file(tmp_path: Path, overrides: list[str]) -> None:
+    assert refused(tmp_path, "", overrides) == (
+        "bad.yaml: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
+    )
+
+
+@pytest.mark.parametrize("line", ["gravity_m_per_s2: 1:30", "gravity_m_per_s2: 010"])
+def test_numbers_that_yaml_1_1_reads_in_base_60_or_8_are_refused(tmp_path: Path, line: str) -> None:
+    refused(tmp_path, f"{GOOD}{line}\n")

@@ -1,0 +1,214 @@
+"""The shipped studies: they expand, and say how the quick variant differs."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import studies
+from dem.errors import InputError
+from dem.phases.deposit import Deposit
+from dem.phases.internal_oscillation import InternalOscillation
+from dem.phases.relax import Relax
+from dem.phases.shake import Shake
+from dem.phases.shape_change import ShapeChange
+from dem.setting.fidelity import FIDELITIES, Fidelity
+from studies.base.shipped import differences
+from studies.registry import STUDIES, study_file
+from templates.sweep.expand import Point, expand
+from templates.sweep.sweep_file import load_sweep
+
+FOLDER = Path(studies.__file__).parent
+
+
+def points(*, quick: bool) -> list[Point]:
+    return expand(load_sweep(study_file("gravish", quick=quick)))
+
+
+def test_the_full_study_is_the_papers() -> None:
+    with (FOLDER / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    found = points(quick=False)
+    assert [(p.scene.smarticle.aspect_ratio, p.scene.count, p.scene.seed) for p in found] == [
+        (float(row["l_over_w"]), int(row["n"]), seed) for row in rows for seed in (1, 2, 3)
+    ]
+    assert len(found) == 24
+    assert found[9].name == "lw0.70_seed1"
+    for point, row in zip(found[::3], rows, strict=True):
+        deposit, rest, shake, again = point.scene.phases
+        assert isinstance(deposit, Deposit)
+        assert deposit.per_layer == int(row["per_layer"])
+        assert isinstance(shake, Shake)
+        assert (shake.duration_s, shake.frequency_hz, shake.peak_acceleration_g) == (5.0, 30, 2)
+        assert isinstance(rest, Relax)
+        assert isinstance(again, Relax)
+        assert rest.duration_s == again.duration_s == 0.5
+
+
+def test_the_counts_are_those_of_the_reference() -> None:
+    """The layers of the source times the number per layer are its counts."""
+    with (FOLDER / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            assert int(row["layers"]) * int(row["per_layer"]) == int(row["n"])
+
+
+def test_the_quick_variant_has_the_three_aspect_ratios_and_seeds() -> None:
+    found = points(quick=True)
+    assert {p.scene.smarticle.aspect_ratio for p in found} == {0.4, 0.7, 1.0}
+    assert {p.scene.seed for p in found} == {1, 2, 3}
+
+
+def test_the_quick_variant_says_how_it_differs() -> None:
+    lines = differences(points(quick=True), points(quick=False))
+    assert lines[0] == "9 runs instead of 24"
+    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
+    assert any(line.startswith("shake_s: ") and line.endswith(" instead of 5.0") for line in lines)
+    # Columns that follow from l/w, and what is the same, are not told.
+    assert not any(line.startswith(("n:", "layers:", "seed:", "title:")) for line in lines)
+
+
+def test_nothing_differs_from_itself() -> None:
+    assert differences(points(quick=False), points(quick=False)) == []
+
+
+def test_an_unknown_study_is_an_input_error() -> None:
+    with pytest.raises(InputError, match=r"'gravitsh' does not exist; did you mean 'gravish'\?"):
+        study_file("gravitsh")
+
+
+def test_a_study_without_a_quick_variant_says_so() -> None:
+    with pytest.raises(InputError, match="study sensitivity has no quick variant; leave --quick out"):
+        study_file("sensitivity", quick=True)
+
+
+@pytest.mark.parametrize(
+    ("study", "choices"),
+    [
+        ("sensitivity", {"draft": 0, "diameter-1.27mm": 1, "friction-0.6": 2}),  # friction of smarticles and of walls
+        ("sensitivity-section", {"draft": 0, "pitch-0.5": 1, "two-rows": 2}),  # rows and pitch
+    ],
+)
+def test_variants_differ_from_the_draft_in_their_choice_alone(study: str, choices: dict[str, int]) -> None:
+    found = expand(load_sweep(study_file(study)))
+    assert found[0].name == "draft_seed1"
+    # The file writes the draft out: the two must stay the same.
+    assert found[0].scene.fidelity == Fidelity(base="draft", **FIDELITIES["draft"])
+    assert {point.scene.smarticle.aspect_ratio for point in found} == {0.7}
+    for point in found:
+        variant = str(point.values["variant"])
+        twin = next(p for p in found if p.values["variant"] == "draft" and p.scene.seed == point.scene.seed)
+        here, there = (flat(p.scene.model_dump()) for p in (point, twin))
+        changed = {key for key in here if here[key] != there[key]}
+        assert len(changed) == choices.get(variant, 1), (variant, changed)
+        assert all(key.startswith(("fidelity.", "contact.")) for key in changed)
+
+
+def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return found
+
+
+AMPLITUDES = (5, 10, 15, 20, 30)
+RATIOS, RATIOS_OF_AMPLITUDES = (0.4, 0.55, 0.7, 0.85, 1.0), (0.4, 0.5, 0.7, 1.0)
+
+
+def procedures(*, quick: bool) -> list[Point]:
+    return expand(load_sweep(study_file("procedures", quick=quick)))
+
+
+def test_the_procedures_are_those_of_the_paper() -> None:
+    found = procedures(quick=False)
+    assert len(found) == 87
+    # Seed by seed, so that an interrupted study has all points.
+    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3) for _ in range(29)]
+    assert len({point.scene_sha256 for point in found}) == 87
+    for point in found:
+        deposit, rest, activity, again = point.scene.phases
+        assert isinstance(deposit, Deposit)
+        assert deposit.per_layer == 10
+        assert isinstance(rest, Relax)
+        assert isinstance(again, Relax)
+        assert rest.duration_s == again.duration_s == 0.5
+        assert point.scene.count == 100
+        assert point.scene.fidelity.base == "draft"
+        assert point.scene.recording.energy
+        if isinstance(activity, Shake):
+            assert (activity.duration_s, activity.frequency_hz, activity.peak_acceleration_g) == (5.0, 30, 2)
+        elif isinstance(activity, ShapeChange):
+            assert (activity.straight_deg, activity.opening_s, activity.closing_s) == (0, 1.5, 1.5)
+        else:
+            assert isinstance(activity, InternalOscillation)
+            assert activity.theta_deg == point.values["theta_deg"]
+            assert activity.scaled
+            assert activity.duration_s == 5.0
+
+
+@pytest.mark.parametrize("activity", [Shake, ShapeChange])
+def test_every_procedure_is_run_at_every_aspect_ratio(activity: type) -> None:
+    found = procedures(quick=False)[:29]
+    ratios = [point.scene.smarticle.aspect_ratio for point in found if isinstance(point.scene.phases[2], activity)]
+    assert tuple(ratios) == RATIOS
+
+
+def test_amplitudes_are_left_out_by_the_rule_of_the_hinge() -> None:
+    """90° + θ/2 · 0.7/(l/w) is at most 105°; every other combination is there, and none twice."""
+    found = [
+        (point.scene.smarticle.aspect_ratio, activity.theta_deg)
+        for point in procedures(quick=False)[:29]
+        if isinstance(activity := point.scene.phases[2], InternalOscillation)
+    ]
+    wanted = {(ratio, 10.0) for ratio in RATIOS}
+    wanted |= {
+        (ratio, float(theta))
+        for ratio in RATIOS_OF_AMPLITUDES
+        for theta in AMPLITUDES
+        if theta * 0.7 / ratio <= 30 * (1 + 1e-9)
+    }
+    assert sorted(found) == sorted(wanted)
+    assert len(wanted) < len(RATIOS_OF_AMPLITUDES) * len(AMPLITUDES) + 2
+
+
+def test_the_quick_procedures_say_how_they_differ() -> None:
+    found = procedures(quick=True)
+    assert len(found) == 11
+    assert {point.scene.seed for point in found} == {1}
+    lines = differences(found, procedures(quick=False))
+    assert lines[0] == "11 runs instead of 87"
+    assert {"count: 60 instead of 100", "shake_s: 2.0 instead of 5.0", "oscillate_s: 2.0 instead of 5.0"} <= set(lines)
+    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.55, 0.7, 0.85, 1.0" in lines
+    assert "theta_deg: only 0, 10, 30 of 0, 5, 10, 15, 20, 30" in lines
+    assert "seed: only 1 of 1, 2, 3" in lines
+
+
+def test_every_sweep_file_is_that_of_a_study_in_the_registry() -> None:
+    files = {path.name.removesuffix(".yaml") for path in FOLDER.glob("*/*.yaml")}
+    assert {name for name in files if "." not in name} == set(STUDIES)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
+    shipped = STUDIES[name]
+    assert shipped.load(quick=True).name == name
+    variables = expand(load_sweep(shipped.sweep_file()))[0].values
+    assert set(shipped.pictured) <= set(variables)
+
+
+def test_what_is_known_of_studies_beforehand_loads_nothing_large() -> None:
+    code = "import sys, studies.registry; print(*{name.split('.')[0] for name in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "studies" in loaded
+    assert not {"pandas", "matplotlib", "numpy", "pyvista", "yade"} & set(loaded)
+
+
+def test_every_data_file_of_a_study_is_named_in_its_readme() -> None:
+    readme = (FOLDER / "README.md").read_text(encoding="utf-8")
+    for path in FOLDER.glob("*/*.csv"):
+        assert path.name in readme

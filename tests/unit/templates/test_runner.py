@@ -1,0 +1,294 @@
+"""The local runner, with a fake run in place of the simulation."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
+
+import pytest
+from sweep_cases import MakeFolder
+
+from dem.errors import InputError
+from templates.local.estimate import time_left
+from templates.local.runner import (
+    Outcome,
+    RunCommand,
+    Snapshot,
+    Timing,
+    run_folder,
+    slots_here,
+    smarticles_command,
+)
+from templates.sweep.folder import Entry, Folder
+
+FAKE = Path(__file__).with_name("fake_run.py")
+QUICK = Timing(poll_s=0.01, grace_s=300.0)
+
+
+@dataclass
+class Watcher:
+    """A display that remembers, and may interrupt."""
+
+    when: Callable[[Snapshot], bool] = lambda _: False
+    starts: list[str] = field(default_factory=list)
+    ends: list[Outcome] = field(default_factory=list)
+    snapshots: list[Snapshot] = field(default_factory=list)
+    stops: list[int] = field(default_factory=list)
+    open: bool = False
+
+    def __enter__(self) -> Self:
+        self.open = True
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.open = False
+
+    def started(self, entry: Entry) -> None:
+        self.starts.append(entry.name)
+
+    def ended(self, outcome: Outcome) -> None:
+        self.ends.append(outcome)
+
+    def update(self, snapshot: Snapshot) -> None:
+        self.snapshots.append(snapshot)
+        if self.when(snapshot):
+            raise KeyboardInterrupt
+
+    def stopping(self, count: int) -> None:
+        self.stops.append(count)
+
+
+def fake(behaviours: dict[str, str] | None = None) -> RunCommand:
+    """The command of a run; `behaviours` by its name, `ok` for those not named."""
+
+    def command(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
+        behaviour = (behaviours or {}).get(directory.name, "ok")
+        # The fake has no scene model to compute a hash with.
+        words = (sys.executable, "-I", "-S", str(FAKE), behaviour, str(scene), str(directory))
+        return (*words, "--resume") if resume else words
+
+    return command
+
+
+@pytest.fixture
+def folder(make_folder: MakeFolder) -> Folder:
+    """Runs n10_seed1, n10_seed2, n20_seed1, n20_seed2; their scenes tell their hashes."""
+    made = make_folder()
+    for entry in made.entries:
+        scene = made.scene(entry)
+        scene.write_text(f"{scene.read_text()}\n# sha256 {entry.scene_sha256}\n")
+    return made
+
+
+def statuses(outcomes: Sequence[Outcome]) -> list[str]:
+    return [outcome.status for outcome in outcomes]
+
+
+def test_all_runs_run_once_with_one_thread_the_longest_first(folder: Folder) -> None:
+    watcher = Watcher()
+    outcomes = run_folder(folder, watcher, slots=1, command=fake(), timing=QUICK)
+    assert statuses(outcomes) == ["done"] * 4
+    assert [outcome.name for outcome in outcomes] == [entry.name for entry in folder.entries]
+    assert watcher.starts == ["n20_seed1", "n20_seed2", "n10_seed1", "n10_seed2"]
+    assert not watcher.open
+    assert watcher.stops == []
+    for entry in folder.entries:
+        assert (folder.run(entry) / "threads").read_text() == "1"
+        # A run that outlives its runner keeps the sweep locked.
+        assert (folder.run(entry) / "held").read_text() == str(folder.path / ".lock")
+    last = watcher.snapshots[-1]
+    assert (last.total, last.ended, last.failed, last.running) == (4, 4, 0, ())
+    assert last.left_s == 0
+
+
+def test_a_sweep_can_want_its_runs_seed_by_seed(folder: Folder) -> None:
+    watcher = Watcher()
+    run_folder(replace(folder, seed_by_seed=True), watcher, slots=1, command=fake(), timing=QUICK)
+    assert watcher.starts == ["n20_seed1", "n10_seed1", "n20_seed2", "n10_seed2"]
+
+
+@pytest.mark.parametrize("slots", [1, 3])
+def test_as_many_runs_as_slots_and_never_more(folder: Folder, slots: int) -> None:
+    waiting = fake({entry.name: "wait" for entry in folder.entries})
+    watcher = Watcher(when=lambda now: sum(run.phi is not None for run in now.running) == slots)
+    with pytest.raises(KeyboardInterrupt):
+        run_folder(folder, watcher, slots=slots, command=waiting, timing=QUICK)
+    assert {len(snapshot.running) for snapshot in watcher.snapshots} == {slots}
+    assert len(watcher.starts) == slots
+
+
+def test_by_default_one_run_per_core() -> None:
+    assert slots_here() >= 1
+
+
+def test_a_failing_run_does_not_stop_the_others(folder: Folder) -> None:
+    behaviours = {"n20_seed1": "fail", "n10_seed1": "crash", "n10_seed2": "refuse"}
+    outcomes = run_folder(folder, Watcher(), slots=2, command=fake(behaviours), timing=QUICK)
+    assert statuses(outcomes) == ["failed", "failed", "failed", "done"]
+    assert [outcome.cause for outcome in outcomes] == [
+        "killed by SIGKILL (out of memory?): Segmentation something",
+        "scene.yaml: count: -1 is negative; use 1",
+        "left through the wall",
+        None,
+    ]
+    assert [outcome.missing for outcome in outcomes] == [True, True, True, False]
+
+
+def test_success_without_done_json_is_a_failure(folder: Folder) -> None:
+    outcomes = run_folder(folder, Watcher(), command=fake({"n10_seed1": "silent"}), timing=QUICK, slots=4)
+    assert outcomes[0].status == "failed"
+    assert str(outcomes[0].cause).startswith("ended without done.json, without a word; see ")
+
+
+def test_the_same_again_keeps_finished_runs_and_sets_others_aside(folder: Folder) -> None:
+    first = run_folder(folder, Watcher(), command=fake({"n20_seed1": "fail"}), timing=QUICK)
+    assert statuses(first) == ["done", "done", "failed", "done"]
+    ids = [(folder.run(entry) / "id").read_text() for entry in folder.entries]
+    failed = folder.entries[2]
+    (folder.run(failed) / "precious").write_text("data")
+
+    watcher = Watcher()
+    second = run_folder(folder, watcher, command=fake(), timing=QUICK)
+    assert statuses(second) == ["kept", "kept", "done", "kept"]
+    assert watcher.starts == ["n20_seed1"]
+    again = [(folder.run(entry) / "id").read_text() for entry in folder.entries]
+    assert [old == new for old, new in zip(ids, again, strict=True)] == [True, True, False, True]
+    aside = folder.path / "runs" / "n20_seed1.stopped-1"
+    assert (aside / "precious").read_text() == "data"
+    assert (aside / "id").read_text() == ids[2]
+
+    third = run_folder(folder, Watcher(), command=fake(), timing=QUICK)
+    assert statuses(third) == ["kept"] * 4
+
+
+def test_a_finished_run_of_another_scene_is_set_aside(folder: Folder) -> None:
+    run_folder(folder, Watcher(), command=fake(), timing=QUICK)
+    (folder.run(folder.entries[0]) / "run.json").write_text('{"scene_sha256": "other"}')
+    outcomes = run_folder(folder, Watcher(), command=fake(), timing=QUICK)
+    assert statuses(outcomes) == ["done", "kept", "kept", "kept"]
+    assert (folder.path / "runs" / "n10_seed1.stopped-1" / "done.json").exists()
+
+
+def test_ctrl_c_stops_all_runs_and_leaves_usable_directories(folder: Folder) -> None:
+    waiting = {"n20_seed1": "wait", "n20_seed2": "wait"}
+    watcher = Watcher(when=lambda now: sum(run.phi is not None for run in now.running) == 2)
+    with pytest.raises(KeyboardInterrupt):
+        run_folder(folder, watcher, slots=2, command=fake(waiting), timing=QUICK)
+    assert watcher.starts == ["n20_seed1", "n20_seed2"]
+    assert watcher.stops == [2]
+    assert sorted(statuses(watcher.ends)) == ["interrupted", "interrupted"]
+    assert not watcher.open
+    states = {status.name: status.state for status in folder.status()}
+    assert states == {
+        "n10_seed1": "missing",
+        "n10_seed2": "missing",
+        "n20_seed1": "interrupted",
+        "n20_seed2": "interrupted",
+    }
+    assert not folder.is_active()
+    # Nothing was set aside that was not run anew.
+    assert not list((folder.path / "runs").glob("*.stopped-*"))
+    outcomes = run_folder(folder, Watcher(), command=fake(), timing=QUICK)
+    assert statuses(outcomes) == ["done"] * 4
+
+
+@pytest.mark.parametrize(
+    ("state", "checkpoint", "goes_on"),
+    [("interrupted", True, True), ("interrupted", False, False), ("failed", True, False)],
+)
+def test_stopped_runs_go_on_from_their_checkpoint(folder: Folder, state: str, checkpoint: bool, goes_on: bool) -> None:
+    entry = folder.entries[0]
+    run = folder.run(entry)
+    run.mkdir(parents=True)
+    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
+    (run / "failed.json").write_text(json.dumps({"status": state, "cause": "…"}))
+    (run / "precious").write_text("data")
+    if checkpoint:
+        (run / "checkpoint.zip").write_text("")
+    outcomes = run_folder(folder, Watcher(), slots=4, command=fake(), timing=QUICK)
+    assert statuses(outcomes) == ["done"] * 4
+    aside = run.with_name("n10_seed1.stopped-1")
+    assert (run / "precious").exists() is goes_on
+    assert aside.exists() is not goes_on
+
+
+def test_a_run_that_does_not_listen_is_made_to_stop(folder: Folder) -> None:
+    deaf = fake({"n20_seed1": "deaf"})
+    progress = folder.run(folder.entries[2]) / "progress.json"
+    watcher = Watcher(when=lambda _: progress.exists())
+    with pytest.raises(KeyboardInterrupt):
+        run_folder(folder, watcher, slots=1, command=deaf, timing=Timing(poll_s=0.01, grace_s=1.0))
+    assert [outcome.cause for outcome in watcher.ends] == ["killed by SIGTERM, without a word; see "
+        f"{folder.log(folder.entries[2])}"]  # fmt: skip
+    assert not folder.is_active()
+
+
+def test_a_display_that_fails_leaves_no_process_behind(folder: Folder) -> None:
+    class Broken(Watcher):
+        def update(self, snapshot: Snapshot) -> None:
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run_folder(folder, Broken(), command=fake({"n20_seed1": "wait"}), timing=QUICK)
+    assert not folder.is_active()
+
+
+def test_progress_of_all_runs_reaches_the_display(folder: Folder) -> None:
+    watcher = Watcher(when=lambda now: any(run.phi is not None for run in now.running))
+    with pytest.raises(KeyboardInterrupt):
+        run_folder(folder, watcher, slots=1, command=fake({"n20_seed1": "wait"}), timing=QUICK)
+    (run,) = watcher.snapshots[-1].running
+    assert (run.name, run.phase, run.time_s, run.end_s, run.phi, run.expected_s) == (
+        "n20_seed1",
+        "shake",
+        1.25,
+        5.5,
+        0.123,
+        20.0,
+    )
+    # 20 s expected of this run, less what has passed, then 20 + 10 + 10 s of the others.
+    left = time_left([], [(20.0, run.wall_s, run.left_in_phase_s)], [20.0, 10.0, 10.0], slots=1)
+    assert watcher.snapshots[-1].left_s == left
+
+
+def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
+    with folder.lock(), pytest.raises(InputError, match="are being computed already"):
+        run_folder(folder, Watcher(), command=fake(), timing=QUICK)
+    assert not (folder.path / "runs").exists()
+
+
+def test_the_command_of_a_run_is_this_interpreter_and_the_paths_that_it_is_given() -> None:
+    command = smarticles_command(Path("a scene.yaml"), Path("out"), False)
+    assert smarticles_command(Path("a scene.yaml"), Path("out"), True) == (*command, "--resume")
+    assert command == (
+        sys.executable,
+        "-P",
+        "-m",
+        "smarticles",
+        "run",
+        "a scene.yaml",
+        "--out",
+        "out",
+    )
+
+
+def test_runs_are_told_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, str]] = []
+
+    def noting(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
+        told.append((str(scene), str(directory)))
+        return fake()(scene, directory, resume)
+
+    # What the user gave for imports still means what it meant where it was given.
+    monkeypatch.setenv("PYTHONPATH", f"lib{os.pathsep}{folder.path}")
+    outcomes = run_folder(folder, Watcher(), command=noting, timing=QUICK)
+    assert sorted(told) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
+    assert [outcome.cause for outcome in outcomes] == [None] * 4
+    assert all(folder.is_done(entry) for entry in folder.entries)
+    searched = (folder.run(folder.entries[0]) / "searched").read_text().split(os.pathsep)
+    assert searched[-2:] == [str(Path.cwd() / "lib"), str(folder.path)]
