@@ -19,7 +19,7 @@ import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.motion.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
+from dem.engine.links.motion.planar import lagrange_force, lay_out, lay_out_near, mobility, momenta, rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
@@ -232,7 +232,7 @@ def middle_of_step(
     wx, wy, wz = 0.0, 0.0, 0.0
     for turn in range(ITERATIONS):
         if turn == 0 or free:
-            lay_out(shape, bodies.alpha[i, 0] + half * r1, bodies.alpha[i, 1] + half * r2, row)
+            lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
         if free:
             r1, r2 = rates(row, z, p1 + half * g1, p2 + half * g2)
         wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
