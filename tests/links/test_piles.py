@@ -93,9 +93,7 @@ def test_a_pile_comes_to_rest() -> None:
 @pytest.mark.parametrize("law", ["halt", "stall", "slip", "servo"])
 def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
     more = {"damping": 1e-6} if law == "servo" else {}
-    made = builds.engine(
-        gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), account=True
-    )
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), account=True)
     builds.pile(made, 30, settle=0.1)
     made.motors.articulate()
     swing(made, 1500)
@@ -118,21 +116,6 @@ def test_the_account_closes_in_a_shaken_pile() -> None:
     given = made.account.given
     assert made.account.container_work > 0.1 * made.account.added
     assert abs(given - stored - made.account.dissipated) < 0.01 * given
-
-
-def blocked(law: str, *, limit: float = builds.TORQUE) -> LinksEngine:
-    """A heavy-handed case: a smarticle that opens its barbs between two walls of a channel."""
-    from dem.setting.plane import Channel
-
-    made = builds.engine(
-        channel=Channel(width=0.012, table=-1e-3), motor_law=builds.motor_law(law, torque_limit=limit), dt=5e-5
-    )
-    made.add(builds.at([0, 0, 0]))
-    made.motors.articulate()
-    for look in range(600):
-        made.motors.actuate(np.full((1, 2), max(-0.2, math.pi / 2 - look * 6e-3)), 2e-4)
-        made.advance(4)
-    return made
 
 
 def test_a_motor_that_halts_holds_and_may_give_way() -> None:

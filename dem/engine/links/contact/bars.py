@@ -147,8 +147,8 @@ def _row(x: float, y: float, z: float, link: Array, half: Array, radius: float, 
             row[4] = math.copysign(1.0, py)
         else:
             row[5] = math.copysign(1.0, pz)
-        row[7] = radius + min(ways[0], min(ways[1], ways[2]))
-    return row[7]
+        row[7] = radius + min(ways[0], ways[1], ways[2])
+    return float(row[7])
 
 
 @part

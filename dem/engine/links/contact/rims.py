@@ -19,7 +19,7 @@ def _squared(link: Array, s: float, radius: float, height: float) -> float:
     """Squared distance [m²] of a point of a link's axis from a horizontal circle about the z-axis."""
     x, y, z = link[0] + s * link[3], link[1] + s * link[4], link[2] + s * link[5]
     out, up = math.sqrt(x * x + y * y) - radius, z - height
-    return out * out + up * up
+    return float(out * out + up * up)
 
 
 @part

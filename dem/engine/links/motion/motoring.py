@@ -1,11 +1,11 @@
 """Motors in the kernels: what they measure, what they prescribe, and what they exert.
 
-Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The mean
-torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle: τ = dp/dt
-- ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look the rate
-jumps at once, to no more than what τ_max alone would give to a free barb in the period (`acceleration`): a motor turns
-round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the motor. What a jump
-takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
+Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
+mean torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle:
+τ = dp/dt - ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look
+the rate jumps at once, by no more than what τ_max alone would give to a free barb in the period (`acceleration`): a
+motor turns round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the
+motor. What a jump takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
 
 Slip and servo let the angle be free: p is a state of its own, and τ a spring to the command, capped, and for a servo
 damped. It is taken at the middle of the step that begins, so that no stiffness is unstable.
@@ -156,8 +156,9 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
 
 @part
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
-    """Generalised forces of contacts on the angles [N m]: all points move as an angle turns, as the centre of mass
-    does not.
+    """Generalised forces of contacts on the angles [N m].
+
+    All points of a smarticle move as an angle turns, since the centre of mass does not.
     """
     axes, load, row = bodies.axes, bodies.load, bodies.plane[i]
     share = shape.barb_mass / shape.mass

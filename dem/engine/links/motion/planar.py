@@ -45,6 +45,7 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
 
 @part
 def lay_out_directions(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
+    """See `lay_out`; the cosines and sines of the angles are given."""
     arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
     share = mb / shape.mass
     x1, y1, x2, y2 = -shape.half - c1 * arm, s1 * arm, shape.half + c2 * arm, s2 * arm
@@ -160,4 +161,4 @@ def lagrange_force(
     b_mine = -mb * shape.arm * (cx * dy - cy * dx)
     b_other = -mb * share * (ux * vy - uy * vx)
     a_both = share * mb * shape.arm * (dx * vx + dy * vy)
-    return force + wz * (b_mine * mine + b_other * other) + mine * other * a_both
+    return float(force + wz * (b_mine * mine + b_other * other) + mine * other * a_both)
