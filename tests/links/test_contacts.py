@@ -214,8 +214,8 @@ def test_neighbours_are_complete_in_a_moving_pile(rows: int) -> None:
     made.add(builds.at(places, [Rotation.random(random_state=k) for k in range(60)]))
     world = made._world
     world.bodies.velocity[:] = rng.normal(size=(60, 3))
-    for _ in range(40):
-        made.advance(5)
+    for _ in range(12):
+        made.advance(15)
         world.posed()
         pairs = world.pairs
         near = pairs.near[: pairs.counts[1]]

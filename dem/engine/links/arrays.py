@@ -302,7 +302,7 @@ def pairs_for(links: int, smarticles: int, capacity: int) -> Pairs:
 
 
 def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: int) -> Cells:
-    """Room for a search among `links` links of some smarticles in so many pieces, of `capacity` pairs, in so many cells."""
+    """Room for a search among `links` links of some smarticles, so many pieces, pairs and cells."""
     return Cells(
         np.zeros(pieces, np.int32),
         np.zeros(pieces, np.int32),

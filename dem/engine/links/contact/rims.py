@@ -56,7 +56,7 @@ def nearest_to_circle(link: Array, radius: float, height: float) -> float:
 def push_rims(
     shape: Shape, law: Law, bodies: Bodies, ground: Ground, rims: Rims, hinged: Any, ledger: Any, dt: float
 ) -> float:
-    """Add the forces of the rims on links between their ends; the ends meet them as `dem.engine.links.contact.walls` says.
+    """Add the forces of the rims on links between their ends; for the ends themselves the wall cares.
 
     Args:
         shape: what all smarticles have in common.
