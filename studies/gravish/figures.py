@@ -114,8 +114,8 @@ def _draw_packing(
             ("phi_0", "white", r"$\phi_0$"),
             ("phi_f", figures.GREEN, rf"$\phi_\mathrm{{f}}$ after {time} s"),
         ):
-            shape = {**marker("s", figures.GREEN, face), **look}
-            _draw_means(axes, part, f"{stage} {definition}", shape, f"{TOLD[engine]}, {when}", shift=2 * _SHIFT)
+            squares = {**marker("s", figures.GREEN, face), **look}
+            _draw_means(axes, part, f"{stage} {definition}", squares, f"{TOLD[engine]}, {when}", shift=2 * _SHIFT)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
