@@ -12,6 +12,7 @@ from dem.record.manifest import RunManifest
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
+from studies.base.activity import ENERGY, PHI_ACTIVE, height_history
 from studies.base.engines import TOLD, engines_of, judging, of_engine
 from studies.base.figures import (
     ASPECT_LABEL,
@@ -41,7 +42,6 @@ from studies.base.procedures import (
     THETA,
     of_procedure,
 )
-from studies.procedures.measure import ENERGY, PHI_ACTIVE, height_history
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,7 +77,7 @@ def draw(
     Args:
         output: Folder.
         points: See `base.procedures.points`.
-        runs: See `measure.procedure_row`.
+        runs: See `activity.procedure_row`.
         manifests: The runs, in the order of the table.
         footer: Origin, one statement each.
 

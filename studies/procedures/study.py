@@ -2,7 +2,7 @@
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: smarticles poured
 into a cylinder go through one of three activities. What is measured of a run is in
-`studies.procedures.measure`, what the paper found and how it is judged in `studies.procedures.findings`.
+`studies.base.activity`, what the paper found and how it is judged in `studies.procedures.findings`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from postprocess.measures.packing import DEFINITIONS
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, told_means
+from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, QUANTITIES, procedure_row, samples, static_spread
 from studies.base.engines import by_engine, compared_engines, engine_lines, engines_of, judging, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, AMPLITUDE, CROSSINGS, NAMED, PHI, PROCEDURE, THETA, points, refuse_unlike
@@ -23,7 +24,6 @@ from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_t
 from studies.base.study import Analysis, Tables
 from studies.procedures import figures
 from studies.procedures.findings import findings
-from studies.procedures.measure import ENERGY, HEIGHT, PHI_ACTIVE, QUANTITIES, procedure_row, samples, static_spread
 
 
 class Procedures(PaperStudy):
