@@ -107,7 +107,7 @@ class LinksHands:
         for link, side in ((0, -1), (2, 1)):
             if link in shape.kinds:
                 places.append(np.array([side * shape.half, 0.0, 0.0]) + shape.tip * boxes.directions[link])
-        return boxes.to_body(np.array([place + [0.0, 0.0, z] for place in places for z in shape.offsets]))
+        return boxes.to_body(np.array([place + np.array([0.0, 0.0, z]) for place in places for z in shape.offsets]))
 
     def swept(self, particle: Particle) -> Array:
         """See the interface."""
@@ -116,7 +116,7 @@ class LinksHands:
         for link in shape.kinds:
             long = 2 * shape.end if link == 1 else shape.tip
             way = np.linspace(0, long, POINTS)[:, None] * boxes.directions[link]
-            found += [way + [starts[int(link)], 0.0, z] for z in shape.offsets]
+            found += [way + np.array([starts[int(link)], 0.0, z]) for z in shape.offsets]
         return boxes.to_body(np.concatenate(found))
 
     def pin_stiffness(self, scene: Scene) -> float:

@@ -27,7 +27,7 @@ def hinged(
     angles: Sequence[float] = (90, 90),
     **motor: float | str,
 ) -> Scene:
-    """A scene of one smarticle that will be articulated, its shafts springs; angles in deg, `motor` as in a scene file."""
+    """A scene of one smarticle whose shafts will be springs; angles in deg, `motor` as in a scene file."""
     return scene(
         hands,
         fidelity=fidelity,
