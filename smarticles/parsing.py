@@ -11,6 +11,9 @@ from typing import Any, NoReturn
 
 from dem.errors import InputError, nearest
 
+ENGINES = ("yade", "links")
+"""What --engine knows, as `dem.scene.scene.Scene.engine`."""
+
 Handler = Callable[[argparse.Namespace], int]
 """Does what a subcommand says; returns the exit status."""
 
@@ -98,6 +101,28 @@ def add_scene(parser: Parser) -> None:
         metavar="KEY=VALUE",
         help="change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
     )
+
+
+def add_engine(parser: Parser, what: str) -> None:
+    """Add --engine; `what` is what it sets, for the help."""
+    parser.add_argument("--engine", choices=ENGINES, help=f"{what}: yade, sphere chains on YADE, or links, swept links")
+
+
+def engine_settings(arguments: argparse.Namespace) -> list[str]:
+    """What --set and --engine say, as `KEY=VALUE`.
+
+    Raises:
+        InputError: they say different things.
+    """
+    settings: list[str] = list(arguments.set)
+    if arguments.engine is None:
+        return settings
+    for setting in settings:
+        key, _, value = setting.partition("=")
+        if key.strip() == "engine" and value.strip() != arguments.engine:
+            msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
+            raise InputError(msg)
+    return [*settings, f"engine={arguments.engine}"]
 
 
 def add_slots(parser: Parser) -> None:

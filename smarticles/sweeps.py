@@ -25,6 +25,7 @@ def make_folder(
     command: str,
     constants: Mapping[str, str] | None = None,
     *,
+    engine: str | None = None,
     max_points: int | None = None,
 ) -> Folder:
     """Expand a sweep file into its directory, or take up the directory that holds it already.
@@ -34,16 +35,24 @@ def make_folder(
         out: directory of the sweep.
         command: the command line, for the manifest.
         constants: values that replace those of the file.
+        engine: what all its runs are to be computed by; None: what the file says.
         max_points: how many runs it may have; None: the usual limit.
 
     Raises:
         InputError: the sweep is not valid, or the directory holds something else.
     """
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
-    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
-    sweep = with_constants(load_sweep(file), constants or {})
+    sweep = changed_sweep(file, constants or {}, engine=engine)
     return folder_of(sweep, expand(sweep, max_points=max_points or MAX_POINTS), out, command)
+
+
+def changed_sweep(file: Path, constants: Mapping[str, str], *, engine: str | None = None) -> Sweep:
+    """A sweep file as a command changes it; see `make_folder`."""
+    from templates.sweep.sweep_file import load_sweep, on_engine, with_constants  # noqa: PLC0415
+
+    sweep = with_constants(load_sweep(file), constants)
+    return sweep if engine is None else on_engine(sweep, engine)
 
 
 def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *, extend: bool = False) -> Folder:

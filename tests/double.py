@@ -357,6 +357,7 @@ class KindDouble:
 
     name = "double"
     damps_once_per_look = False
+    idle_knobs: tuple[str, ...] = ()
     actuated_share = 1.0
     built: list[EngineDouble]
 

@@ -22,6 +22,10 @@ class EngineKind(Protocol):
     def damps_once_per_look(self) -> bool:
         """Whether a servo's damper acts on what the last look told; it must then look in every step."""
 
+    @property
+    def idle_knobs(self) -> tuple[str, ...]:
+        """Knobs of the fidelity that have no meaning on it."""
+
     def version(self) -> str:
         """Version of what results depend on.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dem.engine.kinds import engine_kind
 from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES, Fidelity
 
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
@@ -15,7 +17,19 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     """All warnings of a scene, for `plan` and for the beginning of a run: what, where, value with unit, way out."""
     of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
     # What several phases say of one thing is said once.
-    return (*dict.fromkeys(of_phases), *recording_warnings(scene))
+    return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene))
+
+
+def engine_warnings(scene: Scene) -> tuple[str, ...]:
+    """Knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
+    fidelity = scene.fidelity
+    named = FIDELITIES[fidelity.base]
+    usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
+    told = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
+    if not told:
+        return ()
+    mean = "has no meaning" if len(told) == 1 else "have no meaning"
+    return (f"fidelity: {', '.join(told)} {mean} on the engine {scene.engine}; leave out what does nothing",)
 
 
 def recording_warnings(scene: Scene) -> tuple[str, ...]:

@@ -30,7 +30,11 @@ class PlannedPhase:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything `smarticles plan` says; `correction` is the factor that its wall times have been corrected by."""
+    """Everything `smarticles plan` says.
+
+    `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
+    `correction` is the factor that wall times have been corrected by.
+    """
 
     name: str
     count: int
@@ -46,6 +50,8 @@ class Plan:
     wall_s: float
     warnings: tuple[str, ...]
     planar: bool = False
+    engine: str = "yade"
+    strands: int = 0
     correction: float = 1.0
 
     def corrected(self, factor: float) -> Self:
@@ -62,8 +68,9 @@ class Plan:
         corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
-            f"{self.name}: {self.count} smarticles of {self.spheres_per_smarticle} spheres, "
+            f"{self.name}: {self.count} smarticles of {self._section_to_text()}, "
             f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
+            *self._engine_to_text(),
             self._steps_to_text(),
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
@@ -84,6 +91,18 @@ class Plan:
         lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    def _section_to_text(self) -> str:
+        if not self.strands:
+            return f"{self.spheres_per_smarticle} spheres"
+        return f"smooth links of {self.strands} strand{'' if self.strands == 1 else 's'}"
+
+    def _engine_to_text(self) -> list[str]:
+        """What is different on an engine that is not the usual one."""
+        idle = engine_kind(self.engine).idle_knobs
+        if not self.strands:
+            return []
+        return [f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here"]
 
     def _steps_to_text(self) -> str:
         first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
@@ -129,4 +148,6 @@ def plan(scene: Scene) -> Plan:
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
+        engine=scene.engine,
+        strands=scene.fidelity.rows if scene.smooth else 0,
     )

@@ -71,6 +71,7 @@ class RunManifest:
         time_step: The shortest of its phases [s].
         phases: The phases in order.
         status: "done", "failed", "interrupted" or "unfinished".
+        engine: What computed it: "yade" or "links".
         cause: Why the run failed or was interrupted; None otherwise.
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.
@@ -103,6 +104,7 @@ class RunManifest:
     container_tiers: int = 1
     planar: bool = False
     channel_width: float | None = None
+    engine: str = "yade"
     cause: str | None = None
     end_time: float | None = None
     steps: int | None = None
@@ -128,6 +130,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "command": run.command,
         "started": run.started,
         "versions": dict(run.versions),
+        "engine": run.engine,
         "threads": run.threads,
         "fidelity": run.fidelity,
         "count": run.count,
@@ -311,11 +314,18 @@ def read_run(directory: Path | str) -> RunManifest:
         container_tiers=run.integer("container_tiers", least=1) if "container_tiers" in run.data else 1,
         planar=run.data.get("planar") is True,
         channel_width=run.number("channel_width_m", positive=True) if run.data.get("channel_width_m") else None,
+        # Runs of before there was another engine do not say.
+        engine=run.text("engine") if "engine" in run.data else _first_engine(versions),
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),
         **_ending(directory, phases),
     )
+
+
+def _first_engine(versions: Mapping[str, Any]) -> str:
+    """The engine of a run that does not say, by the versions that it lists."""
+    return "links" if "links" in versions else "yade"
 
 
 def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:

@@ -207,6 +207,7 @@ def manifest(
         command=command,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         versions=versions(made_by),
+        engine=scene.engine,
         threads=threads,
         fidelity=scene.fidelity.base,
         count=scene.count,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from smarticles.commands.study import compute_and_analyse
 from smarticles.layout import columns
-from smarticles.parsing import Commands, add_scene, add_slots, positive_number
+from smarticles.parsing import Commands, add_engine, add_scene, add_slots, engine_settings, positive_number
 from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
@@ -38,10 +38,11 @@ against wall time. Knobs:
 
   time-step    time step over the stable one: 0.9, 0.45, 0.225
   stiffness    of contacts: ×1, ×2, ×4; the time step follows
-  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows
+  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows.
+               On links strands alone
   restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
   control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
-  hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate
+  hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
   fidelity     draft, standard, reference
 
 The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
@@ -60,6 +61,7 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
 """,
     )
     add_scene(accuracy)
+    add_engine(accuracy, "run the whole ladder on this engine instead of what the scene says")
     accuracy.add_argument("--out", type=Path, metavar="DIR", help="directory of the ladder")
     accuracy.add_argument("--seeds", default=_SEEDS, metavar="1,2,…", help=f"seeds of each setting; default: {_SEEDS}")
     accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to turn; default: all that the scene calls for")
@@ -135,7 +137,7 @@ def _expanded(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Expanded:
     from templates.sweep.expand import expand  # noqa: PLC0415
 
     knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
-    scene = load_scene(arguments.scene, arguments.set)
+    scene = load_scene(arguments.scene, engine_settings(arguments))
     ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
     expected_s = {setting: expected_wall_s(one) for setting, one in ladder.scenes.items()}
     if arguments.max_run_hours is not None:

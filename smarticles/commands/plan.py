@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_json, add_scene, positive_number
+from smarticles.parsing import Commands, add_engine, add_json, add_scene, engine_settings, positive_number
 from smarticles.scenes import read_scene
 
 if TYPE_CHECKING:
@@ -31,12 +31,14 @@ the finest within the other. What was measured stands in a table that `smarticle
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference
+  smarticles plan scene.yaml --engine links
   smarticles plan scene.yaml --json | jq .time_step_s
   smarticles plan scene.yaml --max-error 0.03 --table accuracy/results/work_precision.csv
   smarticles plan scene.yaml --max-hours 4
 """,
     )
     add_scene(plan)
+    add_engine(plan, "plan it on this engine instead of what the scene says")
     plan.add_argument(
         "--max-error",
         type=positive_number,
@@ -59,7 +61,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
     """`smarticles plan`."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
-    scene = read_scene(arguments.scene, arguments.set)
+    scene = read_scene(arguments.scene, engine_settings(arguments))
     choice = _chosen(scene, arguments)
     planned = plan(scene) if choice is None else choice.planned
     if arguments.json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from smarticles.parsing import Commands, add_scene, positive_int
+from smarticles.parsing import Commands, add_engine, add_scene, engine_settings, positive_int
 from smarticles.scenes import run_here
 
 
@@ -25,10 +25,12 @@ directory that holds something else is never touched.""",
   smarticles run scene.yaml --out runs/a
   smarticles run scene.yaml --out runs/b --set seed=2 --set phases.2.duration_s=5
   smarticles run scene.yaml --out runs/c --set fidelity=draft
+  smarticles run scene.yaml --out runs/d --engine links
   smarticles run scene.yaml --out runs/a --resume
 """,
     )
     add_scene(run)
+    add_engine(run, "what computes it, instead of what the scene says")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="new run directory")
     run.add_argument(
         "--resume",
@@ -51,7 +53,7 @@ def run_scene(arguments: argparse.Namespace) -> int:
         arguments.scene,
         arguments.out,
         arguments,
-        settings=arguments.set,
+        settings=engine_settings(arguments),
         resume=arguments.resume,
         threads=arguments.threads,
     )

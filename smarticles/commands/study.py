@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from smarticles.layout import columns, told_results
-from smarticles.parsing import Commands, add_slots
-from smarticles.sweeps import compute, make_folder, refuse_failures
+from smarticles.parsing import Commands, add_engine, add_slots
+from smarticles.sweeps import changed_sweep, compute, make_folder, refuse_failures
 from studies import registry
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
   smarticles study gravish --quick --out demo
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
+  smarticles study gravish --out gravish-yade --engine yade  every run on one engine
   smarticles study sensitivity --out sensitivity
   smarticles study procedures --quick --out procedures-quick
   smarticles study procedures --out procedures --analyse     what the finished runs say so far
@@ -51,6 +52,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
     study.add_argument(
         "--fidelity", metavar="NAME", help="draft, standard or reference instead of what the study ships with"
     )
+    add_engine(study, "all runs on this engine, instead of those that the study ships with")
     study.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
     add_slots(study)
@@ -61,8 +63,10 @@ def run_study(arguments: argparse.Namespace) -> int:
     shipped = registry.shipped(arguments.name)
     file = registry.study_file(arguments.name, quick=arguments.quick)
     changed = _changed(arguments.name, file, arguments.fidelity)
-    folder = make_folder(file, arguments.out, arguments.command_line, changed)
-    note = _note(arguments.name, file, changed)
+    if arguments.engine is not None:
+        _refuse_engine(arguments.name, file, arguments.engine)
+    folder = make_folder(file, arguments.out, arguments.command_line, changed, engine=arguments.engine)
+    note = _note(arguments.name, file, changed, arguments.engine)
     print(note, flush=True)
     load = partial(shipped.load, quick=arguments.quick)
     return compute_and_analyse(folder, arguments, load, note=note, pictured=shipped.pictured)
@@ -143,17 +147,32 @@ def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
     return changed
 
 
+def _refuse_engine(name: str, file: Path, engine: str) -> None:
+    """Refuse an engine that a study's scenes are not valid on.
+
+    Raises:
+        InputError: there is one.
+    """
+    from templates.sweep.expand import expand  # noqa: PLC0415
+
+    try:
+        expand(changed_sweep(file, {}, engine=engine))
+    except InputError as error:
+        msg = f"--engine {engine}: study {name} cannot be run on it ({error}); leave --engine out"
+        raise InputError(msg) from None
+
+
 def _scenes(points: Sequence[Point]) -> set[str]:
     return {point.scene_sha256 for point in points}
 
 
-def _note(name: str, file: Path, changed: Mapping[str, str]) -> str:
+def _note(name: str, file: Path, changed: Mapping[str, str], engine: str | None) -> str:
     """How what is run differs from the full study as it ships, one line."""
     from studies.base.shipped import differences  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
-    here = expand(with_constants(load_sweep(file), changed))
+    here = expand(changed_sweep(file, changed, engine=engine))
     lines = differences(here, expand(load_sweep(registry.study_file(name))))
     return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
 

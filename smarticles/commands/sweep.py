@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from smarticles import queueing
 from smarticles.layout import columns
-from smarticles.parsing import Commands, add_slots, positive_int
-from smarticles.sweeps import complete_and_tell, expected_wall_s, make_folder
+from smarticles.parsing import Commands, add_engine, add_slots, positive_int
+from smarticles.sweeps import changed_sweep, complete_and_tell, expected_wall_s, make_folder
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -32,6 +32,8 @@ A sweep file makes many scenes from one template:
     table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file
   derived: {half: "(count / 2) | round | int"}
   repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+  again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}
+                                      # some of these runs once more, last, with other constants
 
 The same command again takes up where it stopped, see `smarticles resume --help`."""
 
@@ -63,6 +65,7 @@ def add(commands: Commands) -> None:
     sweep.add_argument(
         "--max-points", type=positive_int, metavar="N", help="refuse a sweep of more runs; default: 10000"
     )
+    add_engine(sweep, "all runs on this engine: its constant `engine` is set to it")
     add_slots(sweep)
     queueing.add_options(sweep)
 
@@ -71,9 +74,8 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     """`smarticles sweep`."""
     from templates.slurm.queue import require_sbatch  # noqa: PLC0415
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
-    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
-    sweep = load_sweep(arguments.sweep)
+    sweep = changed_sweep(arguments.sweep, {}, engine=arguments.engine)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
     queue = queueing.wants_queue(arguments)
     if arguments.dry_run:
@@ -86,7 +88,13 @@ def run_sweep(arguments: argparse.Namespace) -> int:
             require_sbatch()
         # Renders all and throws it away: what is refused is refused before anything is written.
         _draft(sweep.content.name, points, arguments)
-    folder = make_folder(arguments.sweep, _place(arguments), arguments.command_line, max_points=arguments.max_points)
+    folder = make_folder(
+        arguments.sweep,
+        _place(arguments),
+        arguments.command_line,
+        engine=arguments.engine,
+        max_points=arguments.max_points,
+    )
     if queue:
         return queueing.enqueue(folder, arguments)
     if arguments.submit == "none":

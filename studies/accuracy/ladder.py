@@ -141,7 +141,12 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
         if knob in _OF_MOTORS and not driven:
             msg = f"--knobs: {knob} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
             raise InputError(msg)
-    chosen = knobs or [knob for knob in KNOBS if driven or knob not in _OF_MOTORS]
+    if scene.smooth and "hinge" in (knobs or ()):
+        msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
+        raise InputError(msg)
+    chosen = knobs or [
+        knob for knob in KNOBS if (driven or knob not in _OF_MOTORS) and not (scene.smooth and knob == "hinge")
+    ]
     base = _variables(scene)
     template = _template(scene)
     settings: dict[str, Mapping[str, Value]] = {BASE: base}
@@ -149,7 +154,7 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     rungs: list[Rung] = []
     left_out: list[str] = []
     for knob in chosen:
-        for value, unit, name, changes in _rungs(knob, base):
+        for value, unit, name, changes in _rungs(knob, base, smooth=scene.smooth):
             values = {**base, **changes}
             # The name of a fidelity decides nothing by itself.
             knobs_only = {key: value for key, value in values.items() if key != "base"}
@@ -255,8 +260,8 @@ _Point = tuple[str, str, str, dict[str, Value]]
 """Value and unit as text, name of the setting, and the variables that differ from the base."""
 
 
-def _rungs(knob: str, base: Mapping[str, Value]) -> list[_Point]:
-    """All rungs of a knob, coarse to fine."""
+def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
+    """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
     if knob == "time-step":
         return _numbers("time-step", "time_step_fraction", "", _with(_STEPS, base["time_step_fraction"]))
     if knob == "restitution":
@@ -264,7 +269,7 @@ def _rungs(knob: str, base: Mapping[str, Value]) -> list[_Point]:
     if knob == "control":
         return _numbers("control", "control_interval_s", "s", _with(_CONTROL_INTERVALS, base["control_interval_s"]))
     if knob == "section":
-        return _sections(base)
+        return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
         return [(name, "", name, {"base": name, "diameter_m": None, **values}) for name, values in FIDELITIES.items()]
     key = {"stiffness": "stiffness_N_per_m", "hinge": "hinge_stiffness_N_per_m"}[knob]
@@ -296,6 +301,17 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
         shapes.append(own)
     shapes.sort(key=lambda shape: (shape["rows"], -shape["pitch"]))
     return [(name := _told_section(**shape), "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape) for shape in shapes]
+
+
+def _strands(base: Mapping[str, Value]) -> list[_Point]:
+    """One, two and three strands of a smooth link, by the scene's own rule of their diameter."""
+    shapes = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
+    own = {key: base[key] for key in shapes[0]}
+    if not any(_same(own, shape) for shape in shapes):
+        shapes.append(own)
+    shapes.sort(key=lambda shape: shape["rows"] or 0)
+    names = [f"{shape['rows']}-strands" + ("" if shape["diameter_m"] is None else "-own") for shape in shapes]
+    return [(name.replace("-", " "), "", name, dict(shape)) for name, shape in zip(names, shapes, strict=True)]
 
 
 def _told_section(*, rows: int, pitch: float, diameter_m: float | None) -> str:

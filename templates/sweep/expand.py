@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.scene.reading import parse_scene, scene_hash
 from dem.scene.scene import Scene
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
@@ -30,12 +30,14 @@ class Point:
         values: every variable, the seed included.
         scene: the validated scene.
         scene_sha256: its hash.
+        again: whether it is another point once more, with other constants.
     """
 
     name: str
     values: Mapping[str, Value]
     scene: Scene
     scene_sha256: str
+    again: bool = False
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
@@ -50,19 +52,33 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
     """
     count = _count(sweep)
     if count > max_points:
-        msg = (
-            f"{sweep.path}: points: {count} runs, more than {max_points}; "
-            f"shorten its lists, or give --max-points {count}"
-        )
-        raise InputError(msg)
+        raise _too_many(sweep, count, max_points)
     points: list[Point] = []
-    for values in _assignments(sweep):
+    assigned = list(_assignments(sweep))
+    again = _again(sweep, assigned)
+    if count + len(again) > max_points:
+        raise _too_many(sweep, count + len(again), max_points)
+    for index, values in enumerate([*assigned, *again]):
         name = _run_name(sweep, values)
         data = render_yaml(sweep.template_text, values, str(sweep.template))
         scene = parse_scene(data, source=f"{sweep.template}, rendered for run {name}")
-        points.append(Point(name=name, values=values, scene=scene, scene_sha256=scene_hash(scene)))
+        points.append(
+            Point(
+                name=name,
+                values=values,
+                scene=scene,
+                scene_sha256=scene_hash(scene),
+                again=index >= len(assigned),
+            )
+        )
     _refuse_twins(sweep, points)
     return points
+
+
+def _too_many(sweep: Sweep, count: int, max_points: int) -> InputError:
+    return InputError(
+        f"{sweep.path}: points: {count} runs, more than {max_points}; shorten its lists, or give --max-points {count}"
+    )
 
 
 def _count(sweep: Sweep) -> int:
@@ -94,8 +110,12 @@ def _assignments(sweep: Sweep) -> Iterator[dict[str, Value]]:
         sources["points.grid"] = [dict(zip(points.grid, row, strict=True)) for row in combinations]
     used = {where: rows for where, rows in sources.items() if rows}
     _refuse_shared(sweep, {where: set(rows[0]) for where, rows in used.items()})
+    yield from _repeated(sweep, [_derived(sweep, values) for values in _joined(used.values())])
+
+
+def _repeated(sweep: Sweep, assigned: Sequence[dict[str, Value]]) -> Iterator[dict[str, Value]]:
+    """Values of all variables with each seed."""
     repeats = sweep.content.repeats
-    assigned = list(_without_seed(sweep, list(used.values())))
     if repeats is None:
         yield from assigned
     elif repeats.seed_by_seed:
@@ -104,15 +124,46 @@ def _assignments(sweep: Sweep) -> Iterator[dict[str, Value]]:
         yield from ({**values, SEED: seed} for values in assigned for seed in repeats.seeds)
 
 
-def _without_seed(sweep: Sweep, sources: Sequence[Sequence[Mapping[str, Value]]]) -> Iterator[dict[str, Value]]:
-    """Values of all variables but the seed, point by point."""
+def _joined(sources: Iterable[Sequence[Mapping[str, Value]]]) -> Iterator[dict[str, Value]]:
     for parts in itertools.product(*sources):
-        values = {name: value for part in parts for name, value in part.items()}
-        for name, expression in sweep.content.derived.items():
-            where = f"{sweep.path}: derived.{name}"
-            literal = not isinstance(expression, str)
-            values[name] = expression if literal else evaluate(str(expression), values, where)
-        yield values
+        yield {name: value for part in parts for name, value in part.items()}
+
+
+def _derived(sweep: Sweep, values: Mapping[str, Value]) -> dict[str, Value]:
+    """The same values with those that follow from them."""
+    values = dict(values)
+    for name, expression in sweep.content.derived.items():
+        where = f"{sweep.path}: derived.{name}"
+        literal = not isinstance(expression, str)
+        values[name] = expression if literal else evaluate(str(expression), values, where)
+    return values
+
+
+def _again(sweep: Sweep, points: Sequence[Mapping[str, Value]]) -> list[dict[str, Value]]:
+    """The points that come once more with other constants.
+
+    Raises:
+        InputError: a variable that chooses them is unknown, or no point has one of its values.
+    """
+    again = sweep.content.again
+    if again is None:
+        return []
+    chosen = list(points)
+    for name, wanted in again.only.items():
+        where = f"{sweep.path}: again.only.{name}"
+        if name not in points[0]:
+            msg = f"{where}: no such variable; {nearest(name, sorted(points[0]))}"
+            raise InputError(msg)
+        present = list(dict.fromkeys(str(point[name]) for point in points))
+        for value in wanted:
+            if not any(point[name] == value for point in points):
+                msg = f"{where}: no point has {value!r}; there are {', '.join(present)}"
+                raise InputError(msg)
+        chosen = [point for point in chosen if point[name] in wanted]
+    if not chosen:
+        msg = f"{sweep.path}: again.only: keeps no point; give fewer conditions"
+        raise InputError(msg)
+    return [_derived(sweep, {**point, **again.constants}) for point in chosen]
 
 
 def _refuse_shared(sweep: Sweep, names: Mapping[str, set[str]]) -> None:

@@ -118,12 +118,14 @@ class Entry:
         scene_sha256: hash of its scene.
         expected_s: expected wall time [s]; only its proportion to the others' matters.
         values: the sweep's variables.
+        again: whether it is another run once more, with other constants.
     """
 
     name: str
     scene_sha256: str
     expected_s: float
     values: Mapping[str, Value]
+    again: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,10 +147,13 @@ class Folder:
     seed_by_seed: bool = False
 
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
-        """Runs in the order in which to start them: the longest first, seed by seed where the sweep says so."""
+        """Runs in the order in which to start them: the longest first, seed by seed where the sweep says so.
+
+        Those that come once more, such as on a slower engine, come after all others.
+        """
         seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries)) if self.seed_by_seed else []
         ranks = {seed: rank for rank, seed in enumerate(seeds)}
-        return sorted(entries, key=lambda entry: (ranks.get(entry.values.get(SEED), 0), -entry.expected_s))
+        return sorted(entries, key=lambda entry: (entry.again, ranks.get(entry.values.get(SEED), 0), -entry.expected_s))
 
     def scene(self, entry: Entry) -> Path:
         """Scene file of a run."""
@@ -304,6 +309,7 @@ def _manifest(
                 "scene_sha256": point.scene_sha256,
                 "expected_s": round(expected_s(point.scene), 1),
                 "values": dict(point.values),
+                **({"again": True} if point.again else {}),
             }
             for point in points
         ],
@@ -365,6 +371,7 @@ def open_folder(path: Path) -> Folder:
                     scene_sha256=str(point["scene_sha256"]),
                     expected_s=float(point["expected_s"]),
                     values=dict(point["values"]),
+                    again=point.get("again") is True,
                 )
                 for point in content["points"]
             ),

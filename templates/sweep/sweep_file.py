@@ -13,6 +13,7 @@ points:                             # any of these; several are crossed with eac
 derived: {half: "(count / 2) | round | int"}                # expressions, in order
 repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
                                     # `seed_by_seed: true` beside it: all points with the first seed come first
+again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
 """
 
 from __future__ import annotations
@@ -118,6 +119,15 @@ class Repeats(_Model):
         return seeds
 
 
+class Again(_Model):
+    """Some of the points once more, with other constants, after all others; such as on another engine."""
+
+    constants: dict[str, Value] = Field(min_length=1, description="constants that differ there")
+    only: dict[str, list[Value]] = Field(
+        default={}, description="the points whose variable holds one of these values; the seed is one of them"
+    )
+
+
 class SweepFile(_Model):
     """What a sweep file says, validated."""
 
@@ -129,6 +139,15 @@ class SweepFile(_Model):
     points: Points
     derived: dict[str, str | int | float | bool] = {}
     repeats: Repeats | None = None
+    again: Again | None = None
+
+    @model_validator(mode="after")
+    def _known(self) -> SweepFile:
+        for name in self.again.constants if self.again else ():
+            if name not in self.constants:
+                msg = f"again.constants: {name!r} is none of the constants; add it there"
+                raise ValueError(msg)
+        return self
 
     @field_validator("constants", "derived")
     @classmethod
@@ -206,6 +225,30 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
     return replace(sweep, content=content)
 
 
+ENGINE = "engine"
+"""The constant of a sweep that names the engine of its scenes."""
+
+
+def on_engine(sweep: Sweep, engine: str) -> Sweep:
+    """The same sweep with all its runs on one engine: nothing is run again on another.
+
+    Raises:
+        InputError: the sweep has no constant that names its engine.
+    """
+    content = sweep.content
+    if ENGINE not in content.constants:
+        msg = (
+            f"{sweep.path}: constants: there is no 'engine' that could be {engine}; add `engine: yade` there, and "
+            f"`engine: {{{{ engine }}}}` to {sweep.template}"
+        )
+        raise InputError(msg)
+    again = content.again
+    if again is not None and ENGINE in again.constants:
+        again = None
+    constants = {**content.constants, ENGINE: engine}
+    return replace(sweep, content=content.model_copy(update={"constants": constants, "again": again}))
+
+
 def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], Path | None, str | None]:
     if table is None:
         return [], None, None
@@ -243,4 +286,5 @@ _MODELS: Models = {
     ("points",): Points,
     ("points", "table"): Table,
     ("repeats",): Repeats,
+    ("again",): Again,
 }

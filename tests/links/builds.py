@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain, mean_width
-from dem.body.placement import Poses
+from dem.body.placement import Poses, place_layer
 from dem.engine.links.engine import LinksEngine
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
@@ -48,9 +48,7 @@ def boxes(aspect: float = 0.7, angles: tuple[float, float] = (math.pi / 2, math.
     )
 
 
-def particle(
-    aspect: float = 0.7, angles: tuple[float, float] = (math.pi / 2, math.pi / 2), rows: int = 1
-) -> Particle:
+def particle(aspect: float = 0.7, angles: tuple[float, float] = (math.pi / 2, math.pi / 2), rows: int = 1) -> Particle:
     diameter = DIAMETER if rows == 1 else T2
     return Particle(boxes(aspect, angles), SphereChain(rows=rows, diameter=diameter, pitch=0.35 * diameter))
 
@@ -59,7 +57,7 @@ def motor_law(law: str = "halt", **more: float) -> MotorLaw:
     return MotorLaw(**{"torque_limit": TORQUE, "speed_limit": 6.0, "stiffness": 3e-3, "law": law} | more)
 
 
-def engine(  # noqa: PLR0913
+def engine(
     *,
     law: ContactLaw = LAW,
     gravity: float = 0.0,
@@ -87,8 +85,6 @@ def at(positions: object, rotations: list[Rotation] | None = None) -> Poses:
 
 def pile(made: LinksEngine, count: int, *, seed: int = 1, settle: float = 0.3, per_layer: int = 10) -> LinksEngine:
     """Pour layer on layer into the cylinder, and wait."""
-    from dem.body.placement import place_layer
-
     rng = np.random.default_rng(seed)
     p, radius = made.particle, made.cylinder.radius
     while made.count < count:

@@ -82,7 +82,9 @@ def touching(rng: np.random.Generator, angle: float) -> tuple[np.ndarray, np.nda
         lengths = rng.uniform(0.5 * D, 10 * D, size=2)
         gap = D * rng.uniform(0.9, 0.999)
         p = np.array([0.0, 0.0, 0.0, lengths[0], 0.0, 0.0])
-        q = np.array([*rng.normal(size=2) * 2 * D, gap, lengths[1] * math.cos(angle), lengths[1] * math.sin(angle), 0.0])
+        q = np.array(
+            [*rng.normal(size=2) * 2 * D, gap, lengths[1] * math.cos(angle), lengths[1] * math.sin(angle), 0.0]
+        )
         q[3:] = Rotation.from_rotvec(rng.normal(size=3) * 0.02).apply(q[3:])
         turn = Rotation.random(random_state=rng)
         p, q = (np.concatenate([turn.apply(x[:3]), turn.apply(x[3:])]) for x in (p, q))
@@ -120,7 +122,7 @@ def test_a_rod_turned_over_another_feels_no_jump_and_gains_no_energy() -> None:
     energies, torques, counts = [], [], []
     for angle in angles:
         turned = np.array([math.cos(angle), math.sin(angle), 0.0]) * 8 * D
-        rod = np.concatenate([centre + [0, 0, gap] - turned / 2, turned])
+        rod = np.concatenate([centre + np.array([0, 0, gap]) - turned / 2, turned])
         energy, force, torque, count = look(p, rod, (False, False))
         energies.append(energy)
         torques.append((torque - np.cross(centre, force))[2])

@@ -27,9 +27,7 @@ def links_of(alpha1: float, alpha2: float) -> tuple[np.ndarray, np.ndarray, np.n
     b = builds.boxes(angles=(alpha1, alpha2))
     vertices = b._plain_vertices
     centres = (vertices[:3] + vertices[1:]) / 2 - b.plain_centre_of_mass
-    frames = np.array(
-        [np.stack([u, np.cross([0, 0, 1.0], u), [0, 0, 1.0]], axis=1) for u in b.directions]
-    )
+    frames = np.array([np.stack([u, np.cross([0, 0, 1.0], u), [0, 0, 1.0]], axis=1) for u in b.directions])
     return centres, frames, b.link_masses
 
 

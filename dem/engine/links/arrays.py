@@ -93,6 +93,7 @@ class Cells(NamedTuple):
         visited: (cells,) the last link that each cell was looked at for.
         marks: (N S, 7) as in `Pairs`.
         centres: (N, 3) as in `Pairs`.
+        boxes: (N S, 6) lower and upper corners of boxes about links and their skins [m].
         starts: (cells + 2,) where each cell begins in `owners`, from the second number on.
         rows: (N S + 1,) where the old list's rows begin.
         seen: (N S,) the last link that each link was looked at for.
@@ -108,6 +109,7 @@ class Cells(NamedTuple):
     visited: Indices
     marks: Array
     centres: Array
+    boxes: Array
     starts: Indices
     rows: Indices
     seen: Indices
@@ -300,7 +302,7 @@ def pairs_for(links: int, smarticles: int, capacity: int) -> Pairs:
 
 
 def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: int) -> Cells:
-    """Room for a search among `links` links of some smarticles in so many pieces, of `capacity` pairs, in so many cells."""
+    """Room for a search among `links` links of some smarticles, so many pieces, pairs and cells."""
     return Cells(
         np.zeros(pieces, np.int32),
         np.zeros(pieces, np.int32),
@@ -308,6 +310,7 @@ def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: in
         np.zeros(cells, np.int32),
         np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
+        np.zeros((links, 6)),
         np.zeros(cells + 2, np.int32),
         np.zeros(links + 1, np.int32),
         np.zeros(links, np.int32),

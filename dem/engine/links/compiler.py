@@ -72,7 +72,11 @@ def folder() -> Path | None:
     for base in _folders():
         path = base / f"links-{stamp()}"
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # Compiled code is loaded as it is: in a folder that all can write to, another could have left some.
+            if hasattr(os, "getuid") and path.stat().st_uid != os.getuid():
+                causes.append(f"{path} (belongs to another user)")
+                continue
             with tempfile.TemporaryFile(dir=path):
                 return path
         except (OSError, RuntimeError) as error:
@@ -92,7 +96,7 @@ def _announce() -> None:
     LOG.warning("compiling the links engine, about half a minute for each kind of phase%s", kept)
 
 
-class _Locator(_CacheLocator):  # type: ignore[misc] # Numba has no types
+class _Locator(_CacheLocator):
     """Tells Numba's cache where to keep what."""
 
     def __init__(self, line: int) -> None:
@@ -112,11 +116,11 @@ class _Locator(_CacheLocator):  # type: ignore[misc] # Numba has no types
         return cls(py_func.__code__.co_firstlineno)
 
 
-class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = (_Locator,)
+class _Implementation(CompileResultCacheImpl):
+    _locator_classes = [_Locator]  # type: ignore[list-item] # noqa: RUF012 - the type that Numba gives it
 
 
-class _Cache(NumbaCache):  # type: ignore[misc]
+class _Cache(NumbaCache):
     """Numba's cache, in our folder, and never a reason to fail."""
 
     _impl_class = _Implementation
@@ -132,7 +136,7 @@ class _Cache(NumbaCache):  # type: ignore[misc]
             if folder() is None:
                 self._enabled = False
             else:
-                super().__init__(self._function)
+                super().__init__(self._function)  # type: ignore[no-untyped-call]
                 self._ready = True
         return self._ready and self._enabled
 
@@ -141,7 +145,7 @@ class _Cache(NumbaCache):  # type: ignore[misc]
         found = None
         try:
             if self._prepare():
-                found = super().load_overload(sig, target_context)
+                found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception as error:
             self._give_up("read", error)
         if found is None:
@@ -152,7 +156,7 @@ class _Cache(NumbaCache):  # type: ignore[misc]
         """Keep compiled code."""
         try:
             if self._prepare():
-                super().save_overload(sig, data)
+                super().save_overload(sig, data)  # type: ignore[no-untyped-call]
         except Exception as error:
             self._give_up("written", error)
 

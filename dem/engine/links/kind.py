@@ -24,6 +24,7 @@ class LinksKind:
 
     name = "links"
     damps_once_per_look = False
+    idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
     actuated_share = 1.3
 
     def version(self) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -164,4 +166,5 @@ class LinksMotors:
         if "command" in arrays:
             assert self._law is not None  # a checkpoint belongs to its scene
             made = self._made(self._law)
-            world.motors = made._replace(**{name: arrays[name] for name in arrays if name in made._fields})
+            kept: dict[str, Any] = {name: arrays[name] for name in arrays if name in made._fields}
+            world.motors = made._replace(**kept)

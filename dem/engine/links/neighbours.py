@@ -1,10 +1,10 @@
 """Which links are near each other: a wide list, rebuilt seldom, and a tight one inside it, which steps look at.
 
 Every link has a skin of its own: how far its ends, and so all of it, may move until the list is made anew, apart from
-what all have moved on average, since a shaken pile moves as a whole. Links that are fast have thick skins and those that
-lie still thin ones, so that all are used up at about the same time. A list holds every pair whose axes are nearer than a
-diameter and both skins. Both lists are in an order that depends on the positions alone, and the memory of a contact
-goes with its pair.
+what all have moved on average, since a shaken pile moves as a whole. Links that are fast have thick skins and those
+that lie still thin ones, so that all are used up at about the same time. A list holds every pair whose axes are nearer
+than a diameter and both skins. Both lists are in an order that depends on the positions alone, and the memory of a
+contact goes with its pair.
 """
 
 from __future__ import annotations
@@ -87,11 +87,17 @@ def mark(shape: Shape, bodies: Bodies, marks: Array, centres: Array, least: floa
 
 
 @part
-def _distance(segments: Array, p: int, q: int) -> float:
-    """Squared distance of two axes [m²]."""
+def _near(segments: Array, p: int, q: int, reach: float) -> bool:
+    """Whether two axes are nearer than `reach` [m]."""
     ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
     vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
     wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+    # Most are told apart by the lines that they are on, without a division.
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    across = wx * nx + wy * ny + wz * nz
+    squared = reach * reach
+    if across * across > squared * (nx * nx + ny * ny + nz * nz):
+        return False
     s, t = nearest_on_segments(
         ux * ux + uy * uy + uz * uz,
         ux * vx + uy * vy + uz * vz,
@@ -100,7 +106,7 @@ def _distance(segments: Array, p: int, q: int) -> float:
         vx * wx + vy * wy + vz * wz,
     )
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    return x * x + y * y + z * z
+    return bool(x * x + y * y + z * z < squared)
 
 
 @part
@@ -114,7 +120,7 @@ def tighten(shape: Shape, bodies: Bodies, pairs: Pairs, least: float, most: floa
         p, q = first[k], second[k]
         reach = diameter + marks[p, 6] + marks[q, 6]
         # Contacts stay in the list until the step in which they end has forgotten them.
-        if _distance(bodies.segments, p, q) < reach * reach or pairs.used[k]:
+        if pairs.used[k] or _near(bodies.segments, p, q, reach):
             pairs.near[count] = k
             count += 1
     pairs.counts[1] = count
@@ -214,7 +220,7 @@ def _cell(offset: float, size: float, last: int) -> int:
 @part
 def _cuts(segments: Array, p: int, piece: float) -> int:
     squared = segments[p, 3] ** 2 + segments[p, 4] ** 2 + segments[p, 5] ** 2
-    return int(math.ceil(math.sqrt(squared) / piece))
+    return math.ceil(math.sqrt(squared) / piece)
 
 
 @part
@@ -239,8 +245,15 @@ def _search(shape: Shape, bodies: Bodies, cells: Cells, nx: int, ny: int, nz: in
         seen[p] = -1
     for cell in range(nx * ny * nz):
         visited[cell] = -1
+    boxes = cells.boxes
+    for p in range(count):
+        for d in range(3):
+            boxes[p, d] = min(marks[p, d], marks[p, 3 + d]) - marks[p, 6]
+            boxes[p, 3 + d] = max(marks[p, d], marks[p, 3 + d]) + marks[p, 6]
     total = 0
     for p in range(count):
+        x0, y0, z0 = boxes[p, 0] - bare, boxes[p, 1] - bare, boxes[p, 2] - bare
+        x1, y1, z1 = boxes[p, 3] + bare, boxes[p, 4] + bare, boxes[p, 5] + bare
         # Links of the same smarticle come right after each other.
         after = (p // each + 1) * each - 1
         mine = bare + marks[p, 6]
@@ -265,8 +278,17 @@ def _search(shape: Shape, bodies: Bodies, cells: Cells, nx: int, ny: int, nz: in
                             if seen[q] == p:
                                 continue
                             seen[q] = p
+                            if (
+                                (boxes[q, 0] > x1)
+                                | (boxes[q, 1] > y1)
+                                | (boxes[q, 2] > z1)
+                                | (boxes[q, 3] < x0)
+                                | (boxes[q, 4] < y0)
+                                | (boxes[q, 5] < z0)
+                            ):
+                                continue
                             reach = mine + marks[q, 6]
-                            if _distance(segments, p, q) < reach * reach:
+                            if _near(segments, p, q, reach):
                                 if total == capacity:
                                     return -1
                                 first[total] = p

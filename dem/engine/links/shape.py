@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.particle import Particle
+from dem.body.particle import Boxes, Particle
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class Shape(NamedTuple):
         radius: of the sphere that sweeps the links.
         offsets: (strands,) of the strands along the normal.
         kinds: (links,) which links carry contact: 0 barb 1, 1 the middle link, 2 barb 2.
-        reach: no point of a smarticle is farther from its centre of mass, whatever its angles.
+        reach: how far the axes of the links reach from the centre of mass, in the shape that it is poured in.
     """
 
     mass: float
@@ -74,5 +74,9 @@ def shape_of(particle: Particle) -> Shape:
         radius=radius,
         offsets=np.zeros(1) if rows == 1 else np.linspace(-reach, reach, rows),
         kinds=np.array([0, 1, 2] if barbed else [1], dtype=np.int64),
-        reach=length / 2 + barb + boxes.thickness_normal + radius,
+        reach=_reach(boxes),
     )
+
+
+def _reach(boxes: Boxes) -> float:
+    return float(np.linalg.norm(boxes.vertices, axis=1).max())

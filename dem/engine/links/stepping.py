@@ -26,10 +26,10 @@ def shaken_to(ground: Ground, time: float) -> None:
     """Put what is shaken where it is at a time [s]; `place` and `speed` are written."""
     if ground.wave[1] > 0.0:
         phase = ground.wave[1] * (time - ground.wave[2])
-        for part in range(4):
-            if ground.shaken[part]:
-                ground.place[part] = ground.base[part] + ground.wave[0] * math.sin(phase)
-                ground.speed[part] = ground.wave[0] * ground.wave[1] * math.cos(phase)
+        for k in range(4):
+            if ground.shaken[k]:
+                ground.place[k] = ground.base[k] + ground.wave[0] * math.sin(phase)
+                ground.speed[k] = ground.wave[0] * ground.wave[1] * math.cos(phase)
 
 
 @part
@@ -145,17 +145,17 @@ def advance(
             lost += push_hooks(shape, wall_law, bodies, ground, hooks, motors, ledger, dt, out)
         if cords is not None:
             totals[WORK] += pull(shape, bodies, cords, motors, dt)
-        for part in range(6):
+        for k in range(6):
             for d in range(3):
-                ground.sums[part, d] += ground.force[part, d]
-            if part < 4:
-                totals[WORK] -= ground.force[part, 2] * ground.speed[part] * dt
+                ground.sums[k, d] += ground.force[k, d]
+            if k < 4:
+                totals[WORK] -= ground.force[k, 2] * ground.speed[k] * dt
         kick(shape, bodies, motors, gravity, planar, dt)
         if ledger is not None:
             totals[LOST] += lost + settle(shape, bodies, motors, ledger, dt)
         drift(shape, bodies, motors, dt, row)
-        for part in range(4):
-            if not ground.shaken[part]:
-                ground.place[part] += ground.speed[part] * dt
+        for k in range(4):
+            if not ground.shaken[k]:
+                ground.place[k] += ground.speed[k] * dt
     shaken_to(ground, begin + (made + steps) * dt)
     return steps

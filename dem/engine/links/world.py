@@ -348,7 +348,7 @@ class World:
         )
         self.totals, self.skins = arrays["totals"], arrays["fast"]
         self.bodies, self.pairs, self.ends = group(Bodies, "bodies"), group(Pairs, "pairs"), group(Ends, "ends")
-        fixed = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
+        fixed: dict[str, Any] = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
         self.ground = self.ground._replace(**fixed)
         self.hooks = group(Hooks, "hooks") if "hooks.slip" in arrays else None
         self.rims = group(Rims, "rims") if "rims.slip" in arrays else None

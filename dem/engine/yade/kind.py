@@ -25,6 +25,7 @@ class YadeKind:
 
     name = "yade"
     damps_once_per_look = True
+    idle_knobs: tuple[str, ...] = ()
     # Three bodies and four bonds each, and the motors' looks.
     actuated_share = 1.7
 

@@ -72,7 +72,7 @@ def nearest_to_box(x: float, y: float, z: float, link: Array, half: Array) -> fl
 def meet_bar(
     x: float, y: float, z: float, link: Array, half: Array, radius: float, stiffness: float, out: Array
 ) -> int:
-    """Points of contact of a link with a bar, and the springs there, as `dem.engine.links.contact.meeting.meet` has them.
+    """Points of contact of a link with a bar, and the springs there, as `meet` has them for two links.
 
     Args:
         x: start of the link's axis, from the middle of the bar [m].
@@ -147,8 +147,8 @@ def _row(x: float, y: float, z: float, link: Array, half: Array, radius: float, 
             row[4] = math.copysign(1.0, py)
         else:
             row[5] = math.copysign(1.0, pz)
-        row[7] = radius + min(ways[0], min(ways[1], ways[2]))
-    return row[7]
+        row[7] = radius + min(ways[0], ways[1], ways[2])
+    return float(row[7])
 
 
 @part

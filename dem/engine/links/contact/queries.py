@@ -59,7 +59,7 @@ def _overlap(p: Array, q: Array, diameter: float, stiffness: float, out: Array) 
     """Overlap of two links that touch [m], from the energy of the contact at their nearest points."""
     meet(p, q, diameter, stiffness, False, False, out)
     share = out[0, 8]
-    return (2 * out[ENERGY, 0] / (stiffness * (2 - share))) ** 0.5
+    return float((2 * out[ENERGY, 0] / (stiffness * (2 - share))) ** 0.5)
 
 
 @kernel

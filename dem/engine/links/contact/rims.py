@@ -19,7 +19,7 @@ def _squared(link: Array, s: float, radius: float, height: float) -> float:
     """Squared distance [m²] of a point of a link's axis from a horizontal circle about the z-axis."""
     x, y, z = link[0] + s * link[3], link[1] + s * link[4], link[2] + s * link[5]
     out, up = math.sqrt(x * x + y * y) - radius, z - height
-    return out * out + up * up
+    return float(out * out + up * up)
 
 
 @part
@@ -56,7 +56,7 @@ def nearest_to_circle(link: Array, radius: float, height: float) -> float:
 def push_rims(
     shape: Shape, law: Law, bodies: Bodies, ground: Ground, rims: Rims, hinged: Any, ledger: Any, dt: float
 ) -> float:
-    """Add the forces of the rims on links between their ends; the ends meet them as `dem.engine.links.contact.walls` says.
+    """Add the forces of the rims on links between their ends; for the ends themselves the wall cares.
 
     Args:
         shape: what all smarticles have in common.

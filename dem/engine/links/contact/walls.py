@@ -245,7 +245,8 @@ def _edge(
     distance = math.sqrt(out * out + up * up)
     if distance < shape.radius and distance > 0.0:
         press(
-            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, surface, WALL, shape.radius - distance, x, y, z,
+            shape, law, bodies, ends, ground, hinged, ledger, dt, p, end, surface, WALL, shape.radius - distance,
+            x, y, z,
             ex * out / distance, ey * out / distance, up / distance,
         )  # fmt: skip
 

@@ -1,11 +1,11 @@
 """Motors in the kernels: what they measure, what they prescribe, and what they exert.
 
-Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The mean
-torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle: τ = dp/dt
-- ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look the rate
-jumps at once, to no more than what τ_max alone would give to a free barb in the period (`acceleration`): a motor turns
-round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the motor. What a jump
-takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
+Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
+mean torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle:
+τ = dp/dt - ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look
+the rate jumps at once, by no more than what τ_max alone would give to a free barb in the period (`acceleration`): a
+motor turns round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the
+motor. What a jump takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
 
 Slip and servo let the angle be free: p is a state of its own, and τ a spring to the command, capped, and for a servo
 damped. The spring is taken at the mean of the angles half a step before and after, the damper at the rate after, so
@@ -20,7 +20,7 @@ import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
 from dem.engine.links.compiler import kernel, part
-from dem.engine.links.motion.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
+from dem.engine.links.motion.planar import lagrange_force, lay_out, lay_out_near, mobility, momenta, rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
@@ -157,8 +157,9 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
 
 @part
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
-    """Generalised forces of contacts on the angles [N m]: all points move as an angle turns, as the centre of mass
-    does not.
+    """Generalised forces of contacts on the angles [N m].
+
+    All points of a smarticle move as an angle turns, since the centre of mass does not.
     """
     axes, load, row = bodies.axes, bodies.load, bodies.plane[i]
     share = shape.barb_mass / shape.mass
@@ -235,7 +236,7 @@ def middle_of_step(
     wx, wy, wz = 0.0, 0.0, 0.0
     for turn in range(ITERATIONS):
         if turn == 0 or free:
-            lay_out(shape, bodies.alpha[i, 0] + half * r1, bodies.alpha[i, 1] + half * r2, row)
+            lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
         if free:
             r1, r2 = rates(row, z, p1 + half * g1, p2 + half * g2)
         wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)

@@ -24,6 +24,8 @@ from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
 
+SMALL = 1e-4  # rad²; up to this square of an angle the series used here are exact to the last digit
+
 
 @kernel
 def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
@@ -38,11 +40,12 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
             (= A_22) and A_12 [kg m²].
     """
     c1, s1, c2, s2 = math.cos(alpha1), math.sin(alpha1), math.cos(alpha2), math.sin(alpha2)
-    _lay_out(shape, c1, s1, c2, s2, row)
+    lay_out_directions(shape, c1, s1, c2, s2, row)
 
 
 @part
-def _lay_out(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
+def lay_out_directions(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
+    """See `lay_out`; the cosines and sines of the angles are given."""
     arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
     share = mb / shape.mass
     x1, y1, x2, y2 = -shape.half - c1 * arm, s1 * arm, shape.half + c2 * arm, s2 * arm
@@ -65,6 +68,27 @@ def _lay_out(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Arra
 
 
 @part
+def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array) -> None:
+    """The same for angles that differ little from those of another row, without sines of the whole angles.
+
+    Args:
+        shape: what all have in common.
+        by1: by how much angle 1 is greater [rad].
+        by2: by how much angle 2 is greater [rad].
+        from_: (PLANE,) the other row.
+        row: (PLANE,) written.
+    """
+    x1, x2 = by1 * by1, by2 * by2
+    if x1 > SMALL or x2 > SMALL:
+        c, s, d, t = math.cos(by1), math.sin(by1), math.cos(by2), math.sin(by2)
+    else:
+        c, s = 1 - x1 / 2 * (1 - x1 / 12 * (1 - x1 / 30)), by1 * (1 - x1 / 6 * (1 - x1 / 20))
+        d, t = 1 - x2 / 2 * (1 - x2 / 12 * (1 - x2 / 30)), by2 * (1 - x2 / 6 * (1 - x2 / 20))
+    c1, s1, c2, s2 = -from_[10], from_[11], from_[12], from_[13]
+    lay_out_directions(shape, c1 * c - s1 * s, s1 * c + c1 * s, c2 * d - s2 * t, s2 * d + c2 * t, row)
+
+
+@part
 def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tuple[float, float, float]:
     """ω = I⁻¹(L - h z) [rad/s], all in the middle link's axes.
 
@@ -76,8 +100,8 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
         internal: h = b·α̇ [kg m²/s].
     """
     xx, yy, xy = row[14], row[15], row[17]
-    determinant = xx * yy - xy * xy
-    return (yy * lx - xy * ly) / determinant, (xx * ly - xy * lx) / determinant, (lz - internal) / row[16]
+    inverse = 1 / (xx * yy - xy * xy)
+    return (yy * lx - xy * ly) * inverse, (xx * ly - xy * lx) * inverse, (lz - internal) / row[16]
 
 
 @part
@@ -137,4 +161,4 @@ def lagrange_force(
     b_mine = -mb * shape.arm * (cx * dy - cy * dx)
     b_other = -mb * share * (ux * vy - uy * vx)
     a_both = share * mb * shape.arm * (dx * vx + dy * vy)
-    return force + wz * (b_mine * mine + b_other * other) + mine * other * a_both
+    return float(force + wz * (b_mine * mine + b_other * other) + mine * other * a_both)

@@ -32,7 +32,7 @@ def turn_axes(bodies: Bodies, i: int) -> None:
 def along_normal(bodies: Bodies, i: int) -> float:
     """Angular momentum of a smarticle along its normal [kg m²/s]."""
     axes, momentum = bodies.axes, bodies.momentum
-    return axes[i, 0, 2] * momentum[i, 0] + axes[i, 1, 2] * momentum[i, 1] + axes[i, 2, 2] * momentum[i, 2]
+    return float(axes[i, 0, 2] * momentum[i, 0] + axes[i, 1, 2] * momentum[i, 1] + axes[i, 2, 2] * momentum[i, 2])
 
 
 @part

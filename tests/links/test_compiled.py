@@ -1,0 +1,97 @@
+"""Compiled code: only what a scene calls for, the same bits cold and warm, and no cache is a reason to fail."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import builds
+import numpy as np
+from numba import types
+
+from dem.engine.links.stepping import advance
+
+HERE = Path(__file__).parent
+PROGRAM = """
+import builds, hashlib, logging
+logging.basicConfig(format="%(message)s")
+made = builds.pile(builds.engine(gravity=9.81, radius=0.0234), 6, settle=0.02)
+bodies = made._world.bodies
+print(hashlib.sha256(bodies.position.tobytes() + bodies.turn.tobytes()).hexdigest())
+"""
+
+
+def run(cache: Path) -> tuple[str, str]:
+    """What a fresh process computes with a cache folder, and what it says."""
+    path = os.pathsep.join([str(HERE), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env={**os.environ, "SMARTICLES_CACHE_DIR": str(cache), "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.strip(), done.stderr
+
+
+def test_a_scene_compiles_what_it_calls_for_only() -> None:
+    before = set(advance.signatures)
+    made = builds.engine(gravity=9.81)
+    made.add(builds.at([0, 0, 1.0]))
+    made.advance(1)
+    welded = [s for s in advance.signatures if s not in before] or list(before)
+    names = advance.py_func.__code__.co_varnames[: advance.py_func.__code__.co_argcount]
+    plain = [
+        s
+        for s in welded
+        if all(s[names.index(n)] is types.none for n in ("motors", "hooks", "rims", "channel", "cords", "ledger"))
+    ]
+    assert plain
+    # Nothing of a hook, a rim, a string or the account is in its code.
+    code = advance.inspect_llvm(plain[0])
+    for name in ("push_hooks", "push_rims", "push_sideways", "settle", "middle_of_step"):
+        assert name not in code, name
+    assert "push_apart" in code or "push_up" in code
+
+
+def test_cold_and_warm_give_the_same_bits_and_a_broken_cache_is_no_harm(tmp_path: Path) -> None:
+    cold, said = run(tmp_path)
+    assert "compiling the links engine" in said
+    warm, said = run(tmp_path)
+    assert warm == cold
+    assert said == ""
+    for file in tmp_path.rglob("*.nbc"):
+        file.write_bytes(b"rubbish")
+    broken, said = run(tmp_path)
+    assert broken == cold
+    assert "compiled code cannot be read" in said
+    assert str(tmp_path) in said
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    program = "import logging, builds; logging.basicConfig(format='%(message)s')\n"
+    program += "made = builds.engine(); made.add(builds.at([0, 0, 1.0])); made.state(); print(made.count)"
+    path = os.pathsep.join([str(HERE), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "SMARTICLES_CACHE_DIR": str(blocked), "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "1"
+    assert done.stderr.count("compiled code cannot be kept") == 1
+    assert "SMARTICLES_CACHE_DIR" in done.stderr
+
+
+def test_a_digest_of_a_pile_does_not_depend_on_what_ran_before() -> None:
+    digests = set()
+    for _ in range(2):
+        made = builds.pile(builds.engine(gravity=9.81, radius=0.0234), 5, settle=0.01)
+        digests.add(hashlib.sha256(np.ascontiguousarray(made._world.bodies.position).tobytes()).hexdigest())
+    assert len(digests) == 1

@@ -1,0 +1,261 @@
+"""Contacts with the floor, the wall, hooks, rims and each other, where the answer is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import builds
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem.engine.links.neighbours import build
+from dem.physics.contact import damping_ratio
+from dem.setting.hooks import Cross
+from dem.setting.plane import Channel
+
+FLAT = Rotation.identity()
+RADIUS = builds.DIAMETER / 2
+MASS = builds.boxes().mass
+
+
+def test_a_bar_bounces_with_its_restitution() -> None:
+    # Both ends of a bar that lies flat: two springs on the whole mass.
+    p, zeta = builds.particle(aspect=0.0), damping_ratio(0.6)
+    law = replace(builds.LAW, wall_damping=2 * zeta * math.sqrt(2 * 500.0 * p.boxes.mass) / 2)
+    made = builds.engine(law=law, dt=1e-6, made_of=p)
+    made.add(builds.at([0, 0, RADIUS + 1e-5], [FLAT]))
+    made._world.bodies.velocity[0, 2] = -0.1
+    made.advance(4000)
+    assert made.state().velocities[0, 2] == pytest.approx(0.06, rel=2e-3)
+    assert made.fixtures.container_force[2] == 0.0
+
+
+def test_a_bar_rests_with_its_weight_on_the_floor() -> None:
+    made = builds.engine(gravity=9.81, made_of=builds.particle(aspect=0.0))
+    weight = made.particle.boxes.mass * 9.81
+    made.add(builds.at([0, 0, RADIUS], [FLAT]))
+    made.advance(8000)
+    assert made.fixtures.container_force[2] == pytest.approx(-weight, rel=1e-6)
+    assert RADIUS - made.state().positions[0, 2] == pytest.approx(weight / (2 * 500.0), rel=1e-6)
+    assert made.touches().tolist() == [2]
+    assert made.neighbours().tolist() == [0]
+    assert made.unbalanced_force() < 1e-6
+
+
+def test_a_slider_is_stopped_by_friction() -> None:
+    made = builds.engine(gravity=9.81, dt=2e-5)
+    made.add(builds.at([0, 0, RADIUS - MASS * 9.81 / 2000.0], [FLAT]))
+    made._world.bodies.velocity[0, 0] = 0.1
+    made.advance(500)
+    # Friction acts below the centre of mass, which tilts it a little; on average it is μ g.
+    assert made.state().velocities[0, 0] == pytest.approx(0.1 - 0.4 * 9.81 * 0.01, rel=0.02)
+    made.advance(10000)
+    assert np.abs(made.state().velocities).max() < 1e-6
+
+
+def test_it_sticks_on_an_incline_and_slides_where_friction_is_too_small() -> None:
+    for friction, sticks in ((0.5, True), (0.2, False)):
+        made = builds.engine(law=replace(builds.LAW, wall_friction=friction), gravity=9.81, dt=2e-5)
+        made.add(builds.at([0, 0, RADIUS - MASS * 9.81 / 2000.0], [FLAT]))
+        made.advance(2000)
+        for _ in range(100):  # a push of 0.3 g along x
+            made._world.bodies.velocity[0, 0] += 0.3 * 9.81 * 2e-5 * 50
+            made.advance(50)
+        moved = made.state().positions[0, 0]
+        assert (abs(moved) < 2e-5) == sticks
+        if not sticks:
+            assert moved == pytest.approx(0.5 * (0.3 - 0.2) * 9.81 * 0.1**2, rel=0.05)
+
+
+def test_two_bars_cross_and_one_carries_the_other() -> None:
+    made = builds.engine(gravity=9.81, made_of=builds.particle(aspect=0.0))
+    turn = Rotation.from_euler("z", 90, degrees=True)
+    made.add(builds.at([[0, 0, RADIUS], [0, 0, 3 * RADIUS]], [FLAT, turn]))
+    made.advance(8000)
+    state = made.state()
+    mass = made.particle.boxes.mass
+    assert 3 * RADIUS - state.positions[1, 2] == pytest.approx(mass * 9.81 / 500 + 2 * mass * 9.81 / 1000, rel=1e-4)
+    assert made.neighbours().tolist() == [1, 1]
+
+
+def test_parallel_bars_lie_on_each_other_at_rest() -> None:
+    made = builds.engine(gravity=9.81, made_of=builds.particle(aspect=0.0), law=replace(builds.LAW, friction=1.0))
+    made.add(builds.at([[0, 0, RADIUS], [1e-3, 0, 3 * RADIUS]]))
+    made.advance(4000)
+    before = made.state().positions
+    made.advance(20000)
+    after = made.state()
+    # Round bars balance on each other; nothing along them moves or tilts.
+    assert np.abs(after.positions[:, [0, 2]] - before[:, [0, 2]]).max() < 1e-7
+    assert abs(after.link_rotations[1, 1, 2, 0]) < 1e-4
+
+
+def test_the_wall_holds_what_circles_inside_it() -> None:
+    made = builds.engine(law=replace(builds.ELASTIC), radius=0.0234, dt=2e-5)
+    turn = Rotation.from_euler("x", 90, degrees=True)
+    made.add(builds.at([0.0234 - RADIUS - 8e-3, 0, 0.02], [turn]))
+    made._world.bodies.velocity[0] = [0.1, 0.35, 0.0]
+    state = made.state()
+    energy, spin = state.kinetic_energy, state.angular_momentum[2]
+    made.advance(25000)
+    after = made.state()
+    # Without friction a round wall takes no angular momentum about its axis; elastic: no energy.
+    assert after.angular_momentum[2] == pytest.approx(spin, rel=1e-9)
+    assert after.kinetic_energy == pytest.approx(energy, rel=0.02)
+    assert np.hypot(*after.vertices[0, :, :2].T).max() < 0.0234
+    assert made.fixtures.container_force.shape == (3,)
+
+
+def test_a_smarticle_hangs_on_a_hook_with_its_weight() -> None:
+    side = 0.5e-3
+    hooks = (
+        Cross(height=5e-3, side=side, length=builds.W),
+        Cross(height=40e-3, side=side, length=builds.W),
+    )
+    made = builds.engine(gravity=9.81, hooks=hooks, dt=2e-5, law=replace(builds.LAW, wall_friction=0.8))
+    # An upside-down U over the bar along y: the middle link lies across it, barbs hang down.
+    turn = Rotation.from_euler("x", -90, degrees=True)
+    com = builds.boxes().plain_centre_of_mass[1]
+    made.add(builds.at([0, 3e-3, 40e-3 + side / 2 + RADIUS - com], [turn]))
+    made.advance(25000)
+    sums = made.fixtures.hook_sums
+    made.advance(1000)
+    mean = (made.fixtures.hook_sums - sums) / 1000
+    assert mean[1, 2] == pytest.approx(-MASS * 9.81, rel=1e-3)
+    assert np.abs(mean[0]).max() == 0.0
+    # Raised, it comes along, and the work is the gain of potential energy.
+    height, work = made.state().positions[0, 2], made.account.container_work
+    made.fixtures.raise_upper(0.01)
+    made.advance(10000)
+    made.fixtures.stop()
+    made.advance(10000)
+    gain = made.state().positions[0, 2] - height
+    assert gain == pytest.approx(0.002, rel=1e-2)
+    assert made.account.container_work - work == pytest.approx(MASS * 9.81 * gain, rel=1e-2)
+    assert made.fixtures.upper_height == pytest.approx(0.042)
+
+
+def test_a_ceiling_between_tiers_stops_what_rises() -> None:
+    made = builds.engine(radius=0.0234, upper=((0.03, 0.01),), height=0.1)
+    made.add(builds.at([0.016, 0, 0.02], [FLAT]))
+    made._world.bodies.velocity[0, 2] = 0.2
+    made.advance(1200)
+    assert made.state().vertices[0, :, 2].max() < 0.03
+    assert made.state().velocities[0, 2] < 0
+
+
+def test_a_bar_across_a_rim_is_held_by_it() -> None:
+    # Through the opening of the upper tier, leaning on its edge.
+    made = builds.engine(gravity=0.0, radius=0.0234, upper=((0.03, 0.004),), height=0.1, made_of=builds.particle(0.0))
+    turn = Rotation.from_euler("y", 60, degrees=True)
+    made.add(builds.at([0.0, 0, 0.03], [turn]))
+    made._world.bodies.velocity[0] = [0.05, 0, 0]
+    made.advance(4000)
+    state = made.state()
+    at_rim = state.positions[0] + state.link_rotations[0, 1, :, 0] * (
+        (0.03 - state.positions[0, 2]) / state.link_rotations[0, 1, 2, 0]
+    )
+    assert abs(at_rim[0]) < 0.004
+    assert state.velocities[0, 0] < 0.05
+
+
+def test_a_lifted_wall_lets_through_below_its_edge_and_its_work_is_counted() -> None:
+    made = builds.engine(gravity=9.81, radius=0.0234)
+    made.add(builds.at([0.016, 0, RADIUS], [FLAT]))
+    made.advance(500)
+    assert made.fixtures.enclosed
+    made.fixtures.lift_wall(0.1)
+    made.advance(round(0.1 / made.time_step))
+    made.fixtures.stop()
+    assert made.fixtures.wall_bottom == pytest.approx(0.01 - 0.00234)
+    assert not made.fixtures.enclosed
+    made._world.bodies.velocity[0, 0] = 0.4
+    made.advance(4000)
+    assert made.state().positions[0, 0] > 0.0234
+    made.fixtures.remove_wall()
+    assert not made.fixtures.walled
+    assert made.fixtures.wall_bottom == math.inf
+
+
+def test_shaking_moves_floor_and_wall_and_ends_where_it_is() -> None:
+    made = builds.engine(gravity=9.81, dt=1e-4)
+    made.fixtures.shake(amplitude=1e-3, frequency=30.0)
+    made.add(builds.at([0, 0, 1.0]))
+    made.advance(1234)
+    phase = 2 * math.pi * 30 * 0.1234
+    assert made.fixtures.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
+    assert made.fixtures.velocity == pytest.approx(1e-3 * 2 * math.pi * 30 * math.cos(phase), rel=1e-9)
+    made.fixtures.stop()
+    made.advance(10)
+    assert made.fixtures.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
+    assert made.fixtures.velocity == 0.0
+
+
+def test_a_channel_confines_and_keeps_motion_in_the_plane() -> None:
+    made = builds.engine(channel=Channel(width=0.03, table=-1e-3), gravity=9.81)
+    made.add(builds.at([[0, 0, 0], [0.02, 0.003, 0]]))
+    made._world.bodies.velocity[:] = [[0.1, 0.2, 0], [-0.1, -0.1, 0]]
+    made.advance(20000)
+    state = made.state()
+    assert np.abs(state.vertices[..., 2]).max() == 0.0
+    assert np.abs(state.vertices[..., 1]).max() < 0.015
+    assert made.fixtures.channel_sums[0, 1] < 0 < made.fixtures.channel_sums[1, 1]
+    assert made.fixtures.floor == -1e-3
+    assert not made.fixtures.enclosed
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_neighbours_are_complete_in_a_moving_pile(rows: int) -> None:
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, made_of=builds.particle(rows=rows))
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-1, 1, size=(60, 3)) * [0.012, 0.012, 0.02] + [0, 0, 0.03]
+    made.add(builds.at(places, [Rotation.random(random_state=k) for k in range(60)]))
+    world = made._world
+    world.bodies.velocity[:] = rng.normal(size=(60, 3))
+    for _ in range(12):
+        made.advance(15)
+        world.posed()
+        pairs = world.pairs
+        near = pairs.near[: pairs.counts[1]]
+        listed = set(zip(pairs.first[near].tolist(), pairs.second[near].tolist(), strict=True))
+        for p, q in touching_links(world.bodies.segments, world.each, builds.DIAMETER if rows == 1 else builds.T2):
+            # The list was looked after before the last step: what has moved since is in its skin.
+            assert (p, q) in listed
+    assert pairs.counts[2] > 3
+
+
+def touching_links(segments: np.ndarray, each: int, diameter: float) -> list[tuple[int, int]]:
+    grid = np.linspace(0, 1, 41)
+    points = segments[:, None, :3] + grid[:, None] * segments[:, None, 3:]
+    found = []
+    for p in range(len(segments)):
+        for q in range(p + 1, len(segments)):
+            if p // each != q // each:
+                middle = np.linalg.norm(points[p, 20] - points[q, 20])
+                if middle < 0.013:
+                    away = np.linalg.norm(points[p][:, None] - points[q][None], axis=-1).min()
+                    if away < diameter:
+                        found.append((p, q))
+    return found
+
+
+def test_what_contacts_remember_survives_a_new_list() -> None:
+    made = builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5), 20)
+    world = made._world
+    world.posed()
+
+    def memory() -> dict[tuple[int, int], list[float]]:
+        pairs = world.pairs
+        return {
+            (int(pairs.first[k]), int(pairs.second[k])): pairs.slip[k].ravel().tolist()
+            for k in range(pairs.counts[0])
+            if pairs.used[k]
+        }
+
+    before = memory()
+    assert len(before) > 10
+    skins = world.skins
+    build(world.shape, world.bodies, world.pairs, world.cells, skins[1], 2 * skins[3], skins[4], skins[5], skins[6])
+    assert memory() == before

@@ -1,0 +1,220 @@
+"""Piles: the same bits again, checkpoints, the account of energy, motors under load, nothing passes through."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import builds
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem.engine.interface import Saved
+from dem.engine.links.engine import LinksEngine
+from dem.errors import InputError
+
+HERE = Path()
+
+
+def bits(made: LinksEngine) -> bytes:
+    bodies = made._world.bodies
+    return b"".join(a.tobytes() for a in (bodies.position, bodies.turn, bodies.velocity, bodies.momentum, bodies.alpha))
+
+
+def poured(count: int = 20, **more: object) -> LinksEngine:
+    return builds.pile(
+        builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law("halt"), **more), count
+    )
+
+
+def swing(made: LinksEngine, looks: int, begin: int = 0) -> None:
+    for look in range(begin, begin + looks):
+        made.motors.actuate(np.full((made.count, 2), math.pi / 2 - 0.5 * math.sin(look / 40)), 2e-4)
+        made.advance(4)
+
+
+def test_the_same_twice_and_however_steps_are_grouped() -> None:
+    one, other = (builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5), 15, settle=0) for _ in range(2))
+    one.advance(600)
+    for steps in (1, 99, 250, 250):
+        other.advance(steps)
+        other.state()
+        other.neighbours()
+        other.touches()
+    assert bits(one) == bits(other)
+
+
+def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
+    made = poured(12)
+    made.fixtures.shake(amplitude=5e-4, frequency=30.0)
+    made.advance(333)
+    saved = made.save(HERE)
+    assert isinstance(saved.content, bytes)
+    again = builds.engine(gravity=9.81, radius=0.0234, dt=1e-5, motor_law=builds.motor_law("halt"))
+    again.load(saved, HERE)
+    for each in (made, again):
+        each.advance(777)
+        each.fixtures.stop()
+        each.motors.articulate()
+        swing(each, 30)
+        each.advance(2)
+    assert made.time == again.time
+    middle = made.save(HERE)
+    third = builds.engine(gravity=9.81, radius=0.0234, dt=1e-5, motor_law=builds.motor_law("halt"))
+    third.load(middle, HERE)
+    for each in (made, again, third):
+        each.advance(2)
+        swing(each, 50, begin=30)
+        each.motors.weld()
+        each.advance(500)
+    assert bits(made) == bits(again) == bits(third)
+    assert made.motors.work == third.motors.work
+    assert made.account.container_work == third.account.container_work
+    assert made.overlaps(1e-4).deepest == third.overlaps(1e-4).deepest
+
+
+def test_a_foreign_checkpoint_is_refused_in_one_line() -> None:
+    made = builds.engine()
+    with pytest.raises(InputError, match="another engine"):
+        made.load(Saved(content=b"", memory={"format": "yade"}), HERE)
+    with pytest.raises(InputError, match="not readable"):
+        made.load(Saved(content=b"rubbish", memory=made.save(HERE).memory), HERE)
+
+
+def test_a_pile_comes_to_rest() -> None:
+    made = poured(30)
+    made.advance(6000)
+    assert made.state().kinetic_energy < 1e-12
+    assert made.unbalanced_force() < 1e-3
+    assert made.fixtures.container_force[2] == pytest.approx(-30 * builds.boxes().mass * 9.81, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", ["halt", "stall", "slip", "servo"])
+def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
+    more = {"damping": 1e-6} if law == "servo" else {}
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), account=True)
+    builds.pile(made, 30, settle=0.1)
+    made.motors.articulate()
+    swing(made, 1500)
+    made.motors.weld()
+    made.advance(1000)
+    state = made.state()
+    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.account.elastic())
+    given = made.account.given + made.motors.work
+    assert made.motors.work > 0.1 * made.account.added
+    assert abs(given - stored - made.account.dissipated) < 0.01 * given
+
+
+def test_the_account_closes_in_a_shaken_pile() -> None:
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, account=True)
+    builds.pile(made, 20, settle=0.1)
+    made.fixtures.shake(amplitude=2 * 9.81 / (2 * math.pi * 30) ** 2, frequency=30.0)
+    made.advance(20000)
+    state = made.state()
+    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.account.elastic())
+    given = made.account.given
+    assert made.account.container_work > 0.1 * made.account.added
+    assert abs(given - stored - made.account.dissipated) < 0.01 * given
+
+
+def test_a_motor_that_halts_holds_and_may_give_way() -> None:
+    made = builds.engine(motor_law=builds.motor_law("halt"), gravity=9.81, dt=5e-5, law=builds.LAW)
+    pile = builds.pile(made, 1, settle=0.2)
+    assert pile.count == 1
+    pile.motors.articulate()
+    bodies = pile._world.bodies
+    # A load above the limit, as if a heavy thing leant on barb 1 against its way.
+    pile.motors.actuate(bodies.alpha + 1e-3, 2e-4)
+    pile.advance(4)
+    pile._world.motors.impulse[:] -= 2e-5 * 2e-4
+    pile.motors.actuate(bodies.alpha + 1e-3, 2e-4)
+    readings = pile.motors.readings
+    assert readings.halted.all()
+    assert (bodies.rate == 0.0).all()
+    pile.advance(4)
+    pile._world.motors.impulse[:] -= 2e-5 * 2e-4
+    pile.motors.actuate(bodies.alpha - 1e-3, 2e-4)
+    assert not pile.motors.readings.halted.any()
+    assert (bodies.rate < 0.0).all()
+
+
+def test_a_motor_that_stalls_does_not_move_either_way() -> None:
+    made = builds.engine(motor_law=builds.motor_law("stall"), dt=5e-5)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    for sign in (1, -1):
+        made.motors.actuate(made._world.bodies.alpha + 1e-3, 2e-4)
+        made.advance(4)
+        made._world.motors.impulse[:] -= 2e-5 * 2e-4
+        made.motors.actuate(made._world.bodies.alpha + sign * 1e-3, 2e-4)
+        assert made.motors.readings.halted.all()
+        assert (made._world.bodies.rate == 0.0).all()
+        made.advance(4)
+
+
+@pytest.mark.parametrize("law", ["slip", "servo"])
+def test_a_slipping_motor_never_exceeds_its_torque(law: str) -> None:
+    made = builds.engine(motor_law=builds.motor_law(law, damping=1e-6 if law == "servo" else 0.0), dt=5e-5)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    torques = []
+    for look in range(300):
+        made.motors.actuate(np.full((1, 2), math.pi / 2 + 0.5 * math.sin(look / 20)), 2e-4)
+        made.advance(4)
+        torques.append(made.motors.readings.torques.copy())
+    assert np.abs(torques).max() <= builds.TORQUE * (1 + 1e-12)
+    assert np.abs(torques).max() > 0.1 * builds.TORQUE
+    assert np.abs(made.state().angles - made.motors.readings.commands).max() < 0.1
+
+
+def test_speed_and_acceleration_of_a_prescribed_angle_are_limited() -> None:
+    made = builds.engine(motor_law=builds.motor_law("halt"), dt=5e-5)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    rates = [0.0]
+    for look in range(400):
+        made.motors.actuate(np.full((1, 2), 0.5 if look < 200 else 1.2), 2e-4)
+        rates.append(float(made._world.bodies.rate[0, 0]))
+        made.advance(4)
+    most = made._world.motors.acceleration[0, 0] * 2e-4
+    assert np.abs(rates).max() <= 6.0
+    assert np.abs(np.diff(rates)).max() <= most * (1 + 1e-12)
+
+
+def test_an_angle_arrives_and_stays() -> None:
+    made = builds.engine(motor_law=builds.motor_law("halt"), dt=5e-5)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    for _ in range(1500):
+        made.motors.actuate(np.full((1, 2), 0.5), 2e-4)
+        made.advance(4)
+    assert np.allclose(made.state().angles, 0.5, atol=1e-12)
+    assert np.abs(made._world.bodies.rate).max() < 1e-9
+
+
+@pytest.mark.parametrize("speed", [3.0, 10.0])
+def test_nothing_passes_through_unseen(speed: float) -> None:
+    made = builds.engine(made_of=builds.particle(aspect=0.0), dt=1e-4)
+    turn = Rotation.from_euler("z", 90, degrees=True)
+    made.add(builds.at([[0, 0, 1.0], [0, 0, 1.02]], [Rotation.identity(), turn]))
+    made._world.bodies.velocity[1, 2] = -speed
+    limit, seen = 0.5 * builds.DIAMETER, False
+    for _ in range(400):
+        made.advance(1)
+    state = made.state()
+    passed = state.positions[1, 2] < state.positions[0, 2]
+    seen = bool(made.overlaps(limit).deep.any())
+    assert passed <= seen
+
+
+def test_a_fast_spin_is_seen() -> None:
+    made = builds.engine(dt=1e-4)
+    made.add(builds.at([0, 0, 1.0]))
+    made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 60
+    made.advance(10)
+    # 60 rad/s moves a tip by less than a tenth of a diameter in a step.
+    assert not made.overlaps(0.5 * builds.DIAMETER).deep.any()
+    made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 6000
+    made.advance(10)
+    assert made.overlaps(0.5 * builds.DIAMETER).deep.any()

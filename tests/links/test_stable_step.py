@@ -1,0 +1,43 @@
+"""The stable time step: modes that it knows are stable just below it, and blow up above."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import builds
+import numpy as np
+import pytest
+
+from dem.engine.links.stable_step import links_stable_time_step
+
+
+def test_it_goes_with_the_root_of_the_stiffness_and_shrinks_with_damping() -> None:
+    p = builds.particle()
+    soft = links_stable_time_step(p, builds.ELASTIC)
+    hard = links_stable_time_step(p, replace(builds.ELASTIC, normal_stiffness=2000.0, tangential_stiffness=1640.0))
+    assert soft / hard == pytest.approx(2.0)
+    assert links_stable_time_step(p, replace(builds.ELASTIC, normal_damping=0.2, wall_damping=0.2)) < soft
+    assert links_stable_time_step(p, builds.ELASTIC, articulated=True) <= soft
+    assert links_stable_time_step(p, builds.ELASTIC, articulated=True, free=True) < soft
+    assert links_stable_time_step(p, builds.ELASTIC, strings=[(1e6, 0.0)]) < soft
+
+
+def test_a_bar_on_the_floor_is_stable_below_its_own_limit_and_not_above() -> None:
+    # Two springs on the whole mass: ω² = 2k/m, stable while ω dt < 2; a nudge grows beyond.
+    p = builds.particle(aspect=0.0)
+    limit = 2 / np.sqrt(2 * 500.0 / p.boxes.mass)
+    assert links_stable_time_step(p, builds.ELASTIC) < limit
+    kinetic = []
+    for share in (0.98, 1.02):
+        made = builds.engine(law=builds.ELASTIC, gravity=9.81, dt=share * limit, made_of=p)
+        made.add(builds.at([0, 0, builds.DIAMETER / 2 - p.boxes.mass * 9.81 / 1000.0 * 1.01]))
+        made.advance(400)
+        kinetic.append(made.state().kinetic_energy)
+    assert kinetic[1] > 100 * kinetic[0]
+
+
+def test_a_pile_at_nine_tenths_of_it_comes_to_rest() -> None:
+    dt = 0.9 * links_stable_time_step(builds.particle(), builds.LAW)
+    made = builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=dt), 40, settle=0.6)
+    assert made.state().kinetic_energy < 1e-11
+    assert made.unbalanced_force() < 1e-3
