@@ -12,6 +12,7 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import read_series
 from postprocess.report import figures
+from studies.base.engines import TOLD, engines_of, judging, of_engine
 from studies.base.figures import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,
@@ -24,6 +25,8 @@ from studies.base.figures import (
     marker,
     told_histories,
 )
+from studies.base.runs import ENGINES
+from studies.base.shaken import SHAKEN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,11 +105,21 @@ def _draw_packing(
         ("phi_f relaxed", "^", sky, sky, r"simulation, $\phi_\mathrm{f}$ at rest again"),
         ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
     ):
-        _draw_means(axes, summary, f"{stage} {definition}", marker(shape, colour, face), label)
+        _draw_means(axes, judging(summary), f"{stage} {definition}", marker(shape, colour, face), label)
+    for engine in engines_of(summary)[1:]:
+        part = of_engine(summary, engine)
+        time = ", ".join(sorted({f"{value:.3g}" for value in part[SHAKEN]}, key=float))
+        look = {"linestyle": "none", "markersize": 4.2}
+        for stage, face, when in (
+            ("phi_0", "white", r"$\phi_0$"),
+            ("phi_f", figures.GREEN, rf"$\phi_\mathrm{{f}}$ after {time} s"),
+        ):
+            squares = {**marker("s", figures.GREEN, face), **look}
+            _draw_means(axes, part, f"{stage} {definition}", squares, f"{TOLD[engine]}, {when}", shift=2 * _SHIFT)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="upper right")
+    axes.legend(loc="best", ncols=2 if engines_of(summary) else 1)
     return finished(figure, path, footer)
 
 
@@ -116,7 +129,11 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
         ("crossings before", "white", "before shaking", -_SHIFT),
         ("crossings after", figures.BLUE, "at the end of shaking", _SHIFT),
     ):
-        _draw_means(axes, summary, quantity, marker("D", figures.BLUE, face), label, shift=shift)
+        _draw_means(axes, judging(summary), quantity, marker("D", figures.BLUE, face), label, shift=shift)
+        for engine in engines_of(summary)[1:]:
+            look = {**marker("s", figures.GREEN, "white" if face == "white" else figures.GREEN), "linestyle": "none"}
+            part = of_engine(summary, engine)
+            _draw_means(axes, part, quantity, look, f"{TOLD[engine]}, {label}", shift=shift + 2 * _SHIFT)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(CROSSINGS_LABEL)
     axes.set_ylim(bottom=0)
@@ -126,7 +143,8 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
 
 def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence[str]) -> list[Path]:
     figure, axes = figures.new_figure(height=2.7)
-    histories: dict[float, list[History]] = {}
+    first = next((name for name in ENGINES if any(run.engine == name for run in manifests)), "")
+    histories: dict[tuple[float, str], list[History]] = {}
     without, ends = [], []
     for run in manifests:
         try:
@@ -134,19 +152,26 @@ def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence
         except InputError:
             without.append(run.directory.name)
         else:
-            histories.setdefault(round(run.aspect_ratio, 6), []).append(history)
+            histories.setdefault((round(run.aspect_ratio, 6), run.engine), []).append(history)
             ends.append(history.active)
     width = bin_width(ends)
-    decimals = 1 if all(round(ratio, 1) == ratio for ratio in histories) else 2
-    colours = figures.sequence(len(histories), last=0.9)
-    for (ratio, seeds), colour in zip(sorted(histories.items()), colours, strict=True):
-        draw_history(axes, seeds, width, colour=colour, label=f"{ratio:.{decimals}f}")
+    ratios = sorted({ratio for ratio, _ in histories})
+    decimals = 1 if all(round(ratio, 1) == ratio for ratio in ratios) else 2
+    colours = dict(zip(ratios, figures.sequence(len(ratios), last=0.9), strict=True))
+    for (ratio, engine), seeds in sorted(histories.items()):
+        if engine == first:
+            draw_history(axes, seeds, width, colour=colours[ratio], label=f"{ratio:.{decimals}f}")
+        else:
+            draw_history(axes, seeds, width, colour=colours[ratio], style=(0, (2, 1)))
+    others = sorted({TOLD.get(engine, engine) for _, engine in histories if engine != first})
     draw_ends(axes, ends)
     axes.set_xlabel("time since shaking began [s]")
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     if histories:
         axes.legend(title=r"$l/w$", loc="center left", bbox_to_anchor=(1.0, 0.5))
     told = [told_histories(width, "Shaking")]
+    if others:
+        told.append(f"Dashed: {', '.join(others)}; lines without dashes: {TOLD.get(first, first)}.")
     if without:
         told.append(f"No time series of φ: {', '.join(without)}.")
     return finished(figure, path, [*told, *footer])

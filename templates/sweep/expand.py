@@ -77,8 +77,7 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
 
 def _too_many(sweep: Sweep, count: int, max_points: int) -> InputError:
     return InputError(
-        f"{sweep.path}: points: {count} runs, more than {max_points}; "
-        f"shorten its lists, or give --max-points {count}"
+        f"{sweep.path}: points: {count} runs, more than {max_points}; shorten its lists, or give --max-points {count}"
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.drive import actuated
+from dem.phases.gaits.drive import actuated
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
