@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ ENGINES = ("yade", "links")
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _ENGINE = "engine"
-_FINEST = list(FIDELITIES)[-1]
+_FINEST, _FINER = list(FIDELITIES)[-1], "converged"
 _KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
 _ASPECT, _COUNT, _ACTIVITY, _REFERENCE = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
@@ -103,7 +103,7 @@ class AccuracyTable:
     Args:
         path: the file.
         fidelities: those with finished runs, engine by engine in the order of their names.
-        reference: what errors are against, such as "reference on links".
+        reference: what errors are against, as the table calls it.
         aspect_ratio: l/w [1].
         count: smarticles [1].
         activity: types of phase, separated by spaces.
@@ -210,10 +210,12 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
         if column not in (reader.fieldnames or ()):
             msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
             raise InputError(msg)
-    rows = _rows_of_fidelities(list(reader))
+    every_row = list(reader)
+    rows = _rows_of_fidelities(every_row)
     try:
         every = [_measured(one, name, row, of) for (one, name), row in rows.items() if int(row[_SEEDS]) > 0]
-        if not any(one.is_reference for one in every) or len(every) < 2:
+        reference = _reference(every_row, {row[_KNOB] for row in rows.values()})
+        if reference is None or len(every) < 2:
             msg = f"--table {file}: tells of fewer than two named fidelities with runs; {_HOW}"
             raise InputError(msg)
         found = tuple(one for one in every if engine in (None, one.engine))
@@ -225,7 +227,7 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
         return AccuracyTable(
             path=file,
             fidelities=found,
-            reference=next(one.name for one in every if one.is_reference),
+            reference=reference,
             aspect_ratio=float(first[_ASPECT]),
             count=round(float(first[_COUNT])),
             activity=first[_ACTIVITY],
@@ -252,6 +254,12 @@ def _rows_of_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str],
         for name in fidelities(engine)
         if f"{engine} {name}" in named
     }
+
+
+def _reference(rows: Sequence[dict[str, str]], knobs: Collection[str]) -> str | None:
+    """What errors are against, such as "links converged": it need not be a named fidelity."""
+    found = (row for row in rows if row[_KNOB] in knobs and row[_REFERENCE] == "reference")
+    return next((row[_VALUE] for row in found if int(row[_SEEDS]) > 0), None)
 
 
 def _measured(engine: str, name: str, row: dict[str, str], of: Sequence[str]) -> Measured:
@@ -395,7 +403,7 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
                 f"not assured: the scatter of {measured.seeds} seeds allows an error up to {max(bounds):.2g}, more "
                 f"than --max-error {max_error:g}; measure with more seeds"
             )
-    if not table.reference.startswith(_FINEST):
+    if not table.reference.endswith((_FINEST, _FINER)):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST}")
     here = {
         "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),

@@ -82,7 +82,7 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
 
 # On the links engine, chosen by results/accuracy-links. What has no meaning there is as in `FIDELITIES`.
 _ON_LINKS: Mapping[str, Mapping[str, Any]] = {
-    "draft": {"rows": 1, "stiffness_N_per_m": 125.0},
+    "draft": {"rows": 1, "stiffness_N_per_m": 250.0},
     "standard": {"rows": 1, "stiffness_N_per_m": 500.0},
     "reference": {"rows": 2, "stiffness_N_per_m": 1000.0},
 }

@@ -42,8 +42,8 @@ against wall time. Knobs:
   restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
   control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
-  fidelity     draft, standard, reference, as the engine of the scene has them
-  engine       draft, standard and reference of both engines, against reference on links; only if named in --knobs
+  fidelity     draft, standard, reference; on links also what is finer yet, converged
+  engine       the named fidelities of both engines, against converged on links; only if named in --knobs
 
 The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
 setting with finished runs. Seeds: 1 to 20 on links, 1 to 3 on YADE. An error within the scatter between seeds is not resolved, which is not

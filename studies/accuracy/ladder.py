@@ -31,18 +31,20 @@ KNOBS: Mapping[str, str] = MappingProxyType(
         "control": "time between two looks of the motor control; where the scene actuates",
         "hinge": "stiffness of the hinges' pins; where the scene actuates",
         "fidelity": "the named fidelities, all knobs together",
-        "engine": "the named fidelities of all engines, the finest of links last; only where it is asked for",
+        "engine": "the named fidelities of all engines, against the converged one of links; only where it is asked for",
     }
 )
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
-"""From coarse to fine: beads and facets vanish on links, so that its finest fidelity is what all are compared with."""
+"""From coarse to fine: links have no beads and no facets, so that their converged answer is what all are compared with."""
 # Left as the scene has them: facets, since no knob turns them; a step by hand is refused.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _FACTORS = (1, 2, 4)
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
 _STRANDS = (1, 2, 3)
+_CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
+"""Finer than the finest name on links, in what was found to matter: what the names are compared with."""
 _STEPS = (0.9, 0.45, 0.225)
 _PITCHES = (1.3, 1.0, 0.5)
 _RESTITUTIONS = (0.2, 0.5, 0.7, 0.9)
@@ -294,18 +296,23 @@ def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
-        return [(name, "", name, _named(str(base["engine"]), name)) for name in fidelities(str(base["engine"]))]
+        one = str(base["engine"])
+        return [(name, "", f"{one}-{name}" if smooth else name, values) for name, values in _names(one).items()]
     if knob == "engine":
-        return [(f"{one} {name}", "", f"{one}-{name}", _named(one, name)) for one in _ENGINES for name in fidelities(one)]
+        return [(f"{one} {name}", "", f"{one}-{name}", each) for one in _ENGINES for name, each in _names(one).items()]
     if knob == "stiffness" and smooth:
         return _numbers("stiffness", "stiffness_N_per_m", "N/m", _with(_STIFFNESSES, base["stiffness_N_per_m"])[::-1])
     key = {"stiffness": "stiffness_N_per_m", "hinge": "hinge_stiffness_N_per_m"}[knob]
     return [(f"{base[key] * n:g}", "N/m", f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
 
 
-def _named(engine: str, name: str) -> dict[str, Value]:
-    """What a named fidelity of an engine sets."""
-    return {"engine": engine, "base": name, "diameter_m": None, **fidelities(engine)[name]}
+def _names(engine: str) -> dict[str, dict[str, Value]]:
+    """What each named fidelity of an engine sets, coarse to fine; on links what is finer yet comes last."""
+    shared: dict[str, Value] = {"engine": engine, "diameter_m": None}
+    found = {name: {**shared, "base": name, **knobs} for name, knobs in fidelities(engine).items()}
+    if engine == _ENGINES[-1]:
+        found["converged"] = {**list(found.values())[-1], **_CONVERGED}
+    return found
 
 
 def _numbers(knob: str, key: str, unit: str, values: Sequence[float]) -> list[_Point]:

@@ -141,7 +141,8 @@ engine,yade standard,,yade-standard,3,0.7,60,shake,1,1,1.5,-2,2,-20,10,not resol
 engine,yade reference,,yade-reference,0,,,,,,,,,,,unknown
 engine,links draft,,links-draft,20,0.7,60,shake,1,3,1,7,1,-20,2,resolved
 engine,links standard,,base,20,0.7,60,shake,1,1,1,2,1,-20,2,resolved
-engine,links reference,,x,20,0.7,60,shake,1,0,1,0,1.2,0,5,reference
+engine,links reference,,x,20,0.7,60,shake,1,-1,1,0.5,1.2,1,5,not resolved
+engine,links converged,,y,20,0.7,60,shake,1,0,1,0,1.2,0,5,reference
 """
 
 
@@ -149,7 +150,7 @@ def test_engines_are_chosen_between_against_one_reference(tmp_path: Path) -> Non
     file = tmp_path / "both.csv"
     file.write_text(BOTH, encoding="utf-8")
     table = read_table(file)
-    assert table.reference == "reference on links"
+    assert table.reference == "links converged"
     names = [one.name for one in table.fidelities]
     assert names == ["draft on yade", "standard on yade", "draft on links", "standard on links", "reference on links"]
     scene = scene_of()

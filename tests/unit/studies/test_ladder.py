@@ -164,9 +164,9 @@ def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> Non
     idle = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
     assert len({tuple(getattr(one.fidelity, key) for key in idle) for one in ladder.scenes.values()}) == 1
     # Named fidelities are those of the engine, and run once where a knob alone makes them.
-    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference"]
+    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference", "converged"]
     for rung in ladder.rungs:
-        if rung.knob == "fidelity":
+        if rung.knob == "fidelity" and rung.value != "converged":
             turned = ladder.scenes[rung.setting].fidelity.model_dump()
             assert {key: turned[key] for key in turned if key != "base"}.items() >= fidelities("links")[
                 rung.value
@@ -180,9 +180,13 @@ def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: 
     scene = scene_of(tmp_path, SCENE, f"engine={engine}", "fidelity=standard")
     ladder = build_ladder(scene, source="scene.yaml", knobs=["engine"])
     found = dict(labels(ladder, "engine"))
-    assert list(found) == [f"{one} {name}" for one in ("yade", "links") for name in FIDELITIES]
+    assert list(found) == [*(f"{one} {name}" for one in ("yade", "links") for name in FIDELITIES), "links converged"]
     assert found[f"{engine} standard"] == BASE
-    assert ladder.references()["engine"].label == "links reference"
+    assert ladder.references()["engine"].label == "links converged"
+    finer, finest = (ladder.scenes[found[f"links {name}"]].fidelity for name in ("converged", "reference"))
+    assert finer.rows > finest.rows
+    assert finer.stiffness_N_per_m > finest.stiffness_N_per_m
+    del found["links converged"]
     for name, setting in found.items():
         one = ladder.scenes[setting]
         assert one.engine == name.split()[0]
