@@ -63,6 +63,16 @@ print()
 print(json.dumps(answer))
 """
 
+# Whether Numba compiles here, and where the compiled engine is kept.
+_LINKS = """
+import json
+import numba
+from dem.engine.links.compiler import folder
+answer = {"version": numba.__version__, "sum": numba.njit(lambda a, b: a + b)(1, 2), "folder": str(folder() or "")}
+print()
+print(json.dumps(answer))
+"""
+
 # A sphere before a plain background: an empty picture has no contrast.
 _PYVISTA = """
 import json
@@ -147,7 +157,10 @@ def examine() -> Iterator[Probe]:
         needed=True,
         found=f"{platform.python_version()}, {sys.executable}",
     )
-    yield check_yade()
+    links = check_links()
+    # One engine is enough; only scenes that name the other one need that.
+    yield check_yade(needed=not links.ok)
+    yield links
     for module, (distribution, needed) in _PACKAGES.items():
         yield check_package(module, distribution, needed=needed)
     yield check_pyvista()
@@ -157,22 +170,37 @@ def examine() -> Iterator[Probe]:
     yield check_disk(Path.cwd())
 
 
-def check_yade() -> Probe:
-    """Whether YADE imports and moves a sphere."""
-    way_out = "`make setup` installs it; for other systems see environment.md"
+def check_yade(*, needed: bool = True) -> Probe:
+    """Whether YADE imports and moves a sphere.
+
+    Args:
+        needed: whether there is no other engine.
+    """
+    way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
     answer = _ask(_YADE)
     if isinstance(answer, str):
-        return Probe(name="yade", ok=False, needed=True, found=answer, way_out=way_out)
+        return Probe(name="yade", ok=False, needed=needed, found=answer, way_out=way_out)
     found = f"{answer['version']}, {answer['path']}"
     if not 0.08 < answer["speed"] < 0.12:
         return Probe(
             name="yade",
             ok=False,
-            needed=True,
+            needed=needed,
             found=f"{found}: a sphere falls at {answer['speed']:.3g} m/s after 0.01 s, not 0.1 m/s",
             way_out="install the version that environment.md names",
         )
-    return Probe(name="yade", ok=True, needed=True, found=f"{found}; a sphere falls")
+    return Probe(name="yade", ok=True, needed=needed, found=f"{found}; a sphere falls")
+
+
+def check_links() -> Probe:
+    """Whether the links engine can be compiled, and its code be kept."""
+    answer = _ask(_LINKS)
+    if isinstance(answer, str) or answer["sum"] != 3:
+        found = answer if isinstance(answer, str) else "Numba computes nonsense"
+        way_out = "only scenes with `engine: links` need it; install numba as requirements.txt pins it"
+        return Probe(name="links", ok=False, needed=False, found=found, way_out=way_out)
+    kept = f"compiled code in {answer['folder']}" if answer["folder"] else "compiled code cannot be kept"
+    return Probe(name="links", ok=True, needed=False, found=f"Numba {answer['version']}; {kept}")
 
 
 def check_pyvista() -> Probe:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from smarticles.verification.check import Answer, Check
+from smarticles.verification.hands.kinds import hands_on
 
 Size = Literal["short", "long"]
 
@@ -20,10 +21,11 @@ class Case:
     Args:
         name: short, unique in its catalogue.
         about: what happens in it.
-        run: simulates and checks, where YADE may be loaded; of a known answer without, of a hard case with a folder.
+        run: simulates with the hands that it is given, and checks; a hard case is given a folder as well.
         theory: formula, and where it is from, where the answer is known.
         short: its size in continuous integration; None: the long form only.
         long: what differs from that in the long form; None: there is no other.
+        absent: why it has no meaning, by engine.
     """
 
     name: str
@@ -32,16 +34,17 @@ class Case:
     theory: str = ""
     short: Mapping[str, Any] | None = field(default_factory=dict)
     long: Mapping[str, Any] | None = None
+    absent: Mapping[str, str] = field(default_factory=dict)
 
-    def answers(self) -> list[Answer]:
-        """Run it, and compare with theory."""
-        return [found for found in self.run() if isinstance(found, Answer)]
+    def answers(self, engine: str) -> list[Answer]:
+        """Run it on an engine, and compare with theory."""
+        return [found for found in self.run(hands_on(engine)) if isinstance(found, Answer)]
 
-    def checks(self, size: Size, out: Path) -> tuple[list[Check], float]:
-        """Run it in a folder and check it; with the wall time [s] that this took."""
+    def checks(self, engine: str, size: Size, out: Path) -> tuple[list[Check], float]:
+        """Run it on an engine, in a folder, and check it; with the wall time [s] that this took."""
         begun = time.monotonic()
         options = {**(self.short or {}), **((self.long or {}) if size == "long" else {})}
-        found = [one for one in self.run(out, **options) if isinstance(one, Check)]
+        found = [one for one in self.run(hands_on(engine), out, **options) if isinstance(one, Check)]
         return found, time.monotonic() - begun
 
 
@@ -55,10 +58,9 @@ class Ladder:
         quantity: the error that is measured.
         unit: of it.
         size: of the motion, that errors are told in parts of [unit].
-        order: of the scheme, in this motion [1].
-        why: where that order is from.
+        scheme: order of the scheme in this motion [1], and where that order is from; by engine.
         steps: from coarse to fine [s].
-        errors: of each of these steps [unit].
+        errors: of each of some steps [unit], by hands.
     """
 
     name: str
@@ -66,7 +68,6 @@ class Ladder:
     quantity: str
     unit: str
     size: float
-    order: int
-    why: str
+    scheme: Mapping[str, tuple[int, str]]
     steps: tuple[float, ...]
-    errors: Callable[[Sequence[float]], list[float]]
+    errors: Callable[..., list[float]]

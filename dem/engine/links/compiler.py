@@ -72,7 +72,11 @@ def folder() -> Path | None:
     for base in _folders():
         path = base / f"links-{stamp()}"
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # Compiled code is loaded as it is: in a folder that all can write to, another could have left some.
+            if hasattr(os, "getuid") and path.stat().st_uid != os.getuid():
+                causes.append(f"{path} (belongs to another user)")
+                continue
             with tempfile.TemporaryFile(dir=path):
                 return path
         except (OSError, RuntimeError) as error:

@@ -84,7 +84,8 @@ def import_yade() -> Any:
             return importlib.import_module("yade")
     except ImportError as error:
         msg = (
-            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, "
-            "see environment.md; `smarticles doctor` tells what is missing"
+            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, see "
+            "environment.md, or run the scene on the engine that needs none: --engine links; `smarticles doctor` tells "
+            "what is missing"
         )
         raise RunError(msg) from None

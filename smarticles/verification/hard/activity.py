@@ -11,22 +11,23 @@ from scipy.spatial.transform import Rotation
 from smarticles.verification.bench import add, look, lying, scene_of, watched
 from smarticles.verification.check import Check, above, below, near, says
 from smarticles.verification.hard.extremes import narrowest
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, turn
 
 TORQUE_LIMIT = 1.607e-5  # N m, the paper's
 
 
-def no_torque(out: Path) -> list[Check]:
+def no_torque(hands: Hands, out: Path) -> list[Check]:
     """τ_max = 0."""
-    run = whole(scene(turn(40, 0.3), motor={"torque_limit_N_m": 0.0}), out)
+    run = whole(scene(hands, turn(40, 0.3), motor={"torque_limit_N_m": 0.0}), out)
     return [says(run.text, "motor.torque_limit_N_m", "0.0 N m", "more than 0 N m")]
 
 
-def weak_motors(out: Path, *, law: str, count: int) -> list[Check]:
+def weak_motors(hands: Hands, out: Path, *, law: str, count: int) -> list[Check]:
     """τ_max / 1000: motors that cannot lift their own barbs."""
     limit = TORQUE_LIMIT / 1000
-    run = whole(scene(turn(40, 0.3), RELAX, count=count, motor={"law": law, "torque_limit_N_m": limit}), out)
+    run = whole(scene(hands, turn(40, 0.3), RELAX, count=count, motor={"law": law, "torque_limit_N_m": limit}), out)
     checks = run.sound()
     if run.error is None:
         driven = run.during(1)
@@ -41,9 +42,9 @@ def weak_motors(out: Path, *, law: str, count: int) -> list[Check]:
     return checks
 
 
-def strong_motors(out: Path, *, count: int) -> list[Check]:
+def strong_motors(hands: Hands, out: Path, *, count: int) -> list[Check]:
     """τ_max · 100: motors that nothing stops."""
-    run = whole(scene(turn(40, 0.3), RELAX, count=count, motor={"torque_limit_N_m": 100 * TORQUE_LIMIT}), out)
+    run = whole(scene(hands, turn(40, 0.3), RELAX, count=count, motor={"torque_limit_N_m": 100 * TORQUE_LIMIT}), out)
     checks = run.sound()
     if run.error is None:
         angles = run.series["angle_rad"][run.during(1)][-1]
@@ -57,16 +58,16 @@ def strong_motors(out: Path, *, count: int) -> list[Check]:
     return checks
 
 
-def no_room(out: Path, *, count: int, seconds: float) -> list[Check]:
+def no_room(hands: Hands, out: Path, *, count: int, seconds: float) -> list[Check]:
     """Smarticles of l/w = 0.7 straighten in a container little wider than one of them, half as wide as needed."""
-    data, refused = narrowest(scene(shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1), 0.05)
+    data, refused = narrowest(scene(hands, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1), 0.05)
     run = whole(data, out)
     return [refused, *run.sound(), *_jammed(run)]
 
 
-def jammed(out: Path, *, count: int, seconds: float) -> list[Check]:
+def jammed(hands: Hands, out: Path, *, count: int, seconds: float) -> list[Check]:
     """l/w = 0.4 in a container of radius 0.7 w, into which a straight one, 0.9 w to either side, does not fit."""
-    data = scene(shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4})
+    data = scene(hands, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4})
     data["container"] = {"radius_m": 0.7 * scene_of(data).smarticle.middle_length_m}
     run = whole(data, out)
     return [*run.sound(), *_jammed(run)]
@@ -86,12 +87,12 @@ def _jammed(run: Watched) -> list[Check]:
     ]
 
 
-def hook(out: Path, *, count: int, distance: float, speed: float, change: float, rest: float) -> list[Check]:
+def hook(hands: Hands, out: Path, *, count: int, distance: float, speed: float, change: float, rest: float) -> list[Check]:
     """The upper hook is drawn out of a pile after its smarticles changed their shape around it."""
     hooks = {"lower_height_m": 2e-3, "upper_height_m": 4e-3}
     # The time that it stays up: what hangs on it comes to rest.
     pull = {"type": "pull-hook", "distance_m": distance, "speed_m_per_s": speed, "duration_s": distance / speed + rest}
-    run = whole(scene(shape_change(change), pull, count=count, hooks=hooks), out)
+    run = whole(scene(hands, shape_change(change), pull, count=count, hooks=hooks), out)
     checks = run.sound(rest=None)
     if run.error is None:
         height = run.series["hook_upper_z_m"]
@@ -105,9 +106,9 @@ def hook(out: Path, *, count: int, distance: float, speed: float, change: float,
     return checks
 
 
-def oscillation(out: Path, *, seconds: float, count: int = 3) -> list[Check]:
+def oscillation(hands: Hands, out: Path, *, seconds: float, count: int = 3) -> list[Check]:
     """Smarticles on the floor of a container swing their barbs by 5° at 8 Hz."""
-    described, engine, recorder = watched(scene(shape_change(1.5), count=count), out)
+    described, engine, recorder = watched(scene(hands, shape_change(1.5), count=count), out)
     particle, boxes = described.particle, described.smarticle.boxes
     for k in range(count):
         height = 3 * particle.reach * (k + 0.5) / 2 + lying(described)

@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from dem.engine.interface import Engine
-from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.container import WALL_MATERIAL
-from dem.engine.yade.engine import YadeEngine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
 from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
-from smarticles.verification.bench import add, fastest, look, lying, push, watched
+from smarticles.verification.bench import add, fastest, look, lying, watched
 from smarticles.verification.check import Check, below, says
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.runs import whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
 
@@ -35,9 +33,9 @@ SPOILT = {
 }
 
 
-def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
+def spoil(hands: Hands, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
     """Three smarticles at rest on the floor; then the second one is spoilt, and the next look says so."""
-    described, engine, recorder = watched(scene(shape_change(1.5), count=3), out)
+    described, engine, recorder = watched(scene(hands, shape_change(1.5), count=3), out)
     # A few diameters apart, so that none falls on another.
     for k in range(3):
         add(engine, (0, 0, lying(described) + 1e-5 + 3 * k * described.particle.radius))
@@ -45,44 +43,21 @@ def spoil(out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]
     if articulated:
         engine.motors.articulate()
     before = look(engine, recorder)
-    _put(engine, what)
+    hands.spoil(engine, what)
     try:
         engine.advance(steps)
         said = look(engine, recorder)
     except RunError as error:
         said = str(error)
     # One link that is put out of the container tears its hinge first.
-    torn = articulated and ("wall" in what or "floor" in what)
+    torn = hands.pin_stiffness(described) < math.inf and articulated and ("wall" in what or "floor" in what)
     expected = "1 smarticle(s) (1): " if torn else SPOILT[what]
     return [Check("the look before says", before or "nothing", "nothing", before is None), says(said, expected)]
 
 
-def _put(engine: YadeEngine, what: str) -> None:
-    """Spoil the second smarticle, or its last link."""
-    links = len(engine._assembly.bodies) // 3
-    body = engine._omega.bodies[engine._assembly.bodies[2 * links - 1]].state
-    vector, (x, y, z), reach, radius = engine._yade.vector, body.pos, engine.particle.reach, engine.particle.radius
-    if what == "velocity":
-        body.vel = vector(0, math.nan, 0)
-    elif what == "spin":
-        body.angVel = body.angMom = vector(math.nan, 0, 0)
-    elif what == "speed":
-        body.vel = vector(0, 0, 1e3)
-    else:
-        places = {
-            "position": (x, y, math.nan),
-            "over the wall": (x, y, engine.cylinder.height + reach),
-            "through the wall": (engine.cylinder.radius + reach, y, z),
-            "under the floor": (x, y, -reach),
-            "hinge": (x, y, z + radius),
-            "overlap": (x, y, z - 2.5 * radius),
-        }
-        body.pos = vector(*places[what])
-
-
-def _resting(out: Path, count: int) -> tuple[YadeEngine, Recorder]:
+def _resting(hands: Hands, out: Path, count: int) -> tuple[Engine, Recorder]:
     """Smarticles in a low stack that has come to rest, and a recorder that has seen it."""
-    described, engine, recorder = watched(scene(count=count), out)
+    described, engine, recorder = watched(scene(hands, count=count), out)
     for k in range(count):
         add(engine, (0, 0, lying(described) * (2 * k + 1) + 1e-5))
     for _ in range(10):
@@ -91,14 +66,11 @@ def _resting(out: Path, count: int) -> tuple[YadeEngine, Recorder]:
     return engine, recorder
 
 
-def heated(out: Path, *, count: int, share: float) -> list[Check]:
+def heated(hands: Hands, out: Path, *, count: int, share: float) -> list[Check]:
     """A pile at rest, in which the dashpots of all contacts are made to drive instead: energy grows out of nothing."""
-    engine, recorder = _resting(out, count)
-    for material in (engine._omega.materials[label] for label in (SMARTICLE_MATERIAL, WALL_MATERIAL)):
-        material.cn, material.cs = -share * material.cn, 0.0
-    for contact in engine._omega.interactions:
-        contact.phys.cn, contact.phys.cs = -share * contact.phys.cn, 0.0
-    push(engine, count - 1, velocity=(0, 0, 1e-3))
+    engine, recorder = _resting(hands, out, count)
+    hands.heat(engine, share)
+    hands.push(engine, count - 1, velocity=(0, 0, 1e-3))
     said, fast, begun = None, 0.0, engine.time
     while not said and engine.time < begun + 5.0:
         engine.advance(round(recorder.interval / engine.time_step))
@@ -110,27 +82,27 @@ def heated(out: Path, *, count: int, share: float) -> list[Check]:
     ]
 
 
-def kicked(out: Path, *, count: int, speed: float) -> list[Check]:
+def kicked(hands: Hands, out: Path, *, count: int, speed: float) -> list[Check]:
     """A pile at rest, all of it suddenly moving upwards, far below the limit of speed."""
-    engine, recorder = _resting(out, count)
+    engine, recorder = _resting(hands, out, count)
     for k in range(count):
-        push(engine, k, velocity=(0, 0, speed))
+        hands.push(engine, k, velocity=(0, 0, speed))
     return [
         says(look(engine, recorder), f"{count} smarticle(s) (0, 1", "an energy that has risen by"),
         below("speed over the limit of speed [1]", speed / recorder.watchdog.speed, 0.2),
     ]
 
 
-def soft(out: Path, *, stiffness: float) -> list[Check]:
+def soft(hands: Hands, out: Path, *, stiffness: float) -> list[Check]:
     """Contacts so soft that the floor does not hold what falls on it: a scene may ask for it."""
-    data = scene(RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
+    data = scene(hands, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
     run = whole(data, out)
     return [says(run.text, "at t = ", "raise fidelity.stiffness_N_per_m")]
 
 
-def wrong_step(out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
+def wrong_step(hands: Hands, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
     """A time step above the stable one, slipped past the check: the run fails, and names its last checkpoint."""
-    data = scene(swing(seconds), count=count, recording={"checkpoint_interval_s": 0.02})
+    data = scene(hands, swing(seconds), count=count, recording={"checkpoint_interval_s": 0.02})
     run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
     return [
         Check(
@@ -149,14 +121,13 @@ def _too_long(described: Scene, factor: float) -> float:
     return step
 
 
-def late(out: Path) -> list[Check]:
+def late(hands: Hands, out: Path) -> list[Check]:
     """A run that goes wrong after a while: the error has the time of the checkpoint before, and the file too."""
-    data = scene({"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
+    data = scene(hands, {"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
 
     def spoil(engine: Engine) -> None:
         if engine.time > 0.55:
-            assert isinstance(engine, YadeEngine)  # hands are YADE's
-            push(engine, 2, velocity=(0, 0, 100))
+            hands.push(engine, 2, velocity=(0, 0, 100))
 
     run = whole(data, out, spoil=spoil)
     text = (out / FAILED).read_text(encoding="utf-8") if (out / FAILED).exists() else None
@@ -166,14 +137,14 @@ def late(out: Path) -> list[Check]:
     ]
 
 
-def cost(out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
+def cost(hands: Hands, out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
     """What all looks of the watchdog take of the processor time of a whole run."""
     phases: dict[str, dict[str, Any]] = {
         "at rest": {"type": "relax"},
         "shaken": {"type": "shake", "frequency_hz": 30, "peak_acceleration_g": 2},
         "swinging": {"type": "internal-oscillation", "theta_deg": 10},
     }
-    data = scene({**phases[activity], "duration_s": seconds}, count=count, per_layer=10, fidelity=fidelity)
+    data = scene(hands, {**phases[activity], "duration_s": seconds}, count=count, per_layer=10, fidelity=fidelity)
     run = whole(data, out, note=False)
     ended = Check("ends", run.text or "done", "done", run.error is None)
     return [ended, below("share of the processor time [1]", run.cost, 0.01)]

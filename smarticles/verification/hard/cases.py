@@ -18,13 +18,14 @@ def _case(
     run: Callable[..., list[Check]],
     short: Mapping[str, Any] | None = MappingProxyType({}),
     long: Mapping[str, Any] | None = None,
+    absent: Mapping[str, str] = MappingProxyType({}),
 ) -> Case:
-    return Case(name=name, about=inspect.getdoc(run) or "", run=run, short=short, long=long)
+    return Case(name=name, about=inspect.getdoc(run) or "", run=run, short=short, long=long, absent=absent)
 
 
-def checked(name: str, size: Size, out: Path) -> tuple[list[Check], float]:
+def checked(name: str, engine: str, size: Size, out: Path) -> tuple[list[Check], float]:
     """The checks of a case, and the wall time [s] that they took; to be called in a worker process by its name."""
-    return CASES[name].checks(size, out)
+    return CASES[name].checks(engine, size, out)
 
 
 def _cases() -> list[Case]:
@@ -115,7 +116,8 @@ def _cases() -> list[Case]:
             place = "wall" in what or "floor" in what or what == "hinge"
             steps = 2 if hinged and place else 3 if what == "overlap" else 0
             size = {"what": what, "articulated": hinged, "steps": steps}
-            cases.append(_case(f"spoilt: {what}, {kind}", broken.spoil, size))
+            absent = {"links": "hinges cannot part, there is none to tear"} if what == "hinge" else {}
+            cases.append(_case(f"spoilt: {what}, {kind}", broken.spoil, size, absent=absent))
             if what in ("velocity", "spin"):
                 cases.append(_case(f"spoilt: {what}, {kind}, some steps before", broken.spoil, {**size, "steps": 5}))
     return [

@@ -11,6 +11,7 @@ from dem.errors import InputError
 from dem.plan.steps import stable_step, time_step
 from smarticles.verification.bench import scene_of
 from smarticles.verification.check import Check, below, near, says
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
 
@@ -23,24 +24,24 @@ def weight_on_floor(run: Watched, error: float) -> list[Check]:
     return [near("mean force on the container over the weight [1]", -force / run.weight, 1.0, error)]
 
 
-def barbs(out: Path, *, ratio: float, count: int) -> list[Check]:
+def barbs(hands: Hands, out: Path, *, ratio: float, count: int) -> list[Check]:
     """The shortest barbs, none, and the longest."""
-    run = whole(scene(RELAX, count=count, smarticle={"aspect_ratio": ratio}), out)
+    run = whole(scene(hands, RELAX, count=count, smarticle={"aspect_ratio": ratio}), out)
     # Rods roll.
     return run.sound(rest=0.05) + weight_on_floor(run, 0.02)
 
 
-def rods(out: Path, *, count: int, radius: float) -> list[Check]:
+def rods(hands: Hands, out: Path, *, count: int, radius: float) -> list[Check]:
     """Bars without barbs, little inertia about themselves, in a narrow container."""
-    data = scene(RELAX, count=count, smarticle={"aspect_ratio": 0}, container={"radius_m": radius})
+    data = scene(hands, RELAX, count=count, smarticle={"aspect_ratio": 0}, container={"radius_m": radius})
     data["phases"][0]["settle"] = {"timeout_s": 1}
     run = whole(data, out)
     return [*run.sound(rest=0.1), *weight_on_floor(run, 0.05)]
 
 
-def one(out: Path) -> list[Check]:
+def one(hands: Hands, out: Path) -> list[Check]:
     """N = 1, poured, actuated, welded."""
-    run = whole(scene(swing(0.1), RELAX, count=1), out)
+    run = whole(scene(hands, swing(0.1), RELAX, count=1), out)
     checks = run.sound() + weight_on_floor(run, 0.02)
     if run.error is None:
         known = int(np.isfinite(run.series["packing_fraction"]).sum())
@@ -52,22 +53,22 @@ def one(out: Path) -> list[Check]:
     return checks
 
 
-def checkpoint_last(out: Path) -> list[Check]:
+def checkpoint_last(hands: Hands, out: Path) -> list[Check]:
     """A run whose last step is that of a checkpoint: what was just loaded has no contacts to look at yet."""
     recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
-    run = whole(scene(RELAX, count=2, recording=recording), out)
+    run = whole(scene(hands, RELAX, count=2, recording=recording), out)
     return [*run.sound(), *weight_on_floor(run, 0.02)]
 
 
-def many(out: Path, *, count: int, per_layer: int, radius: float) -> list[Check]:
+def many(hands: Hands, out: Path, *, count: int, per_layer: int, radius: float) -> list[Check]:
     """Very many in a wide container."""
-    run = whole(scene(RELAX, count=count, per_layer=per_layer, container={"radius_m": radius}), out)
+    run = whole(scene(hands, RELAX, count=count, per_layer=per_layer, container={"radius_m": radius}), out)
     return run.sound(rest=0.1) + weight_on_floor(run, 0.02)
 
 
-def friction(out: Path, *, value: float, count: int) -> list[Check]:
+def friction(hands: Hands, out: Path, *, value: float, count: int) -> list[Check]:
     """No friction, and plenty."""
-    data = scene(RELAX, count=count, contact={"friction_smarticle": value, "friction_wall": value})
+    data = scene(hands, RELAX, count=count, contact={"friction_smarticle": value, "friction_wall": value})
     data["phases"][0]["settle"] = {"timeout_s": 2}
     run = whole(data, out)
     return run.sound() + weight_on_floor(run, 0.05)
@@ -79,18 +80,18 @@ def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], floa
     return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
 
 
-def step_below(out: Path, *, share: float, count: int) -> list[Check]:
+def step_below(hands: Hands, out: Path, *, share: float, count: int) -> list[Check]:
     """A time step by hand, below the stable one."""
-    data, asked, _ = _with_step(scene(swing(0.04), RELAX, count=count), share)
+    data, asked, _ = _with_step(scene(hands, swing(0.04), RELAX, count=count), share)
     run = whole(data, out)
     assert run.scene is not None  # draft, and a step that is allowed
     # At most by the whole fraction of the control period shorter.
     return [*run.sound(), near("step taken over the step asked [1]", time_step(run.scene) / asked, 0.875, 0.12501)]
 
 
-def step_above(out: Path, *, share: float) -> list[Check]:
+def step_above(hands: Hands, out: Path, *, share: float) -> list[Check]:
     """A time step by hand, above the stable one."""
-    data, asked, stable = _with_step(scene(shape_change(1.5)), share)
+    data, asked, stable = _with_step(scene(hands, shape_change(1.5)), share)
     run = whole(data, out)
     made = Check("run directory", "made" if out.exists() else "none", "none", not out.exists())
     return [

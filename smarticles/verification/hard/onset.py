@@ -22,7 +22,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
-from dem.engine.yade.engine import YadeEngine
+from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
 from dem.run.run import _git_revision
@@ -157,7 +157,7 @@ def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     }
 
 
-def _looks(engine: YadeEngine, described: Scene) -> Iterator[tuple[float, float, float]]:
+def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
     """Let time pass; time [s], kinetic energy [J] and all energy but the motors' [J] about every millisecond."""
     dt = engine.time_step
     interval = dt * max(1, round(described.fidelity.control_interval_s / dt))

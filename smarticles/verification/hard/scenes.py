@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+from smarticles.verification.hands.interface import Hands
+
 RELAX = {"type": "relax", "duration_s": 0.05}
 
 
-def scene(*phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int = 1, **keys: Any) -> dict[str, Any]:
+def scene(hands: Hands, *phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int = 1, **keys: Any) -> dict[str, Any]:
     """Plain data of a scene, draft unless said otherwise.
 
     Args:
+        hands: on the engine.
         phases: after the pour.
         count: smarticles.
         per_layer: of the pour.
@@ -19,6 +22,7 @@ def scene(*phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int
     """
     return {
         "schema_version": 1,
+        "engine": hands.name,
         "name": "hard",
         "seed": seed,
         "count": count,

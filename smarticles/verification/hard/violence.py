@@ -9,18 +9,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.errors import RunError
-from smarticles.verification.bench import TILTED, add, energy, fastest, look, lying, push, watched
+from smarticles.verification.bench import TILTED, add, energy, fastest, look, lying, watched
 from smarticles.verification.check import Check, above, below, near, says
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.runs import Noting, whole
 from smarticles.verification.hard.scenes import scene, shape_change
 
 
-def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:
+def drop(hands: Hands, out: Path, *, articulated: bool, time: float) -> list[Check]:
     """A smarticle hits the floor at 10 m/s."""
     speed = 10.0
-    described, engine, recorder = watched(scene(shape_change(1.5), count=1), out)
+    described, engine, recorder = watched(scene(hands, shape_change(1.5), count=1), out)
     add(engine, (0, 0, 0.02), TILTED)
-    push(engine, 0, velocity=(0, 0, -speed))
+    hands.push(engine, 0, velocity=(0, 0, -speed))
     if articulated:
         engine.motors.articulate()
     held = engine.state().angles
@@ -50,11 +51,11 @@ def drop(out: Path, *, articulated: bool, time: float) -> list[Check]:
     ]
 
 
-def tip(out: Path, *, speed: float) -> list[Check]:
+def tip(hands: Hands, out: Path, *, speed: float) -> list[Check]:
     """A barb's tip hits the floor so fast that a sphere's centre passes it, from where on YADE's floor pushes less."""
-    _, engine, recorder = watched(scene(count=1), out)
+    _, engine, recorder = watched(scene(hands, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
-    push(engine, 0, velocity=(0, 0, -speed))
+    hands.push(engine, 0, velocity=(0, 0, -speed))
     said, first = None, energy(engine)
     while not said and engine.time < 0.05:
         engine.advance(2)
@@ -65,21 +66,21 @@ def tip(out: Path, *, speed: float) -> list[Check]:
     ]
 
 
-def landing(out: Path, *, time: float) -> list[Check]:
+def landing(hands: Hands, out: Path, *, time: float) -> list[Check]:
     """Articulated smarticles fall in a heap, their motors taking ten times τ_max for a moment: no false alarm."""
-    described, engine, recorder = watched(scene(shape_change(1.5), count=4), out)
+    described, engine, recorder = watched(scene(hands, shape_change(1.5), count=4), out)
     limits = recorder.watchdog
     noting = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
     recorder.watchdog = noting
     for k in range(4):
         add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
     engine.motors.articulate()
-    assert engine.motors.deciding is not None  # articulated smarticles have them
     held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
     while not said and engine.time < time:
         engine.motors.actuate(held, interval)
         engine.advance(round(interval / engine.time_step))
-        hardest = max(hardest, float(np.abs(engine.motors.deciding.torques).max()) / described.torque_limit)
+        assert engine.motors.readings is not None  # articulated smarticles have them
+        hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / described.torque_limit)
         said = look(engine, recorder)
     return [
         Check("the watchdog says", said or "nothing", "nothing", said is None),
@@ -88,9 +89,9 @@ def landing(out: Path, *, time: float) -> list[Check]:
     ]
 
 
-def overlap(out: Path, *, time: float) -> list[Check]:
+def overlap(hands: Hands, out: Path, *, time: float) -> list[Check]:
     """Two smarticles begin 0.4 diameters apart, overlapping over their whole length, in a high container."""
-    described, engine, recorder = watched(scene(count=2, container={"height_m": 1.0}), out)
+    described, engine, recorder = watched(scene(hands, count=2, container={"height_m": 1.0}), out)
     d, start = described.sphere_diameter, 0.03
     add(engine, (0, 0, start), TILTED)
     add(engine, (0, 0, start + 0.4 * d), TILTED)
@@ -110,9 +111,9 @@ def overlap(out: Path, *, time: float) -> list[Check]:
     ]
 
 
-def thrown_by_overlap(out: Path, *, time: float) -> list[Check]:
+def thrown_by_overlap(hands: Hands, out: Path, *, time: float) -> list[Check]:
     """The same in a container of the usual height, with a watchdog that is blind for the overlap itself."""
-    described, engine, recorder = watched(scene(count=2), out)
+    described, engine, recorder = watched(scene(hands, count=2), out)
     recorder.watchdog.depth = math.inf
     add(engine, (0, 0, 0.03), TILTED)
     add(engine, (0, 0, 0.03 + 0.4 * described.sphere_diameter), TILTED)
@@ -123,9 +124,9 @@ def thrown_by_overlap(out: Path, *, time: float) -> list[Check]:
     return [says(said, "1 smarticle(s) (1): thrown out over the wall of")]
 
 
-def same_place(out: Path, *, time: float) -> list[Check]:
+def same_place(hands: Hands, out: Path, *, time: float) -> list[Check]:
     """Two smarticles in the very same place, where a contact has no direction."""
-    _, engine, recorder = watched(scene(count=2), out)
+    _, engine, recorder = watched(scene(hands, count=2), out)
     for _ in range(2):
         add(engine, (0, 0, 0.03), TILTED)
     try:
@@ -136,10 +137,10 @@ def same_place(out: Path, *, time: float) -> list[Check]:
     return [says(said, "2 smarticle(s) (0, 1)")]
 
 
-def shaken(out: Path, *, count: int, seconds: float, rest: float) -> list[Check]:
+def shaken(hands: Hands, out: Path, *, count: int, seconds: float, rest: float) -> list[Check]:
     """Γ = 10 at 30 Hz, then rest."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 30, "peak_acceleration_g": 10}
-    run = whole(scene(shake, {"type": "relax", "duration_s": rest}, count=count), out)
+    run = whole(scene(hands, shake, {"type": "relax", "duration_s": rest}, count=count), out)
     checks = run.sound()
     if run.error is None:
         peak = 10 * 9.81 / (2 * np.pi * 30)
@@ -154,20 +155,20 @@ def shaken(out: Path, *, count: int, seconds: float, rest: float) -> list[Check]
     return checks
 
 
-def thrown_out(out: Path, *, count: int, seconds: float) -> list[Check]:
+def thrown_out(hands: Hands, out: Path, *, count: int, seconds: float) -> list[Check]:
     """Shaken at Γ = 30 in a container that is too low for it."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 20, "peak_acceleration_g": 30}
-    run = whole(scene(shake, count=count, container={"height_m": 0.045}), out)
+    run = whole(scene(hands, shake, count=count, container={"height_m": 0.045}), out)
     return [says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less")]
 
 
-def mass_ratio(out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4) -> list[Check]:
+def mass_ratio(hands: Hands, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4) -> list[Check]:
     """One of two smarticles that lie on each other is heavier; by hand, a scene has one density for all.
 
     The contacts of draft cannot carry it, which the watchdog must say; contacts stiffer by the same ratio must.
     """
     carries = stiffness > 250 * ratio / 10
-    data = scene(count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
+    data = scene(hands, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
     described, engine, recorder = watched(data, out)
     flat, d, centres = lying(described), described.sphere_diameter, described.particle.centres
     # Springs along a U give way more under its centre of mass, which is not their middle, than side by side.
@@ -177,8 +178,7 @@ def mass_ratio(out: Path, *, heavy_above: bool, stiffness: float, time: float, r
     sunk = [(ratio + 1) * weight * softness, (ratio if heavy_above else 1) * weight * softness]
     add(engine, (0, 0, flat - sunk[0] * carries))
     add(engine, (0, 0, 3 * flat - sum(sunk) * carries))
-    heavy = engine._omega.bodies[engine._assembly.bodies[int(heavy_above)]].state
-    heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
+    hands.burden(engine, int(heavy_above), ratio)
     said, begun, heights = None, engine.time, []
     while not said and engine.time < begun + time:
         engine.advance(round(recorder.interval / engine.time_step) // 20)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from smarticles.verification.case import Case, Ladder
+from smarticles.verification.hands.kinds import ENGINES
 from smarticles.verification.known import bouncing, clumps, floor, free, hinge, impact, oblique
 
 DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
@@ -41,7 +42,7 @@ CASES = (
             name=f"damped rebound, e = {restitution:g}",
             about="a ball on the floor, its dashpot sized for it",
             theory=f"spring and dashpot that never pull; {DASHPOT}, integrated",
-            run=partial(impact.damped_rebound, restitution),
+            run=partial(impact.damped_rebound, restitution=restitution),
         )
         for restitution in (0.2, 0.5, 0.9)
     ),
@@ -49,38 +50,38 @@ CASES = (
         name="two balls",
         about="head on, in free space, e = 0.5",
         theory="the same at the reduced mass; momentum",
-        run=partial(impact.pair_rebound, 0.5),
+        run=partial(impact.pair_rebound, restitution=0.5),
     ),
     Case(
         name="bar on its end",
         about="a bar falls on its end, with the law of a scene that asks for e = 0.5 at the typical mass",
         theory=f"spring and dashpot at the bar's mass; {DASHPOT}, integrated",
-        run=partial(impact.bar_rebound, 0.5),
+        run=partial(impact.bar_rebound, restitution=0.5),
     ),
     Case(
         name="bars end to end",
         about="the same, two bars in free space",
         theory=f"the same at the reduced mass; {DASHPOT}, integrated",
-        run=partial(impact.bars_rebound, 0.5),
+        run=partial(impact.bars_rebound, restitution=0.5),
     ),
     Case(
         name="oblique, sliding, elastic",
         about="a ball at 82° from the normal, μ = 0.4",
         theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
-        run=partial(oblique.sliding_impact, 1.0, dashpot=0.9),
+        run=partial(oblique.sliding_impact, restitution=1.0, dashpot=0.9),
     ),
     Case(
         name="oblique, sliding, e = 0.7",
         about="the same, without a tangential dashpot",
         theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
-        run=partial(oblique.sliding_impact, 0.7, dashpot=0.0),
+        run=partial(oblique.sliding_impact, restitution=0.7, dashpot=0.0),
     ),
     *(
         Case(
             name=f"oblique, sliding, e = {restitution:g}, dashpot of a scene",
             about="the same, with cs/cn = 0.9: the dashpot acts without limit until the spring has reached Coulomb's",
             theory=f"μ(1 + e)mv + (cs s − μ cn v/2) μ cn v/(ks s − μ kn v); {OBLIQUE}, and YADE's law",
-            run=partial(oblique.sliding_impact, restitution, dashpot=0.9),
+            run=partial(oblique.sliding_impact, restitution=restitution, dashpot=0.9),
         )
         for restitution in (0.7, 0.3)
     ),
@@ -88,7 +89,7 @@ CASES = (
         name="oblique, sliding, e = 0.7, dashpot and step of a scene",
         about="the same with 22 steps in a contact, as in a scene: longer than the dashpot acts",
         theory=f"tangential impulse μ(1 + e)mv; {OBLIQUE}",
-        run=partial(oblique.sliding_impact, 0.7, dashpot=0.9, steps=22),
+        run=partial(oblique.sliding_impact, restitution=0.7, dashpot=0.9, steps=22),
     ),
     Case(
         name="oblique, sticking",
@@ -101,7 +102,7 @@ CASES = (
             name=f"smarticle on {place}, e = {restitution:g}",
             about="a welded U meets a smooth floor with one sphere",
             theory=RIGID,
-            run=partial(impact.tip_impact, restitution, turn),
+            run=partial(impact.tip_impact, restitution=restitution, turn=turn),
         )
         for place, turn, restitution in (
             ("a barb's tip", (0.5, 0.3, 0.1), 1.0),
@@ -147,6 +148,7 @@ CASES = (
         about="a straight smarticle is pulled at both ends by a hundred weights",
         theory="gap F/k of the pin",
         run=partial(hinge.pull, aspect_ratio=0.7, fidelity="standard", largest=0.01),
+        absent={"links": "hinges have no pins that give way: links are one body with two angles"},
     ),
     Case(
         name="barb hanging on its motor",
@@ -159,6 +161,7 @@ CASES = (
         about="the same lying, after the barbs have turned through 105°",
         theory="tilt M/k of the shaft",
         run=partial(hinge.tilt, sweeps=1),
+        absent={"links": "shafts do not tilt: both barbs stay in the plane of the middle link"},
     ),
     Case(
         name="pendulum",
@@ -180,7 +183,16 @@ CASES = (
 COARSE, MIDDLE, FINE = (8e-5, 4e-5, 2e-5, 1e-5), (4e-5, 2e-5, 1e-5, 5e-6), (2e-5, 1e-5, 5e-6, 2.5e-6)
 LEAPFROG = "leapfrog is of second order"
 LATE = "YADE's dashpot takes the velocity of half a step before, and begins with a jump: first order"
+LAGS = "the dashpot takes the velocity of half a step before, and begins with a jump: first order"
+MIDPOINT = "the implicit midpoint rule: second order"
+SHAFTS = "the spring's force is the mean over the half steps before and after: second order"
 TURNS = "YADE's exactAsphericalRot takes the frame of the step's beginning for its middle: first order"
+
+
+def on_both(order: int, why: str) -> dict[str, tuple[int, str]]:
+    """The same order on both engines, for the same reason."""
+    return dict.fromkeys(ENGINES, (order, why))
+
 
 LADDERS = (
     Ladder(
@@ -189,8 +201,9 @@ LADDERS = (
         quantity="height after 0.1 s",
         unit="m",
         size=9.81 * 0.096**2 / 2,
-        order=1,
-        why="bodies are let go with the velocity of half a step before: a shift in time by half a step, no more",
+        scheme=on_both(
+            1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"
+        ),
         steps=COARSE,
         errors=free.fall_errors,
     ),
@@ -200,8 +213,7 @@ LADDERS = (
         quantity="orientation after 1.4 turns",
         unit="rad",
         size=8.6,
-        order=1,
-        why=TURNS,
+        scheme={"yade": (1, TURNS), "links": (2, MIDPOINT)},
         steps=COARSE,
         errors=free.spin_errors,
     ),
@@ -211,8 +223,7 @@ LADDERS = (
         quantity="time between two flips",
         unit="s",
         size=0.208,
-        order=1,
-        why=TURNS,
+        scheme={"yade": (1, TURNS), "links": (2, MIDPOINT)},
         steps=MIDDLE,
         errors=free.flip_errors,
     ),
@@ -222,8 +233,7 @@ LADDERS = (
         quantity="height after 5 ms",
         unit="m",
         size=5.12e-3 * 0.2,
-        order=1,
-        why=LATE,
+        scheme={"yade": (1, LATE), "links": (1, LAGS)},
         steps=COARSE,
         errors=partial(bouncing.bounce_errors, restitution=0.5),
     ),
@@ -233,8 +243,7 @@ LADDERS = (
         quantity="places of all spheres after 5 ms",
         unit="m",
         size=5.12e-3 * 0.2,
-        order=1,
-        why=f"{LATE}; so are rotations",
+        scheme={"yade": (1, f"{LATE}; so are rotations"), "links": (1, LAGS)},
         steps=COARSE,
         errors=partial(bouncing.collision_errors, smooth=False),
     ),
@@ -244,8 +253,7 @@ LADDERS = (
         quantity="orientation after 1.3 turns",
         unit="rad",
         size=8.3,
-        order=2,
-        why="about a principal axis the frame does not matter: second order",
+        scheme={"yade": (2, "about a principal axis the frame does not matter: second order"), "links": (2, MIDPOINT)},
         steps=(3.2e-4, 1.6e-4, 8e-5, 4e-5),
         errors=free.planar_spin_errors,
     ),
@@ -255,8 +263,7 @@ LADDERS = (
         quantity="height after 5 ms",
         unit="m",
         size=5.12e-3 * 0.2,
-        order=2,
-        why=f"{LEAPFROG}, and the force begins from zero",
+        scheme=on_both(2, f"{LEAPFROG}, and the force begins from zero"),
         steps=COARSE,
         errors=partial(bouncing.bounce_errors, restitution=1.0),
     ),
@@ -266,8 +273,7 @@ LADDERS = (
         quantity="places of all spheres after 5 ms",
         unit="m",
         size=5.12e-3 * 0.2,
-        order=2,
-        why=f"{LEAPFROG}, also of turns about the normal, and the force begins from zero",
+        scheme=on_both(2, f"{LEAPFROG}, also of turns about the normal, and the force begins from zero"),
         steps=MIDDLE,
         errors=partial(bouncing.collision_errors, smooth=True),
     ),
@@ -277,8 +283,7 @@ LADDERS = (
         quantity="heights after 20 ms",
         unit="m",
         size=2e-3 * 0.36e-3,
-        order=2,
-        why=LEAPFROG,
+        scheme=on_both(2, LEAPFROG),
         steps=COARSE,
         errors=floor.stack_errors,
     ),
@@ -288,8 +293,7 @@ LADDERS = (
         quantity="way after 0.1 s",
         unit="m",
         size=0.1,
-        order=2,
-        why="the force of friction does not jump where sliding ends: second order",
+        scheme=on_both(2, "the force of friction does not jump where sliding ends: second order"),
         steps=COARSE,
         errors=floor.roll_errors,
     ),
@@ -299,8 +303,7 @@ LADDERS = (
         quantity="angle of a barb over 10 ms",
         unit="rad",
         size=0.01,
-        order=2,
-        why=f"{LEAPFROG}, in the plane",
+        scheme={"yade": (2, f"{LEAPFROG}, in the plane"), "links": (2, SHAFTS)},
         steps=FINE,
         errors=hinge.vibration_errors,
     ),

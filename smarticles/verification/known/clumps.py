@@ -6,17 +6,17 @@ A clump that meets the floor with n of them is n times stiffer, and is damped by
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dem.engine.yade.kind import contact_law_of
 from dem.physics.contact import restitution_of, typical_effective_mass
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
-from smarticles.verification.bench import Array, G, add, build, push, scene
+from smarticles.verification.bench import Array, G, add, law_of, scene
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.interface import Hands
+from smarticles.verification.known.floor import lowest
 from smarticles.verification.known.theory import falling_on_springs
 
 SPEED = 0.1  # m/s
@@ -28,7 +28,7 @@ class FlatImpact:
 
     Args:
         rows: of spheres across the thickness [1].
-        pitch: of neighbouring spheres over their diameter [1].
+        pitch: of neighbouring spheres over their diameter; 0 where links are whole [1].
         spheres: of the smarticle [1].
         contacts: of them that touch the floor [1].
         nominal: restitution that the scene asks for [1].
@@ -61,37 +61,30 @@ class FlatImpact:
     step: float
 
 
-def flat_scene(*, rows: int, pitch: float, restitution: float = 0.7) -> Scene:
+def flat_scene(hands: Hands, *, rows: int, pitch: float, restitution: float = 0.7) -> Scene:
     """A scene at the stiffness of `standard`, with spheres of its own."""
-    fidelity = {"base": "standard", "rows": rows, "pitch": pitch}
-    return scene(fidelity=fidelity, contact={"restitution": restitution})
+    fidelity = {"base": "standard", "rows": rows} | ({"pitch": pitch} if pitch else {})
+    return scene(hands, fidelity=fidelity, contact={"restitution": restitution})
 
 
-def _touching(one: Scene) -> Array:
-    """(n, 2) where the spheres of the lowest row are, from the centre of mass [m]."""
-    centres = one.particle.centres
-    found: Array = centres[centres[:, 2] < centres[:, 2].min() + 1e-9, :2]
-    return found
-
-
-def _thrown(one: Scene, dt: float) -> tuple[float, float]:
+def _thrown(hands: Hands, one: Scene, dt: float) -> tuple[float, float]:
     """Restitution [1] and time in contact [s] of a flat throw."""
-    engine = build(one.particle, contact_law_of(one), dt=dt)
+    engine = hands.build(one.particle, law_of(one), dt=dt)
     rest = one.particle.radius - float(one.particle.centres[:, 2].min())
     add(engine, (0, 0, rest + 3.3 * SPEED * dt))
-    push(engine, 0, velocity=(0, 0, -SPEED))
+    hands.push(engine, 0, velocity=(0, 0, -SPEED))
     first = last = 0
     while not last or engine.steps < 2 * last - first + 50:
         engine.advance(1)
-        if engine.container_force()[2]:
+        if hands.floor_force(engine)[2]:
             first, last = first or engine.steps, engine.steps
     energy = one.smarticle.boxes.mass * SPEED**2 / 2
     return math.sqrt(engine.state().kinetic_energy / energy), (last - first + 1) * dt
 
 
-def _sunk(one: Scene, dt: float, *, time: float) -> float:
+def _sunk(hands: Hands, one: Scene, dt: float, *, time: float) -> float:
     """How deep the centre of mass of a smarticle that lies flat has sunk [m]."""
-    engine = build(one.particle, contact_law_of(one), dt=dt, gravity=G)
+    engine = hands.build(one.particle, law_of(one), dt=dt, gravity=G)
     rest = one.particle.radius - float(one.particle.centres[:, 2].min())
     add(engine, (0, 0, rest))
     engine.advance(round(time / dt))
@@ -104,10 +97,10 @@ def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
     return float(np.linalg.solve(stiffness * lift.T @ lift, [weight, 0.0, 0.0])[0])
 
 
-def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImpact:
+def flat_impact(hands: Hands, *, rows: int, pitch: float, restitution: float = 0.7) -> FlatImpact:
     """Throw a smarticle flat at the floor, and lay it there."""
-    one = flat_scene(rows=rows, pitch=pitch, restitution=restitution)
-    law, boxes, points = contact_law_of(one), one.smarticle.boxes, _touching(one)
+    one = flat_scene(hands, rows=rows, pitch=pitch, restitution=restitution)
+    law, boxes, points = law_of(one), one.smarticle.boxes, lowest(hands, one.particle)
     stiffness, damping, mass, count = law.normal_stiffness, law.wall_damping, boxes.mass, len(points)
     ratio = count * damping / (2 * math.sqrt(count * stiffness * mass))
     after, lasts = falling_on_springs(
@@ -116,9 +109,9 @@ def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImp
     energy = float((np.array([mass, *boxes.inertia[:2]]) * after**2).sum() / (mass * SPEED**2))
     period = 2 * math.pi * math.sqrt(mass / (count * stiffness))
     dt = period / 800
-    measured, measured_contact = _thrown(one, dt)
+    measured, measured_contact = _thrown(hands, one, dt)
     # As deep as weight and springs have it, once the vibration has died away: a damping time is a fraction of a period.
-    measured_sunk = _sunk(one, period / 60, time=40 * period)
+    measured_sunk = _sunk(hands, one, period / 60, time=40 * period)
     return FlatImpact(
         rows=rows,
         pitch=pitch,
@@ -128,7 +121,7 @@ def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImp
         parallel=restitution_of(ratio),
         theory=math.sqrt(energy),
         measured=measured,
-        at_scene_step=_thrown(one, time_step(one))[0],
+        at_scene_step=_thrown(hands, one, time_step(one))[0],
         theory_contact=lasts,
         measured_contact=measured_contact,
         single_contact=math.pi * math.sqrt(typical_effective_mass(one.particle) / stiffness),
@@ -138,9 +131,9 @@ def flat_impact(*, rows: int, pitch: float, restitution: float = 0.7) -> FlatImp
     )
 
 
-def flat_checks(*, rows: int, pitch: float) -> list[Answer]:
+def flat_checks(hands: Hands, *, rows: int, pitch: float) -> list[Answer]:
     """A flat impact against springs and dashpots side by side."""
-    found = flat_impact(rows=rows, pitch=pitch)
+    found = flat_impact(hands, rows=rows, pitch=pitch)
     reason = "contact begins within a step, 1/400 of an undamped one; the sum over n contacts is that of one"
     return [
         Answer(
@@ -173,6 +166,10 @@ def flat_checks(*, rows: int, pitch: float) -> list[Answer]:
 ROWS_AND_PITCHES = tuple((rows, pitch) for rows in (1, 2) for pitch in (1.3, 1.0, 0.5, 0.25))
 
 
-def flat_impacts(settings: Sequence[tuple[int, float]] = ROWS_AND_PITCHES) -> list[FlatImpact]:
-    """Flat impacts over the number of spheres."""
-    return [flat_impact(rows=rows, pitch=pitch) for rows, pitch in settings]
+STRANDS = (1, 2, 3, 4)
+
+
+def flat_impacts(hands: Hands) -> list[FlatImpact]:
+    """Flat impacts over the number of points that touch: of spheres, or of strands where links are whole."""
+    settings = ROWS_AND_PITCHES if hands.name == "yade" else [(rows, 0.0) for rows in STRANDS]
+    return [flat_impact(hands, rows=rows, pitch=pitch) for rows, pitch in settings]

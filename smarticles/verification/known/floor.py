@@ -9,8 +9,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from dem.body.particle import Particle
-from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
+from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from smarticles.verification.bench import (
@@ -20,44 +19,51 @@ from smarticles.verification.bench import (
     Array,
     G,
     add,
-    ball,
     ball_law,
-    build,
-    push,
+    law_of,
     scene,
 )
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.interface import Hands
 
 FRICTION = 0.4
 
 
-def resting(particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> YadeEngine:
+def lowest(hands: Hands, particle: Particle) -> Array:
+    """(n, 2) where a body that lies flat touches the floor, from its centre of mass [m]."""
+    ends = hands.ends(particle)
+    found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
+    return found
+
+
+def resting(hands: Hands, particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> Engine:
     """A body lying on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
-    engine = build(particle, law, dt=dt, gravity=G)
-    sunk = particle.boxes.mass * G / (len(particle.centres) * law.normal_stiffness)
+    engine = hands.build(particle, law, dt=dt, gravity=G)
+    sunk = particle.boxes.mass * G / (len(lowest(hands, particle)) * law.normal_stiffness)
     add(engine, (0, -0.03, particle.radius - float(particle.centres[:, 2].min()) - sunk))
-    push(engine, 0, velocity=(0, speed, 0))
+    hands.push(engine, 0, velocity=(0, speed, 0))
     return engine
 
 
 # -- sliding to rolling ------------------------------------------------------------------------------------------------
 
 
-def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
+def roll(hands: Hands, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
     """A round body thrown along the floor: friction slows it and makes it spin until it rolls.
 
     Args:
+        hands: on the engine.
         particle: a ball, or a bar that lies across its way.
         law: with friction.
         speed: at t = 0, without spin [m/s].
         dt: time step [s].
     """
     friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
-    lever = particle.radius - mass * G / (len(particle.centres) * law.normal_stiffness)
+    lever = particle.radius - hands.arm_share * mass * G / (len(lowest(hands, particle)) * law.normal_stiffness)
     share = inertia / (mass * lever**2)
     rolling = speed / (1 + share)
     begins = (speed - rolling) / (friction * G)
-    engine = resting(particle, law, dt=dt, speed=speed)
+    engine = resting(hands, particle, law, dt=dt, speed=speed)
     times, speeds, slips = [], [], []
     for _ in range(400):
         engine.advance(max(1, round(2 * begins / 400 / dt)))
@@ -107,23 +113,23 @@ def roll(particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> lis
     ]
 
 
-def ball_rolls() -> list[Answer]:
+def ball_rolls(hands: Hands) -> list[Answer]:
     """A solid ball: 5/7 of its speed."""
     law = ball_law(restitution=0.5, friction=FRICTION)
-    return roll(ball(), law, speed=0.3, dt=math.pi * math.sqrt(BALL_MASS / STIFFNESS) / 100)
+    return roll(hands, hands.roller(), law, speed=0.3, dt=math.pi * math.sqrt(BALL_MASS / STIFFNESS) / 100)
 
 
-def bar_rolls() -> list[Answer]:
+def bar_rolls(hands: Hands) -> list[Answer]:
     """A bar of many spheres, with the inertia of its box."""
-    one = scene(fidelity="standard", smarticle={"aspect_ratio": 0})
-    return roll(one.particle, contact_law_of(one), speed=0.3, dt=time_step(one) / 4)
+    one = scene(hands, fidelity="standard", smarticle={"aspect_ratio": 0})
+    return roll(hands, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
-def slide(*, aspect_ratio: float, friction: float) -> list[Answer]:
+def slide(hands: Hands, *, aspect_ratio: float, friction: float) -> list[Answer]:
     """A smarticle lying flat is pushed along the floor, along its axis of symmetry, and stops."""
     speed = 0.3
-    one = scene(smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
-    engine = resting(one.particle, contact_law_of(one), dt=time_step(one), speed=speed)
+    one = scene(hands, smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
+    engine = resting(hands, one.particle, law_of(one), dt=time_step(one), speed=speed)
     stops = speed / (friction * G)
     times, ways, speeds = [0.0], [-0.03], [speed]
     while engine.time < 1.5 * stops:
@@ -172,24 +178,25 @@ def slide(*, aspect_ratio: float, friction: float) -> list[Answer]:
     ]
 
 
-def roll_errors(steps: Sequence[float], *, phases: int = 5) -> list[float]:
+def roll_errors(hands: Hands, steps: Sequence[float], *, phases: int = 5) -> list[float]:
     """Error of the way of a ball that slides and then rolls, after 0.1 s [m], against a four times finer step.
 
     Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
     acts only at steps that resolve the winding, a few µs.
 
     Args:
+        hands: on the engine.
         steps: [s].
         phases: speeds, so that rolling begins anywhere within a step.
     """
     law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
     slowed = FRICTION * G
-    spun = slowed * BALL_MASS * BALL_RADIUS / float(ball().boxes.inertia[0])
+    spun = slowed * BALL_MASS * BALL_RADIUS / float(hands.roller().boxes.inertia[0])
 
     def way(dt: float, number: int) -> Array:
         speed = 1 + 0.1 * (0.618034 * number % 1)
-        engine = resting(ball(), law, dt=dt, speed=speed)
-        push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spun * dt / 2, 0, 0))
+        engine = resting(hands, hands.roller(), law, dt=dt, speed=speed)
+        hands.push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spun * dt / 2, 0, 0))
         engine.advance(round(time / dt))
         return np.asarray(engine.state().positions[0])
 
@@ -204,20 +211,22 @@ def roll_errors(steps: Sequence[float], *, phases: int = 5) -> list[float]:
 # -- a stack -----------------------------------------------------------------------------------------------------------
 
 
-def two_high(law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool) -> YadeEngine:
+def two_high(
+    hands: Hands, law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool
+) -> Engine:
     """Two balls on each other on the floor, let go as deep as they will be pressed, or just touching."""
     press = BALL_MASS * G / STIFFNESS * sunk
-    engine = build(ball(), law, dt=dt, gravity=G)
-    add(engine, (0, 0, BALL_RADIUS - 2 * press))
-    add(engine, (0, 0, 3 * BALL_RADIUS - 3 * press))
+    engine = hands.build(hands.ball(), law, dt=dt, gravity=G)
+    add(engine, (0, 0, BALL_RADIUS - 2 * press), hands.ball_turn)
+    add(engine, (0, 0, 3 * BALL_RADIUS - 3 * press), hands.ball_turn)
     for k, velocity in enumerate(velocities):
-        push(engine, k, velocity=(0, 0, velocity))
+        hands.push(engine, k, velocity=(0, 0, velocity))
     return engine
 
 
-def stack_at_rest() -> list[Answer]:
+def stack_at_rest(hands: Hands) -> list[Answer]:
     """Two balls on each other come to rest: the lower contact bears both, the upper one the upper ball."""
-    engine = two_high(ball_law(restitution=0.2), dt=2e-5, sunk=False)
+    engine = two_high(hands, ball_law(restitution=0.2), dt=2e-5, sunk=False)
     engine.advance(5000)
     low, high = engine.state().positions[:, 2]
     reason = "what is left of the vibration after 0.1 s, 40 periods of it"
@@ -243,14 +252,14 @@ def stack_at_rest() -> list[Answer]:
             quantity="force on the floor",
             unit="N",
             theory=-2 * weight,
-            measured=float(engine.container_force()[2]),
+            measured=float(hands.floor_force(engine)[2]),
             tolerance=1e-6,
             reason=reason,
         ),
     ]
 
 
-def stack_motion(dt: float, *, time: float) -> tuple[Array, Array]:
+def stack_motion(hands: Hands, dt: float, *, time: float) -> tuple[Array, Array]:
     """Two elastic balls on each other vibrate without parting.
 
     Returns:
@@ -263,13 +272,13 @@ def stack_motion(dt: float, *, time: float) -> tuple[Array, Array]:
     frequencies = np.sqrt(squares)
     share = modes.T @ (BALL_MASS * thrown)
     before = modes @ (share * np.cos(frequencies * dt / 2))
-    engine = two_high(ball_law(), dt=dt, velocities=before, sunk=True)
+    engine = two_high(hands, ball_law(), dt=dt, velocities=before, sunk=True)
     rest = engine.state().positions[:, 2]
     engine.advance(round(time / dt))
     return engine.state().positions[:, 2] - rest, modes @ (share * np.sin(frequencies * time) / frequencies)
 
 
-def stack_errors(steps: Sequence[float]) -> list[float]:
+def stack_errors(hands: Hands, steps: Sequence[float]) -> list[float]:
     """Error of the heights of two elastic balls that vibrate on each other, after 20 ms [m]."""
-    found = [stack_motion(dt, time=0.02048) for dt in steps]
+    found = [stack_motion(hands, dt, time=0.02048) for dt in steps]
     return [float(np.linalg.norm(one - exact)) for one, exact in found]

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.kind import contact_law_of
-from smarticles.verification.bench import Array, G, add, body_rotations, build, push, scene
+from smarticles.verification.bench import Array, G, add, body_rotations, law_of, scene
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.known.theory import free_rotation
 
 START = Rotation.from_rotvec([0.4, 0.2, -0.7])
@@ -18,10 +18,11 @@ SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose thr
 ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly about the axis of the middle moment
 
 
-def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
+def fall(hands: Hands, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
     """A smarticle thrown upwards in free fall.
 
     Args:
+        hands: on the engine.
         dt: time step [s].
         time: of flight [s].
         throw: speed upwards at t = 0 [m/s].
@@ -31,20 +32,20 @@ def fall(dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array,
         (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
         that it has turned [rad].
     """
-    one = scene()
-    engine = build(one.particle, contact_law_of(one), dt=dt, gravity=G)
+    one = scene(hands)
+    engine = hands.build(one.particle, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, 0.1), START)
-    push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
+    hands.push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
     state = engine.state()
     turned = (Rotation.from_matrix(body_rotations(state)[0]) * START.inv()).magnitude()
     return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
 
-def free_fall() -> list[Answer]:
+def free_fall(hands: Hands) -> list[Answer]:
     """The parabola."""
     dt, time, throw = 5e-5, 0.1, 0.3
-    way, velocity, turned = fall(dt, time=time, throw=throw, centred=True)
+    way, velocity, turned = fall(hands, dt, time=time, throw=throw, centred=True)
     reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
     return [
         Answer(
@@ -84,15 +85,16 @@ def free_fall() -> list[Answer]:
     ]
 
 
-def fall_errors(steps: Sequence[float]) -> list[float]:
+def fall_errors(hands: Hands, steps: Sequence[float]) -> list[float]:
     """Error of the height of a smarticle let go from rest, as the pour does it, after 0.1 s [m]."""
-    return [abs(fall(dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
+    return [abs(fall(hands, dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
 
 
-def spin_rotations(dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
+def spin_rotations(hands: Hands, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
     """A smarticle spins freely.
 
     Args:
+        hands: on the engine.
         dt: time step, a whole fraction of all times [s].
         spin: (3,) laboratory frame [rad/s].
         times: (n,) rising [s].
@@ -100,10 +102,10 @@ def spin_rotations(dt: float, *, spin: Array, times: Array) -> tuple[Rotation, A
     Returns:
         Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].
     """
-    one = scene()
-    engine = build(one.particle, contact_law_of(one), dt=dt)
+    one = scene(hands)
+    engine = hands.build(one.particle, law_of(one), dt=dt)
     add(engine, (0, 0, 0.1), START)
-    push(engine, 0, spin=spin)
+    hands.push(engine, 0, spin=spin)
     rows, spins = [], []
     for time in times:
         engine.advance(round(time / dt) - 1 - engine.steps)
@@ -120,16 +122,16 @@ def _misfit(found: Rotation, exact: Rotation) -> Array:
     return vectors
 
 
-def torque_free_spin() -> list[Answer]:
+def torque_free_spin(hands: Hands) -> list[Answer]:
     """A U about no axis in particular: orientation, energy, angular momentum, in the limit of small steps."""
-    inertia = scene().smarticle.boxes.inertia
+    inertia = scene(hands).smarticle.boxes.inertia
     times, coarse = np.linspace(0.02, 0.2, 10), 2e-5
     exact, _ = free_rotation(inertia=inertia, start=START, spin=SPIN, times=times)
     momentum = START.apply(inertia * START.inv().apply(SPIN))
     energy = momentum @ SPIN / 2
     misfits, energies, momenta = [], [], []
     for dt in (coarse, coarse / 2):
-        rotations, spins = spin_rotations(dt, spin=SPIN, times=times)
+        rotations, spins = spin_rotations(hands, dt, spin=SPIN, times=times)
         misfits.append(_misfit(rotations, exact))
         # The spin is that of the middle of the step: so is the frame it is seen in.
         middle = Rotation.from_rotvec(-spins * dt / 2) * rotations
@@ -186,42 +188,42 @@ def torque_free_spin() -> list[Answer]:
     ]
 
 
-def spin_errors(steps: Sequence[float]) -> list[float]:
+def spin_errors(hands: Hands, steps: Sequence[float]) -> list[float]:
     """Error of the orientation after 1.4 turns about no axis in particular [rad]."""
     times = np.array([0.2])
-    exact, _ = free_rotation(inertia=scene().smarticle.boxes.inertia, start=START, spin=SPIN, times=times)
-    return [float(np.linalg.norm(_misfit(spin_rotations(dt, spin=SPIN, times=times)[0], exact))) for dt in steps]
+    exact, _ = free_rotation(inertia=scene(hands).smarticle.boxes.inertia, start=START, spin=SPIN, times=times)
+    return [float(np.linalg.norm(_misfit(spin_rotations(hands, dt, spin=SPIN, times=times)[0], exact))) for dt in steps]
 
 
-def planar_spin_errors(steps: Sequence[float]) -> list[float]:
+def planar_spin_errors(hands: Hands, steps: Sequence[float]) -> list[float]:
     """Error of the orientation after 1.3 turns about the normal of the U's plane [rad]."""
     times, spin = np.array([0.192]), START.apply([0.0, 0.0, 43.0])
-    exact, _ = free_rotation(inertia=scene().smarticle.boxes.inertia, start=START, spin=spin, times=times)
-    return [float(np.linalg.norm(_misfit(spin_rotations(dt, spin=spin, times=times)[0], exact))) for dt in steps]
+    exact, _ = free_rotation(inertia=scene(hands).smarticle.boxes.inertia, start=START, spin=spin, times=times)
+    return [float(np.linalg.norm(_misfit(spin_rotations(hands, dt, spin=spin, times=times)[0], exact))) for dt in steps]
 
 
 FLIPS = np.linspace(2e-3, 0.5, 250)  # s; times that a U about its middle axis is looked at
 
 
-def _between_flips(rotations: Rotation) -> float:
+def _between_flips(hands: Hands, rotations: Rotation) -> float:
     """Time between the first two flips [s]."""
     # Angular momentum stands still, so its part along the body's y axis tells how the body turns under it.
-    momentum = START.apply(scene().smarticle.boxes.inertia * ABOUT_MIDDLE)
+    momentum = START.apply(scene(hands).smarticle.boxes.inertia * ABOUT_MIDDLE)
     roots = CubicSpline(FLIPS, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
     return float(roots[1] - roots[0])
 
 
-def _flip_times(steps: Sequence[float]) -> tuple[list[float], float]:
+def _flip_times(hands: Hands, steps: Sequence[float]) -> tuple[list[float], float]:
     """Times between the first two flips [s] at time steps [s], and in theory."""
-    inertia, spin = scene().smarticle.boxes.inertia, START.apply(ABOUT_MIDDLE)
+    inertia, spin = scene(hands).smarticle.boxes.inertia, START.apply(ABOUT_MIDDLE)
     exact, _ = free_rotation(inertia=inertia, start=START, spin=spin, times=FLIPS)
-    found = [_between_flips(spin_rotations(dt, spin=spin, times=FLIPS)[0]) for dt in steps]
-    return found, _between_flips(exact)
+    found = [_between_flips(hands, spin_rotations(hands, dt, spin=spin, times=FLIPS)[0]) for dt in steps]
+    return found, _between_flips(hands, exact)
 
 
-def flips() -> list[Answer]:
+def flips(hands: Hands) -> list[Answer]:
     """The middle axis is unstable: the U flips over, again and again."""
-    (coarse, fine), exact = _flip_times((2e-5, 1e-5))
+    (coarse, fine), exact = _flip_times(hands, (2e-5, 1e-5))
     return [
         Answer(
             quantity="time between two flips, dt → 0",
@@ -243,7 +245,7 @@ def flips() -> list[Answer]:
     ]
 
 
-def flip_errors(steps: Sequence[float]) -> list[float]:
+def flip_errors(hands: Hands, steps: Sequence[float]) -> list[float]:
     """Error of the time between the first two flips [s]."""
-    found, exact = _flip_times(steps)
+    found, exact = _flip_times(hands, steps)
     return [abs(time - exact) for time in found]

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
+from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw, typical_effective_mass
 from dem.plan.steps import time_step
 from smarticles.verification.bench import (
@@ -21,13 +20,12 @@ from smarticles.verification.bench import (
     UPRIGHT,
     Array,
     add,
-    ball,
     ball_law,
-    build,
-    push,
+    law_of,
     scene,
 )
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.known.theory import dashpot_impact
 
 CONTACT_TIME = math.pi * math.sqrt(BALL_MASS / STIFFNESS)  # s, of an elastic ball on the floor
@@ -52,17 +50,18 @@ class Touch:
     deepest: float
 
 
-def touch(engine: YadeEngine, *, most: int) -> Touch:
+def touch(hands: Hands, engine: Engine, *, most: int) -> Touch:
     """Advance until a body has met the floor and left it again.
 
     Args:
+        hands: on the engine.
         engine: with one welded body on its way down.
         most: steps to give up after.
     """
     pressed, deepest = 0, 0.0
     for _ in range(most):
         engine.advance(1)
-        if engine.container_force()[2]:
+        if hands.floor_force(engine)[2]:
             pressed += 1
             state = engine.state()
             deepest = max(deepest, engine.particle.radius - float(state.spheres(engine.particle)[0, :, 2].min()))
@@ -72,18 +71,18 @@ def touch(engine: YadeEngine, *, most: int) -> Touch:
     return Touch(state.velocities[0], state.link_spins[0, 1], pressed, deepest)
 
 
-def ball_impact(law: ContactLaw, *, speed: float, slip: float = 0.0, dt: float) -> Touch:
+def ball_impact(hands: Hands, law: ContactLaw, *, speed: float, slip: float = 0.0, dt: float) -> Touch:
     """A ball meets the floor at a speed downwards, and `slip` along x [m/s]; no gravity."""
-    engine = build(ball(), law, dt=dt)
-    add(engine, (0, 0, BALL_RADIUS + 3.3 * speed * dt))
-    push(engine, 0, velocity=(slip, 0, -speed))
-    return touch(engine, most=10 * RESOLVED)
+    engine = hands.build(hands.ball(), law, dt=dt)
+    add(engine, (0, 0, BALL_RADIUS + 3.3 * speed * dt), hands.ball_turn)
+    hands.push(engine, 0, velocity=(slip, 0, -speed))
+    return touch(hands, engine, most=10 * RESOLVED)
 
 
-def elastic_rebound() -> list[Answer]:
+def elastic_rebound(hands: Hands) -> list[Answer]:
     """A ball on an elastic floor."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
-    found = ball_impact(ball_law(), speed=speed, dt=dt)
+    found = ball_impact(hands, ball_law(), speed=speed, dt=dt)
     return [
         Answer(
             quantity="contact time",
@@ -112,11 +111,11 @@ def elastic_rebound() -> list[Answer]:
     ]
 
 
-def damped_rebound(restitution: float) -> list[Answer]:
+def damped_rebound(hands: Hands, restitution: float) -> list[Answer]:
     """A ball whose dashpot is sized for the restitution asked for."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     law = ball_law(restitution=restitution)
-    found = ball_impact(law, speed=speed, dt=dt)
+    found = ball_impact(hands, law, speed=speed, dt=dt)
     exact = dashpot_impact(stiffness=STIFFNESS, damping=law.wall_damping, mass=BALL_MASS)
     return [
         Answer(
@@ -146,14 +145,14 @@ def damped_rebound(restitution: float) -> list[Answer]:
     ]
 
 
-def pair_rebound(restitution: float) -> list[Answer]:
+def pair_rebound(hands: Hands, restitution: float) -> list[Answer]:
     """Two balls meet head on in free space: the reduced mass is half of one."""
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
-    engine = build(ball(), ball_law(restitution=restitution), dt=dt)
-    add(engine, (0, 0, 0.1))
-    add(engine, (0, 0, 0.1 + 2 * BALL_RADIUS + 3.3 * speed * dt))
-    push(engine, 0, velocity=(0, 0, speed / 4))
-    push(engine, 1, velocity=(0, 0, -3 * speed / 4))
+    engine = hands.build(hands.ball(), ball_law(restitution=restitution), dt=dt)
+    add(engine, (0, 0, 0.1), hands.ball_turn)
+    add(engine, (0, 0, 0.1 + 2 * BALL_RADIUS + 3.3 * speed * dt), hands.ball_turn)
+    hands.push(engine, 0, velocity=(0, 0, speed / 4))
+    hands.push(engine, 1, velocity=(0, 0, -3 * speed / 4))
     engine.advance(4 * RESOLVED)
     after = engine.state().velocities
     return [
@@ -176,22 +175,23 @@ def pair_rebound(restitution: float) -> list[Answer]:
     ]
 
 
-def bar_rebound(restitution: float, *, resized: bool = False) -> list[Answer]:
+def bar_rebound(hands: Hands, restitution: float, *, resized: bool = False) -> list[Answer]:
     """An upright bar falls on its end: the force passes through the centre of mass, and the law is a scene's.
 
     Args:
+        hands: on the engine.
         restitution: that the scene asks for; it holds at the typical effective mass, not at the bar's [1].
         resized: whether to size the dashpots for the bar's mass, so that it holds here.
     """
-    one = scene(smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
-    law, mass, speed = contact_law_of(one), one.smarticle.boxes.mass, 0.5
+    one = scene(hands, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
+    law, mass, speed = law_of(one), one.smarticle.boxes.mass, 0.5
     if resized:
         scale = math.sqrt(mass / typical_effective_mass(one.particle))
         law = dataclasses.replace(law, wall_damping=law.wall_damping * scale)
-    engine = build(one.particle, law, dt=time_step(one) / 8)
+    engine = hands.build(one.particle, law, dt=time_step(one) / 8)
     add(engine, (0, 0, one.smarticle.middle_length_m / 2 + 1e-5), UPRIGHT)
-    push(engine, 0, velocity=(0, 0, -speed))
-    found = touch(engine, most=10 * RESOLVED)
+    hands.push(engine, 0, velocity=(0, 0, -speed))
+    found = touch(hands, engine, most=10 * RESOLVED)
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.wall_damping, mass=mass)
     return [
         Answer(
@@ -214,15 +214,15 @@ def bar_rebound(restitution: float, *, resized: bool = False) -> list[Answer]:
     ]
 
 
-def bars_rebound(restitution: float) -> list[Answer]:
+def bars_rebound(hands: Hands, restitution: float) -> list[Answer]:
     """Two upright bars in free space, end to end, with a scene's law."""
-    one = scene(smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
-    law, mass, speed = contact_law_of(one), one.smarticle.boxes.mass, 0.5
-    engine = build(one.particle, law, dt=time_step(one) / 8)
+    one = scene(hands, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
+    law, mass, speed = law_of(one), one.smarticle.boxes.mass, 0.5
+    engine = hands.build(one.particle, law, dt=time_step(one) / 8)
     add(engine, (0, 0, 0.05), UPRIGHT)
     add(engine, (0, 0, 0.05 + one.smarticle.middle_length_m + 1e-4), UPRIGHT)
-    push(engine, 0, velocity=(0, 0, speed / 2))
-    push(engine, 1, velocity=(0, 0, -speed / 2))
+    hands.push(engine, 0, velocity=(0, 0, speed / 2))
+    hands.push(engine, 1, velocity=(0, 0, -speed / 2))
     engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
     after = engine.state().velocities[:, 2]
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.normal_damping, mass=mass / 2)
@@ -250,18 +250,19 @@ def bars_rebound(restitution: float) -> list[Answer]:
 # -- clump on its tip --------------------------------------------------------------------------------------------------
 
 
-def tip_impact(restitution: float, turn: Sequence[float]) -> list[Answer]:
+def tip_impact(hands: Hands, restitution: float, turn: Sequence[float]) -> list[Answer]:
     """A welded smarticle meets a smooth floor with one sphere.
 
     Args:
+        hands: on the engine.
         restitution: that the scene asks for [1].
         turn: rotation vector of its pose [rad].
     """
-    one = scene(contact={"restitution": restitution, "friction_wall": 0})
-    law, boxes, particle, speed = contact_law_of(one), one.smarticle.boxes, one.particle, 0.02
+    one = scene(hands, contact={"restitution": restitution, "friction_wall": 0})
+    law, boxes, particle, speed = law_of(one), one.smarticle.boxes, one.particle, 0.02
     pose = Rotation.from_rotvec(turn)
-    heights = np.sort(pose.apply(particle.centres)[:, 2])
-    arm = pose.apply(particle.centres)[np.argmin(pose.apply(particle.centres)[:, 2])]
+    ends = pose.apply(hands.ends(particle))
+    heights, arm = np.sort(ends[:, 2]), ends[np.argmin(ends[:, 2])]
     lever = np.cross(arm, [0, 0, 1])
     turned = pose.apply(pose.inv().apply(lever) / boxes.inertia)
     felt = 1 / (1 / boxes.mass + lever @ turned)
@@ -269,10 +270,10 @@ def tip_impact(restitution: float, turn: Sequence[float]) -> list[Answer]:
     dt = exact.duration / RESOLVED
     # One sphere alone: the next one is higher than the first one ever comes down.
     assert heights[1] - heights[0] > 3 * speed * exact.duration
-    engine = build(particle, law, dt=dt)
+    engine = hands.build(particle, law, dt=dt)
     add(engine, (0, 0, -heights[0] + particle.radius + 3.3 * speed * dt), pose)
-    push(engine, 0, velocity=(0, 0, -speed))
-    found = touch(engine, most=4 * RESOLVED)
+    hands.push(engine, 0, velocity=(0, 0, -speed))
+    found = touch(hands, engine, most=4 * RESOLVED)
     impulse = (1 + exact.restitution) * felt * speed
     reason = f"{ONSET}; and the smarticle turns by some 1e-3 rad meanwhile"
     spin = impulse * turned

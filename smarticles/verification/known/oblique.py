@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
-from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball, ball_law
+from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball_law
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.interface import Hands
 from smarticles.verification.known.impact import CONTACT_TIME, ONSET, RESOLVED, ball_impact
 
 FRICTION = 0.4
 
 
-def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Answer]:
+def sliding_impact(hands: Hands, restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Answer]:
     """A ball that slides on the floor as long as it touches it: the tangential impulse is μ times the normal one.
 
     Not quite, with a tangential dashpot: YADE holds the tangential spring to Coulomb's limit, and adds the dashpot's
@@ -20,14 +21,15 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
     than t* never sees it.
 
     Args:
+        hands: on the engine.
         restitution: [1].
         dashpot: cs over cn; scenes have 0.9 [1].
         steps: in an elastic contact [1].
     """
     speed, slip, dt = 0.2, 1.5, CONTACT_TIME / steps
     law = ball_law(restitution=restitution, friction=FRICTION, dashpot=dashpot)
-    found = ball_impact(law, speed=speed, slip=slip, dt=dt)
-    inertia = ball().boxes.inertia[1]
+    found = ball_impact(hands, law, speed=speed, slip=slip, dt=dt)
+    inertia = hands.ball().boxes.inertia[1]
     cn, kn, ks = law.wall_damping, law.normal_stiffness, law.tangential_stiffness
     winding = FRICTION * cn * speed / (ks * slip - FRICTION * kn * speed)
     excess = (dashpot * cn * slip - FRICTION * cn * speed / 2) * winding if winding > dt else 0.0
@@ -35,7 +37,7 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
     impulse = coulomb + excess
     # At the lever from the centre to the floor, which is shorter than the radius by the overlap: by its mean under the
     # normal force, π/4 of the largest in a sine.
-    lever = BALL_RADIUS - math.pi / 4 * found.deepest
+    lever = BALL_RADIUS - hands.arm_share * math.pi / 4 * found.deepest
     reason, tolerance = "second order", 1e-4
     if restitution < 1:
         reason = f"{ONSET}; and the estimate of the excess takes both speeds as constant while the spring is wound up"
@@ -72,16 +74,18 @@ def sliding_impact(restitution: float, *, dashpot: float, steps: int = RESOLVED)
     ]
 
 
-def sticking_impact() -> list[Answer]:
+def sticking_impact(hands: Hands) -> list[Answer]:
     """A ball that never slides: the tangential spring, tuned to half a vibration per contact, turns the slip around.
 
-    The contact point moves on the mass m/(1 + m r²/I) = 2/7 m, so with ks = 2/7 kn both directions vibrate alike; the
-    force stays within Coulomb's cone throughout where slip/speed < μ kn/ks.
+    The contact point moves on the mass m/(1 + m r²/I), 2/7 m of a solid ball, so with that share of kn for ks both
+    directions vibrate alike; the force stays within Coulomb's cone throughout where slip/speed < μ kn/ks.
     """
-    speed, slip, dt = 0.01, 0.01, CONTACT_TIME / RESOLVED
-    law = ball_law(friction=FRICTION, tangential=2 / 7)
-    found = ball_impact(law, speed=speed, slip=slip, dt=dt)
-    inertia = ball().boxes.inertia[1]
+    inertia = hands.ball().boxes.inertia[1]
+    share = 1 / (1 + BALL_MASS * BALL_RADIUS**2 / inertia)
+    speed, dt = 0.01, CONTACT_TIME / RESOLVED
+    slip = min(1.0, 0.72 * FRICTION / share) * speed
+    law = ball_law(friction=FRICTION, tangential=share)
+    found = ball_impact(hands, law, speed=speed, slip=slip, dt=dt)
     # To both sides of the contact point the mass is felt at the lever, which is shorter than the radius by the overlap.
     reason = "the lever is shorter than the radius by the overlap, 0.7 %, and with it the vibration slower"
     return [
@@ -96,7 +100,7 @@ def sticking_impact() -> list[Answer]:
         Answer(
             quantity="tangential velocity after",
             unit="m/s",
-            theory=slip - 2 * (2 / 7) * slip,
+            theory=slip - 2 * share * slip,
             measured=float(found.velocity[0]),
             tolerance=0.02,
             reason=reason,
@@ -104,7 +108,7 @@ def sticking_impact() -> list[Answer]:
         Answer(
             quantity="spin after",
             unit="rad/s",
-            theory=2 * (2 / 7) * BALL_MASS * slip * BALL_RADIUS / inertia,
+            theory=2 * share * BALL_MASS * slip * BALL_RADIUS / inertia,
             measured=float(found.spin[1]),
             tolerance=0.01,
             reason=reason,

@@ -27,7 +27,8 @@ def test_missing_yade_says_how_to_get_it() -> None:
         import_yade()
     assert str(caught.value) == (
         "YADE cannot be imported (import of yade halted; None in sys.modules); install it with `make setup` or "
-        "`apt-get install yade`, see environment.md; `smarticles doctor` tells what is missing"
+        "`apt-get install yade`, see environment.md, or run the scene on the engine that needs none: --engine links; "
+        "`smarticles doctor` tells what is missing"
     )
 
 

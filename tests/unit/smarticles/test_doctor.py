@@ -10,13 +10,14 @@ import pytest
 from smarticles import installation
 
 YADE = {"version": "2023.02a", "path": "/somewhere/yade", "speed": 0.0981}
+LINKS = {"version": "0.68.1", "sum": 3, "folder": "/somewhere/links"}
 PYVISTA = {"version": "0.49", "vtk": "9.7.2", "window": "vtkEGLRenderWindow", "contrast": 50.0}
 
 
 @pytest.fixture
 def answers(monkeypatch):
     """What child processes answer; without an entry: a version. To be changed by a test."""
-    answers = {installation._YADE: YADE, installation._PYVISTA: PYVISTA}
+    answers = {installation._YADE: YADE, installation._LINKS: LINKS, installation._PYVISTA: PYVISTA}
     monkeypatch.setattr(installation, "_ask", lambda script: answers.get(script, {"version": "1.2"}))
     monkeypatch.setattr(shutil, "which", lambda command: None)
     return answers
@@ -46,12 +47,22 @@ def test_json_holds_every_check(answers, capsys):
     }
 
 
-def test_without_yade_nothing_runs(answers, capsys):
+def test_without_yade_scenes_on_links_run(answers, capsys):
     answers[installation._YADE] = "RunError: YADE cannot be imported"
+    assert installation.doctor(json_output=False) == 0
+    output = capsys.readouterr().out
+    assert "yade            no    RunError: YADE cannot be imported\n" in output
+    assert "scenes with `engine: links` run without it" in output
+    assert "links           ok    Numba 0.68.1; compiled code in /somewhere/links\n" in output
+
+
+def test_without_any_engine_nothing_runs(answers, capsys):
+    answers[installation._YADE] = "RunError: YADE cannot be imported"
+    answers[installation._LINKS] = {**LINKS, "sum": 0}
     assert installation.doctor(json_output=False) == 1
     output = capsys.readouterr().out
     assert output.endswith("a run needs what fails here: yade\n")
-    assert "yade            FAILS RunError: YADE cannot be imported\n" in output
+    assert "links           no    Numba computes nonsense\n" in output
     assert "way out: `make setup` installs it" in output
 
 

@@ -8,7 +8,8 @@ motor turns round at a pace that it has the torque for. It stops at once: a gear
 motor. What a jump takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
 
 Slip and servo let the angle be free: p is a state of its own, and τ a spring to the command, capped, and for a servo
-damped. It is taken at the middle of the step that begins, so that no stiffness is unstable.
+damped. The spring is taken at the mean of the angles half a step before and after, the damper at the rate after, so
+that no stiffness and no damping is unstable.
 
 Work and kinetic energy agree to the second order in the time step, in kicks and in jumps exactly.
 """
@@ -175,7 +176,7 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
     """Torques of slipping motors [N m], with what they do to the rates in the step taken into account.
 
     Args:
-        bodies: the smarticles.
+        bodies: the smarticles; `rate` is that before the step.
         motors: the motors.
         i: the smarticle.
         r1: rate of angle 1 after the step without the motors [rad/s].
@@ -183,10 +184,12 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
         dt: time step [s].
     """
     m1, m2, m12 = mobility(bodies.plane[i])
-    gain1 = 0.5 * dt * motors.stiffness[i, 0] + motors.damping
-    gain2 = 0.5 * dt * motors.stiffness[i, 1] + motors.damping
-    free1 = motors.stiffness[i, 0] * (motors.command[i, 0] - bodies.alpha[i, 0]) - gain1 * r1
-    free2 = motors.stiffness[i, 1] * (motors.command[i, 1] - bodies.alpha[i, 1]) - gain2 * r2
+    # The spring at the mean of the angles half a step before and after, which keeps its energy; the damper after.
+    gain1, gain2 = 0.25 * dt * motors.stiffness[i, 0], 0.25 * dt * motors.stiffness[i, 1]
+    free1 = motors.stiffness[i, 0] * (motors.command[i, 0] - bodies.alpha[i, 0]) + gain1 * bodies.rate[i, 0]
+    free2 = motors.stiffness[i, 1] * (motors.command[i, 1] - bodies.alpha[i, 1]) + gain2 * bodies.rate[i, 1]
+    gain1, gain2 = gain1 + motors.damping, gain2 + motors.damping
+    free1, free2 = free1 - gain1 * r1, free2 - gain2 * r2
     # τ = free - gain dt M τ: 2 × 2, then one at its cap, then both.
     a, b, c, d = 1 + gain1 * dt * m1, gain1 * dt * m12, gain2 * dt * m12, 1 + gain2 * dt * m2
     determinant = a * d - b * c
