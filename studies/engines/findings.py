@@ -244,7 +244,8 @@ def refinement(runs: pd.DataFrame) -> pd.DataFrame:
             values = by_seed(shaken, quantity, str(variant))
             less = [] if variant == LINKS else (values - limit).dropna().tolist()
             effect = mean_over_seeds(less)
-            scale = 100 / float(limit.mean()) if len(limit) else math.nan
+            base = float(limit.mean()) if len(limit) else math.nan
+            scale = 100 / abs(base) if base else math.nan
             rows.append(
                 {
                     "quantity": quantity.told,
