@@ -36,7 +36,7 @@ class Bodies(NamedTuple):
             body: of whole smarticles while welded, of links while articulated.
         load: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight.
         lever: (N, 2) torque of contacts about the hinges on each barb, positive ones raise the angle [N m].
-        deepest: (N,) deepest contact since the last question [m].
+        deepest: (N,) deepest contact since the last question, as the step after would take it [m].
     """
 
     position: Array

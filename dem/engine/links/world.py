@@ -254,7 +254,8 @@ class World:
             RunError: the simulation has blown up.
         """
         bodies, boxes, n = self.posed(), self.particle.boxes, self.count
-        broken = ~(np.isfinite(bodies.position).all(axis=1) & np.isfinite(bodies.spin).all(axis=1))
+        states = (bodies.position, bodies.velocity, bodies.spin)
+        broken = ~np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states])
         refuse(
             broken,
             self.time,

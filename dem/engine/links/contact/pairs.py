@@ -129,7 +129,7 @@ def push_apart(
         row_i, row_j = i, j
         if hinged is not None:
             row_i, row_j = 3 * i + kind_p, 3 * j + kind_q
-        used = 0
+        used, closing = 0, 0.0
         for slot in range(POINTS):
             weight = out[slot, 8]
             if weight <= 0.0:
@@ -145,6 +145,7 @@ def push_apart(
             mx = motion[row_i, 0] + ay * rz - az * ry - (motion[row_j, 0] + by * gz - bz * gy)
             my = motion[row_i, 1] + az * rx - ax * rz - (motion[row_j, 1] + bz * gx - bx * gz)
             mz = motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx)
+            closing = max(closing, -(mx * nx + my * ny + mz * nz))
             twist = 0.5 * dt * ((ax + bx) * nx + (ay + by) * ny + (az + bz) * nz)
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
@@ -167,7 +168,8 @@ def push_apart(
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
-        depth = diameter - (x * x + y * y + z * z) ** 0.5
+        # As deep as the step that begins would take it: beyond a diameter the links have passed through each other.
+        depth = diameter - (x * x + y * y + z * z) ** 0.5 + dt * closing
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost

@@ -105,8 +105,10 @@ def press(
         ends.slip[p, end, surface], x - arm * nx, y - arm * ny, z - arm * nz, nx, ny, nz,
     )  # fmt: skip
     ends.used[p, end] |= 1 << surface
-    i = p // (shape.kinds.shape[0] * shape.offsets.shape[0])
-    bodies.deepest[i] = max(bodies.deepest[i], depth)
+    if part_of == WALL and ground.flags[1] != 0:
+        # A lifted wall has two sides: who is a radius deep has come through. The other surfaces have one.
+        i = p // (shape.kinds.shape[0] * shape.offsets.shape[0])
+        bodies.deepest[i] = max(bodies.deepest[i], 2 * depth)
 
 
 @part
