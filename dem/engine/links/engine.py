@@ -32,7 +32,7 @@ from dem.setting.plane import Channel
 
 Array = NDArray[np.float64]
 
-FORMAT = "links-1"
+FORMAT = "links-2"
 
 
 class LinksEngine:
