@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
@@ -117,7 +117,7 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
         turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3] = e * norm, f * norm, g * norm, k * norm
 
 
-@part
+@inlined
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
     """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
     axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]
