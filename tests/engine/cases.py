@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
+from dem.engine.links.contact.pairs import push
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
@@ -24,7 +25,7 @@ from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from smarticles.verification.bench import add, advance_watched, body_rotations, push, scene_of
+from smarticles.verification.bench import add, advance_watched, body_rotations, scene_of
 from smarticles.verification.known.floor import resting
 
 

@@ -9,8 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import damping_ratio, restitution_of
-from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS
+from smarticles.verification.hands.yade import ball
 from smarticles.verification.known.cases import CASES, LADDERS
 from smarticles.verification.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
