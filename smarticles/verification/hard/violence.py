@@ -166,7 +166,9 @@ def thrown_out(hands: Hands, out: Path, *, count: int, seconds: float) -> list[C
     return [says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less")]
 
 
-def mass_ratio(hands: Hands, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4) -> list[Check]:
+def mass_ratio(
+    hands: Hands, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4
+) -> list[Check]:
     """One of two smarticles that lie on each other is heavier; by hand, a scene has one density for all.
 
     The contacts of draft cannot carry it, which the watchdog must say; contacts stiffer by the same ratio must.
