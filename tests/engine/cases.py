@@ -14,7 +14,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
-from dem.engine.links.contact.pairs import push
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
@@ -26,6 +25,7 @@ from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from smarticles.verification.bench import add, advance_watched, body_rotations, scene_of
+from smarticles.verification.hands.yade import YadeHands
 from smarticles.verification.known.floor import resting
 
 
@@ -46,6 +46,11 @@ def build(
 
 def version() -> str:
     return yade_version()
+
+
+def push(engine: YadeEngine, k: int, **motion: Any) -> None:
+    """Give a welded smarticle a velocity and a spin."""
+    YadeHands().push(engine, k, **motion)
 
 
 def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[str, Any]:
@@ -110,7 +115,7 @@ def stopping(data: dict[str, Any]) -> dict[str, Any]:
 def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle lying flat on a floor without friction is pushed along it."""
     scene = scene_of(data)
-    engine = resting(scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
+    engine = resting(YadeHands(), scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
     engine.advance(round(duration / engine.time_step))
     return {"v": engine.state().velocities[0, 1]}
 
