@@ -36,7 +36,7 @@ class Bodies(NamedTuple):
         motion: (N, 6) or (3 N, 6) velocity at the centre of mass [m/s] and angular velocity [rad/s] of each rigid
             body: of whole smarticles while welded, of links while articulated.
         load: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight.
-        lever: (N, 2) torque of contacts about the hinges on each barb, positive ones raise the angle [N m].
+        shares: (3 N, 6) the same on each link while articulated; (0, 6) while welded.
         deepest: (N,) deepest contact since the last question, as the step after would take it [m].
     """
 
@@ -52,7 +52,7 @@ class Bodies(NamedTuple):
     segments: Array
     motion: Array
     load: Array
-    lever: Array
+    shares: Array
     deepest: Array
 
 
@@ -285,7 +285,7 @@ def no_bodies(links: int) -> Bodies:
     f = np.zeros
     return Bodies(
         f((0, 3)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 2)), f((0, 2)), f((0, PLANE)), f((0, 3)), f((0, 3, 3)),
-        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 2)), f(0),
+        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 6)), f(0),
     )  # fmt: skip
 
 

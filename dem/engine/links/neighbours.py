@@ -13,7 +13,7 @@ import math
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
 
 GOOD, REBUILD, FULL = 0, 1, 2
@@ -98,17 +98,19 @@ def _off_lines(segments: Array, p: int, q: int, reach: float) -> bool:
 
 
 @inlined
-def _near(segments: Array, p: int, q: int, reach: float) -> bool:
-    """Whether two axes are nearer than `reach` [m]."""
+def _near(segments: Array, p: int, q: int, reach: float, inverse_p: float, inverse_q: float) -> bool:
+    """Whether two axes, of known inverse squares of their lengths [1/m²], are nearer than `reach` [m]."""
     ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
     vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
     wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-    s, t = nearest_on_segments(
+    s, t = nearest(
         ux * ux + uy * uy + uz * uz,
         ux * vx + uy * vy + uz * vz,
         vx * vx + vy * vy + vz * vz,
         ux * wx + uy * wy + uz * wz,
         vx * wx + vy * wy + vz * wz,
+        inverse_p,
+        inverse_q,
     )
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
     return bool(x * x + y * y + z * z < reach * reach)
@@ -119,7 +121,7 @@ def tighten(shape: Shape, bodies: Bodies, pairs: Pairs, least: float, most: floa
     """Make the tight list from the wide one; see `mark` for the skins."""
     mark(shape, bodies, pairs.near_marks, pairs.near_centres, least, most, time)
     marks, first, second, near, used = pairs.near_marks, pairs.first, pairs.second, pairs.near, pairs.used
-    diameter = 2 * shape.radius
+    diameter, inverses, kind = 2 * shape.radius, shape.inverses, pairs.kind
     count = 0
     # Every pair is written down, and the next one over it unless it counts: no branch, which would be mispredicted.
     for k in range(pairs.counts[0]):
@@ -132,7 +134,9 @@ def tighten(shape: Shape, bodies: Bodies, pairs: Pairs, least: float, most: floa
         p, q = first[k], second[k]
         near[count] = k
         # Contacts stay in the list until the step in which they end has forgotten them.
-        count += (used[k] != 0) | _near(bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6])
+        count += (used[k] != 0) | _near(
+            bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6], inverses[kind[p]], inverses[kind[q]]
+        )
     pairs.counts[1] = count
     pairs.counts[3] += 1
 
@@ -163,7 +167,7 @@ def build(
         GOOD, or FULL where there is no room for all pairs: then the list is as it was.
     """
     mark(shape, bodies, cells.marks, cells.centres, least, most, time)
-    found = _search(bodies, pairs, cells, 2 * (shape.radius + inner), piece)
+    found = _search(shape, bodies, pairs, cells, 2 * (shape.radius + inner), piece)
     if found < 0:
         return FULL
     _carry(pairs, cells, found)
@@ -192,12 +196,13 @@ def _box(marks: Array, p: int, d: int, more: float) -> tuple[float, float]:
 
 
 @part
-def _search(bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: float) -> int:
+def _search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: float) -> int:
     """Write all pairs into the scratch list of `cells`, in rows by the first link.
 
     Args:
+        shape: what all smarticles have in common.
         bodies: the smarticles.
-        pairs: tells owners.
+        pairs: tells owners and kinds.
         cells: `marks` are filled; the rest is written.
         bare: reach of a pair without skins [m].
         piece: width of a strip [m].
@@ -248,6 +253,7 @@ def _search(bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: floa
         p = order[m]
         lx, ly, lz, hx, hy, hz = boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
         own, mine, skin = owner[p], keys[p] // nx, bare + marks[p, 6]
+        inverse = shape.inverses[pairs.kind[p]]
         column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
         for strip in range(_bin(ly - tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
@@ -275,7 +281,7 @@ def _search(bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: floa
             for n in range(hits):
                 q = close[n]
                 lower[number], upper[number] = min(p, q), max(p, q)
-                number += _near(bodies.segments, p, q, skin + marks[q, 6])
+                number += _near(bodies.segments, p, q, skin + marks[q, 6], inverse, shape.inverses[pairs.kind[q]])
     for k in range(number):
         rows[lower[k] + 2] += 1
     for p in range(count):

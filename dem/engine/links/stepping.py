@@ -133,7 +133,7 @@ def advance(
         bodies.load[:] = 0.0
         ground.force[:] = 0.0
         if motors is not None:
-            bodies.lever[:] = 0.0
+            bodies.shares[:] = 0.0
         lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
         if channel is None:
             lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)

@@ -149,7 +149,7 @@ class World:
         new, boxes = len(poses.positions), self.particle.boxes
         fresh = no_bodies(self.each)
         rigid = 3 if self.articulated else 1
-        sizes = {"segments": new * self.each, "motion": new * rigid}
+        sizes = {"segments": new * self.each, "motion": new * rigid, "shares": 3 * new if self.articulated else 0}
         fresh = Bodies(
             *(
                 np.zeros((sizes.get(name, new), *array.shape[1:]), array.dtype)
@@ -199,7 +199,10 @@ class World:
     def set_articulated(self, articulated: bool) -> None:
         """Have velocities for each link, or for whole smarticles."""
         self.articulated = articulated
-        self.bodies = self.bodies._replace(motion=np.zeros(((3 if articulated else 1) * self.count, 6)))
+        n = self.count
+        self.bodies = self.bodies._replace(
+            motion=np.zeros((3 * n if articulated else n, 6)), shares=np.zeros((3 * n if articulated else 0, 6))
+        )
 
     def forget_places(self) -> None:
         """Have neighbours looked for anew at the next step."""

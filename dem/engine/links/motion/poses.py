@@ -6,7 +6,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Bodies
 from dem.engine.links.compiler import inlined, kernel
-from dem.engine.links.motion.planar import lay_out, rates, spin_of
+from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.shape import Shape
 
 SLIP = 2  # laws of motors from here on leave the angles free
@@ -111,13 +111,11 @@ def pose(shape: Shape, bodies: Bodies, hinged: Any) -> None:
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `plane` (while articulated), `axes`, `spin`, `segments` and `motion` are written, and
+        bodies: the smarticles; `axes`, `spin`, `segments` and `motion` are written, and
             `rate` where angles are free.
-        hinged: the motors; None while welded: then the plane geometry is as it was, and no barb moves by itself.
+        hinged: the motors; None while welded: then no barb moves by itself.
     """
     for i in range(bodies.position.shape[0]):
-        if hinged is not None:
-            lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
         turn_axes(bodies, i)
         if hinged is not None and hinged.law >= SLIP:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]
