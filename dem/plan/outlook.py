@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
-from dem.engine.effect import Adds
+from dem.engine.doing import Doing
+from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.plan.advice import warnings_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
-
-# A pour costs about half of the same time in the full pile, since the pile grows from nothing.
-POUR_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -115,6 +113,17 @@ def _told(wall: float) -> str:
     return f"{wall:.1f} s" if wall < 10 else f"{wall:.0f} s"
 
 
+def _doing(scene: Scene, index: int) -> Doing:
+    """What smarticles do in a phase, as far as its cost goes."""
+    phase = scene.phases[index]
+    if phase.pours:
+        return Doing.POUR
+    if phase.actuates:
+        return Doing.ACTUATE
+    shaken = EffectName.CONTAINER_MOTION in phase.calls(scene, index)
+    return Doing.SHAKE if shaken else Doing.REST
+
+
 def plan(scene: Scene) -> Plan:
     """Plan a scene.
 
@@ -128,8 +137,7 @@ def plan(scene: Scene) -> Plan:
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
-        share = POUR_SHARE if phase.pours else kind.actuated_share if phase.actuates else 1.0
-        wall = kind.seconds_per_step(scene) / dt * estimate * share
+        wall = kind.seconds_per_second(scene, dt, _doing(scene, index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)

@@ -84,8 +84,15 @@ class Hands(Protocol):
                 hinges allow.
         """
 
-    def burden(self, engine: Engine, k: int, ratio: float) -> None:
-        """Make a smarticle `ratio` times as heavy [1]; gravity acts."""
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
+        """Make a smarticle `ratio` times as heavy [1]; gravity acts.
+
+        Args:
+            engine: the simulation.
+            k: the smarticle.
+            ratio: [1].
+            rise: time within which its weight grows where its inertia does not [s].
+        """
 
     # -- what is felt ------------------------------------------------------------------------------------------
 

@@ -137,7 +137,7 @@ class YadeHands:
             body.vel, body.angVel = vector(float(along), float(across), 0.0), vector(0, 0, float(spin))
             body.angMom = vector(0, 0, float(spin * inertia))
 
-    def burden(self, engine: Engine, k: int, ratio: float) -> None:
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
         """See the interface."""
         heavy = _bodies(engine)[k]
         heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia

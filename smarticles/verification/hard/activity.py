@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from smarticles.verification.bench import add, look, lying, scene_of, watched
 from smarticles.verification.check import Check, above, below, near, says
-from smarticles.verification.hard.extremes import narrowest
 from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hard.extremes import narrowest
 from smarticles.verification.hard.runs import Watched, whole
 from smarticles.verification.hard.scenes import RELAX, scene, shape_change, turn
 
@@ -67,7 +67,9 @@ def no_room(hands: Hands, out: Path, *, count: int, seconds: float) -> list[Chec
 
 def jammed(hands: Hands, out: Path, *, count: int, seconds: float) -> list[Check]:
     """l/w = 0.4 in a container of radius 0.7 w, into which a straight one, 0.9 w to either side, does not fit."""
-    data = scene(hands, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4})
+    data = scene(
+        hands, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1, smarticle={"aspect_ratio": 0.4}
+    )
     data["container"] = {"radius_m": 0.7 * scene_of(data).smarticle.middle_length_m}
     run = whole(data, out)
     return [*run.sound(), *_jammed(run)]
@@ -87,7 +89,9 @@ def _jammed(run: Watched) -> list[Check]:
     ]
 
 
-def hook(hands: Hands, out: Path, *, count: int, distance: float, speed: float, change: float, rest: float) -> list[Check]:
+def hook(
+    hands: Hands, out: Path, *, count: int, distance: float, speed: float, change: float, rest: float
+) -> list[Check]:
     """The upper hook is drawn out of a pile after its smarticles changed their shape around it."""
     hooks = {"lower_height_m": 2e-3, "upper_height_m": 4e-3}
     # The time that it stays up: what hangs on it comes to rest.

@@ -9,7 +9,9 @@ from smarticles.verification.hands.interface import Hands
 RELAX = {"type": "relax", "duration_s": 0.05}
 
 
-def scene(hands: Hands, *phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int = 1, **keys: Any) -> dict[str, Any]:
+def scene(
+    hands: Hands, *phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int = 1, **keys: Any
+) -> dict[str, Any]:
     """Plain data of a scene, draft unless said otherwise.
 
     Args:

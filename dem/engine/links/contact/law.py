@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Law
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined
 
 
-@part
+@inlined
 def resist(
     law: Law,
     load: float,

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.nearest import nearest_on_segments
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
@@ -36,7 +36,7 @@ PX, NX, LOAD, CARRIED, WEIGHT = 0, 3, 6, 7, 8
 COLUMNS = 9
 
 
-@part
+@inlined
 def _clamp(value: float) -> float:
     return min(1.0, max(0.0, value))
 
@@ -69,7 +69,39 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
     squared = x * x + y * y + z * z
     if squared >= diameter * diameter:
         return 0
-    distance = math.sqrt(squared)
+    return 1 + meet_at(
+        p, q, diameter, stiffness, bend_p, bend_q, a, b, c, d, e, s, t, x, y, z, math.sqrt(squared), out
+    )
+
+
+@part
+def meet_at(
+    p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool,
+    a: float, b: float, c: float, d: float, e: float, s: float, t: float, x: float, y: float, z: float,
+    distance: float, out: Array,
+) -> int:  # fmt: skip
+    """The same for links that touch, whose nearest points are known; the number of rows with bare forces.
+
+    Args:
+        p: as in `meet`.
+        q: as in `meet`.
+        diameter: as in `meet`.
+        stiffness: as in `meet`.
+        bend_p: as in `meet`.
+        bend_q: as in `meet`.
+        a: u·u, of vectors p + s u and q + t v along the links, see `nearest_on_segments`.
+        b: u·v.
+        c: v·v.
+        d: u·(p - q).
+        e: v·(p - q).
+        s: of the nearest point of the first link.
+        t: of that of the second one.
+        x: from the second nearest point to the first [m].
+        y: the same.
+        z: the same.
+        distance: of the two [m].
+        out: as in `meet`.
+    """
     deepest = diameter - distance
     _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * deepest, 1.0)
     out[1, WEIGHT] = out[2, WEIGHT] = 0.0
@@ -81,10 +113,10 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
             bare = _hinge(p, q, diameter, stiffness, True, 0.0, 1.0, bare, out)
     if bend_q:
         bare = _hinge(p, q, diameter, stiffness, False, _clamp(-d / a), -1.0, bare, out)
-    return 1 + bare
+    return bare
 
 
-@part
+@inlined
 def _note(
     out: Array, k: int, p: Array, q: Array, s: float, t: float,
     x: float, y: float, z: float, distance: float, load: float, weight: float,

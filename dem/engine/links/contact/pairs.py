@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
-from dem.engine.links.contact.meeting import BARE, POINTS, meet
+from dem.engine.links.contact.meeting import BARE, POINTS, meet_at
 from dem.engine.links.contact.nearest import nearest_on_segments
 from dem.engine.links.shape import Shape
 
 
-@part
+@inlined
 def push(
     shape: Shape, bodies: Bodies, i: int, kind: int, hinged: Any,
     x: float, y: float, z: float, fx: float, fy: float, fz: float,
@@ -52,7 +53,7 @@ def push(
         bodies.lever[i, k] += sign * (axes[i, 0, 2] * mx + axes[i, 1, 2] * my + axes[i, 2, 2] * mz)
 
 
-@part
+@inlined
 def put_down(
     ledger: Array, rows: tuple[int, int], owners: tuple[int, int],
     x: float, y: float, z: float, fx: float, fy: float, fz: float, known: float,
@@ -98,38 +99,47 @@ def push_apart(
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, position, motion = bodies.segments, bodies.position, bodies.motion
-    links = shape.kinds.shape[0]
-    each = links * shape.offsets.shape[0]
+    owner, kind = pairs.owner, pairs.kind
     diameter = 2 * shape.radius
     reach = diameter * diameter
     lost = 0.0
+    # First who touches, without a branch that would be mispredicted, then what they do.
+    count = 0
     for k in range(pairs.counts[1]):
         pair = pairs.near[k]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
         vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
         wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-        s, t = nearest_on_segments(
-            ux * ux + uy * uy + uz * uz,
-            ux * vx + uy * vy + uz * vz,
-            vx * vx + vy * vy + vz * vz,
-            ux * wx + uy * wy + uz * wz,
-            vx * wx + vy * wy + vz * wz,
-        )
+        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        s, t = nearest_on_segments(a, b, c, d, e)
         x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-        if x * x + y * y + z * z >= reach:
-            if pairs.used[pair]:
-                lost += _forget(pairs, pair, 7)
+        pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
+        count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
+    for k in range(count):
+        pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
+        p, q = pairs.first[pair], pairs.second[pair]
+        ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
+        vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
+        wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+        squared = x * x + y * y + z * z
+        if squared >= reach:
+            lost += _forget(pairs, pair, 7)
             continue
-        kind_p, kind_q = shape.kinds[p % links], shape.kinds[q % links]
-        found = meet(segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
-        if found == 0:  # by rounding
-            continue
-        i, j = p // each, q // each
+        i, j, kind_p, kind_q = owner[p], owner[q], kind[p], kind[q]
+        distance = math.sqrt(squared)
+        found = 1 + meet_at(
+            segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, a, b, c, d, e, s, t,
+            x, y, z, distance, out,
+        )  # fmt: skip
         row_i, row_j = i, j
         if hinged is not None:
             row_i, row_j = 3 * i + kind_p, 3 * j + kind_q
-        used = 0
+        used, closing = 0, 0.0
         for slot in range(POINTS):
             weight = out[slot, 8]
             if weight <= 0.0:
@@ -145,6 +155,7 @@ def push_apart(
             mx = motion[row_i, 0] + ay * rz - az * ry - (motion[row_j, 0] + by * gz - bz * gy)
             my = motion[row_i, 1] + az * rx - ax * rz - (motion[row_j, 1] + bz * gx - bx * gz)
             mz = motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx)
+            closing = max(closing, -(mx * nx + my * ny + mz * nz))
             twist = 0.5 * dt * ((ax + bx) * nx + (ay + by) * ny + (az + bz) * nz)
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
@@ -167,13 +178,14 @@ def push_apart(
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
-        depth = diameter - (x * x + y * y + z * z) ** 0.5
+        # As deep as the step that begins would take it: beyond a diameter the links have passed through each other.
+        depth = diameter - distance + dt * closing
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
 
 
-@part
+@inlined
 def _forget(pairs: Pairs, pair: int, points: int) -> float:
     """Contacts at some points of a pair have ended.
 

@@ -105,8 +105,10 @@ def press(
         ends.slip[p, end, surface], x - arm * nx, y - arm * ny, z - arm * nz, nx, ny, nz,
     )  # fmt: skip
     ends.used[p, end] |= 1 << surface
-    i = p // (shape.kinds.shape[0] * shape.offsets.shape[0])
-    bodies.deepest[i] = max(bodies.deepest[i], depth)
+    if part_of == WALL and ground.flags[1] != 0:
+        # A lifted wall has two sides: who is a radius deep has come through. The other surfaces have one.
+        i = p // (shape.kinds.shape[0] * shape.offsets.shape[0])
+        bodies.deepest[i] = max(bodies.deepest[i], 2 * depth)
 
 
 @part
@@ -144,15 +146,15 @@ def push_up(
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, radius = bodies.segments, shape.radius
-    links, lost = shape.kinds.shape[0], 0.0
+    links, lost, link = shape.kinds.shape[0], 0.0, -1
     floor, lift = ground.place[0], ground.place[1]
     walled, lifted = ground.flags[0] != 0, ground.flags[1] != 0
     tiers = ground.radii.shape[0]
     inner = ground.radii[tiers - 1] - radius
     least = inner * inner if walled else math.inf
     for p in range(segments.shape[0]):
-        kind = shape.kinds[p % links]
-        for end in range(0 if kind == 1 else 1, 2):
+        link = link + 1 if link + 1 < links else 0
+        for end in range(0 if shape.kinds[link] == 1 else 1, 2):
             x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
             if end == 1:
                 x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]

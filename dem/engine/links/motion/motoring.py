@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
-from dem.engine.links.compiler import kernel, part
+from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.motion.planar import lagrange_force, lay_out, lay_out_near, mobility, momenta, rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
@@ -139,7 +139,7 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interva
             motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]
 
 
-@part
+@inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
     """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
@@ -155,7 +155,7 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
     return 0.0 if halted else rate
 
 
-@part
+@inlined
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
     """Generalised forces of contacts on the angles [N m].
 

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.compiler import kernel, part
+from dem.engine.links.compiler import inlined, kernel
 from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
     lay_out_directions(shape, c1, s1, c2, s2, row)
 
 
-@part
+@inlined
 def lay_out_directions(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
     """See `lay_out`; the cosines and sines of the angles are given."""
     arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
@@ -67,7 +67,7 @@ def lay_out_directions(shape: Shape, c1: float, s1: float, c2: float, s2: float,
     row[21] = -share * mb * (u1x * u2x + u1y * u2y)
 
 
-@part
+@inlined
 def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array) -> None:
     """The same for angles that differ little from those of another row, without sines of the whole angles.
 
@@ -88,7 +88,7 @@ def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array)
     lay_out_directions(shape, c1 * c - s1 * s, s1 * c + c1 * s, c2 * d - s2 * t, s2 * d + c2 * t, row)
 
 
-@part
+@inlined
 def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tuple[float, float, float]:
     """ω = I⁻¹(L - h z) [rad/s], all in the middle link's axes.
 
@@ -104,14 +104,14 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
     return (yy * lx - xy * ly) * inverse, (xx * ly - xy * lx) * inverse, (lz - internal) / row[16]
 
 
-@part
+@inlined
 def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
     """P = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
     wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
     return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
 
 
-@part
+@inlined
 def mobility(row: Array) -> tuple[float, float, float]:
     """(A - b bᵀ/I_zz)⁻¹: 11, 22, 12 [1/(kg m²)]: how impulses of the motors change the rates of a free smarticle."""
     a, b, c = row[20] - row[18] ** 2 / row[16], row[20] - row[19] ** 2 / row[16], row[21] - row[18] * row[19] / row[16]
@@ -119,7 +119,7 @@ def mobility(row: Array) -> tuple[float, float, float]:
     return b / determinant, a / determinant, -c / determinant
 
 
-@part
+@inlined
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
     """α̇ [rad/s] that belongs to p [kg m²/s], the inverse of `momenta`."""
     m1, m2, m12 = mobility(row)
@@ -127,7 +127,7 @@ def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float
     return m1 * q1 + m12 * q2, m12 * q1 + m2 * q2
 
 
-@part
+@inlined
 def lagrange_force(
     shape: Shape, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
 ) -> float:

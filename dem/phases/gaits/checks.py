@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.particle import HINGE_CLEARANCE
-from dem.phases.drive import BARBS, actuated, drive
+from dem.phases.gaits.drive import BARBS, actuated, drive
 from dem.phases.phase import SceneView
 from dem.setting.motion import SimpleMotion, Sine, Triangle
 from dem.setting.part import HINGE_RANGE
