@@ -170,8 +170,7 @@ class LinksEngine:
         return self._world.look().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """See the interface; contacts that might have let links pass through each other since the last question count
-        as well.
+        """See the interface; contacts that may have let links pass since the last question count as well.
 
         One that is deep for some steps pushes all the same; not so once the axes of two links have crossed.
         """

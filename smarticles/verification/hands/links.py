@@ -190,7 +190,7 @@ class LinksHands:
         world.shape = shape._replace(
             mass=2 * shape.barb_mass + mass, middle_mass=mass, middle_inertia=HEAVY * shape.middle_inertia
         )
-        lay_out(world.shape, *world.bodies.alpha[0], world.bodies.plane[0])
+        lay_out(world.shape, float(world.bodies.alpha[0, 0]), float(world.bodies.alpha[0, 1]), world.bodies.plane[0])
         bodies = world.posed()
         bodies.position[0] = middle + bodies.axes[0, :, :2] @ bodies.plane[0, :2]
         bodies.velocity[0] = bodies.momentum[0] = 0.0

@@ -13,8 +13,8 @@ from smarticles.verification.check import Check
 from smarticles.verification.hard import activity, broken, extremes, violence
 
 LIGHT_ON_HEAVY = (
-    "all smarticles share one mass: a load as heavy that has no inertia of its own shakes off what lies on it; the same "
-    "load above is borne"
+    "all smarticles share one mass: a load as heavy that has no inertia of its own shakes off what lies on it; above "
+    "it is borne"
 )
 
 
