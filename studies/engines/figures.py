@@ -55,7 +55,7 @@ def _draw_differences(path: Path, judged: Sequence[Equivalence], footer: Sequenc
     axes.axvline(0.0, color=figures.BLACK, linewidth=0.6)
     axes.set_yticks(range(len(shown)), [one.quantity.told for one in shown])
     axes.set_ylim(len(shown) - 0.4, -0.6)
-    axes.set_xlabel("links less YADE, per cent of YADE's mean [%]")
+    axes.set_xlabel("links less YADE over YADE's mean [%]")
     if shown:
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return finished(figure, path, ["Bands: margins, chosen beforehand.", *footer])

@@ -91,9 +91,7 @@ def test_the_study_of_engines_pairs_every_run() -> None:
         assert pitches["yade"] == 1.0
         assert pitches["pitch-0.5"] == 0.5
     sweep = load_sweep(study_file("engines"))
-    with pytest.raises(
-        InputError, match=r"'engine' is a variable.*; leave --engine links out"
-    ):
+    with pytest.raises(InputError, match=r"'engine' is a variable.*; leave --engine links out"):
         on_engine(sweep, "links")
 
 
