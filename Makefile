@@ -24,8 +24,8 @@ demo: setup ## quick comparison with Gravish et al. 2012, figures included (4 mi
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-verify: setup ## known answers against theory, and orders of convergence (2 min)
-	$(BIN)/smarticles verify --out out/verify-$(STAMP)
+verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
+	$(BIN)/smarticles verify --engine both --out out/verify-$(STAMP)
 
 bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
@@ -33,9 +33,8 @@ bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification onset
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification figure
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification cases
+	for engine in yade links; do for part in onset figure cases; do \
+	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification $$part --engine $$engine || exit 1; done; done
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
 	$(PYTEST) -m "not validation"

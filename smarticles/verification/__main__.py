@@ -1,8 +1,9 @@
 """`python -m smarticles.verification PART`: what `smarticles verify` and `make stability` compute, part by part.
 
-`known DIR` computes all known answers: verification.csv, trajectories.csv, clumps.csv and versions.json, which
-`smarticles verify` judges and draws in another process. The other parts are those of `make stability`; what is in their
-tables already is skipped, so that a run that was stopped goes on, and parts can be run apart.
+`known DIR` computes all known answers on an engine: verification.csv, absent.csv, trajectories.csv, clumps.csv and
+versions.json, which `smarticles verify` judges and draws in another process. The other parts are those of `make
+stability`; what is in their tables already is skipped, so that a run that was stopped goes on, and parts can be run
+apart.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dem.errors import RunError
+from smarticles.verification.hands.kinds import ENGINES
+
+STABILITY = {"yade": Path("results/stability"), "links": Path("results/stability/links")}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _done(arguments: argparse.Namespace) -> int:
     # Figures bring in Matplotlib and the package of measures, the others YADE: each only where it is asked for.
-    out: Path = arguments.out
+    out: Path = arguments.out or STABILITY[arguments.engine]
     if arguments.part == "figure":
         from smarticles.verification.figures import draw_onset  # noqa: PLC0415
 
@@ -46,14 +50,14 @@ def _done(arguments: argparse.Namespace) -> int:
 
     out.mkdir(parents=True, exist_ok=True)
     if arguments.part == "known":
-        tables.compute_known(out)
+        tables.compute_known(out, arguments.engine)
     elif arguments.part == "cases":
-        good = tables.run_cases(out, form=arguments.form, only=arguments.only, again=arguments.again)
+        good = tables.run_cases(out, arguments.engine, form=arguments.form, only=arguments.only, again=arguments.again)
         return 0 if good else 1
     else:
         from smarticles.verification.hard.onset import run_onset  # noqa: PLC0415
 
-        run_onset(out, arguments.seeds)
+        run_onset(out, arguments.engine, arguments.seeds)
     return 0
 
 
@@ -69,8 +73,10 @@ def _parser() -> argparse.ArgumentParser:
     onset = parts.add_parser("onset", help="run the same scenes at steps around the stable one and above")
     onset.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="seeds of every scene")
     figure = parts.add_parser("figure", help="draw the figure of the onset from its table")
+    for part in (known, cases, onset, figure):
+        part.add_argument("--engine", choices=ENGINES, default="yade", help="what computes (default: yade)")
     for part in (cases, onset, figure):
-        part.add_argument("--out", type=Path, default=Path("results/stability"), help="folder of tables and figure")
+        part.add_argument("--out", type=Path, help="folder of tables and figure")
     return parser
 
 

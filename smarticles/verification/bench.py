@@ -107,23 +107,21 @@ def drive(
     duration: float,
     targets: Targets,
     *,
-    log: list[Array] | None = None,
+    each: Callable[[], None] | None = None,
     interval: float | None = None,
 ) -> Iterator[float]:
     """Let the motors follow `targets(t)` [rad] from now on; gives the time since then after each control period.
 
-    `log` takes the angles of smarticle 0 after each step.
+    `each` is called after each step.
     """
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
     for look in range(1, round(duration / interval) + 1):
         engine.motors.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
-        if log is None:
+        if each is None:
             engine.advance(steps)
         else:
-            for _ in range(steps):
-                engine.advance(1)
-                log.append(engine.state().angles[0])
+            advance_watched(engine, steps, each)
         yield look * interval
 
 

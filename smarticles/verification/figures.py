@@ -113,9 +113,13 @@ def draw_clumps(path: Path, *, clumps: pd.DataFrame, footer: Sequence[str]) -> l
         figure = figures.blank_figure(_WIDTH, _HEIGHT - 0.9)
         for axes, (theory, measured, unit, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
             axes.plot(contacts, table[theory] * unit, color=figures.GREY, linewidth=0.8, label="theory: n in parallel")
-            for rows, shape, colour in ((1, "o", figures.BLUE), (2, "s", figures.ORANGE)):
+            looks = dict(enumerate(_LOOKS, start=1))
+            for rows in sorted(set(table["rows [1]"])):
+                shape, colour = looks[int(rows)]
                 part = table[table["rows [1]"] == rows]
-                name = f"{rows} row{'s' if rows > 1 else ''}, pitch 1.3 … 0.25"
+                pitches = part["pitch [1]"]
+                chain = f", pitch {pitches.max():g} … {pitches.min():g}" if pitches.any() else ""
+                name = f"{rows} row{'s' if rows > 1 else ''}{chain}"
                 axes.plot(
                     part["contacts [1]"],
                     part[measured] * unit,

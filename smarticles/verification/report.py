@@ -53,6 +53,7 @@ def report_verification(folder: Path, *, command: str) -> Verification:
     Raises:
         InputError: A table is missing or cannot be read.
     """
+    absent = pd.read_csv(folder / "absent.csv") if (folder / "absent.csv").exists() else pd.DataFrame(columns=["case"])
     checks, trajectories, clumps = (
         _read(folder / f"{name}.csv") for name in ("verification", "trajectories", "clumps")
     )
@@ -71,11 +72,14 @@ def report_verification(folder: Path, *, command: str) -> Verification:
     told = clump_sentences(clumps)
     footer = (
         "Single simulations without randomness: nothing scatters, so there are no error bars.",
-        "Versions: " + "; ".join(f"{name} {versions.get(name, 'unknown')}" for name in ("smarticles", "git", "yade")),
+        "Versions: "
+        + "; ".join(
+            f"{name} {versions.get(name, 'unknown')}" for name in ("smarticles", "git", versions.get("engine", "yade"))
+        ),
         f"Command: {command}",
     )
     written = write_tables(folder, {"orders": orders}, footer)
-    lines = _markdown(checks, orders, clumps, failed, told)
+    lines = _markdown(checks, orders, clumps, absent, failed=failed, told=told)
     written["verification.md"] = write_text(
         "\n".join([*lines, *markdown_ending((), footer)]), folder / "verification.md"
     )
@@ -148,7 +152,7 @@ def clump_sentences(clumps: pd.DataFrame) -> tuple[str, ...]:
         "n dashpots side by side damp √n times more.",
         f"From {few['contacts [1]']:.0f} to {many['contacts [1]']:.0f} contacts it sinks in {depth:.1f} times less "
         f"and touches {time:.1f} times shorter: n springs side by side are n times as stiff. More "
-        "spheres do not converge to a flat face of the same restitution and stiffness; these are properties of a "
+        "of them do not converge to a flat face of the same restitution and stiffness; these are properties of a "
         "contact, not of the body.",
     )
 
@@ -219,7 +223,13 @@ def _shown(value: float, form: str) -> str:
 
 
 def _markdown(
-    checks: pd.DataFrame, orders: pd.DataFrame, clumps: pd.DataFrame, failed: Sequence[str], told: Sequence[str]
+    checks: pd.DataFrame,
+    orders: pd.DataFrame,
+    clumps: pd.DataFrame,
+    absent: pd.DataFrame,
+    *,
+    failed: Sequence[str],
+    told: Sequence[str],
 ) -> list[str]:
     passed = int(checks["ok"].sum()), int(orders["ok"].sum())
     return [
@@ -233,6 +243,7 @@ def _markdown(
         "",
         *_table(*told_checks(checks)),
         "",
+        *_told_absent(absent),
         "## Order in the time step",
         "",
         f"The scheme's order, ± {BAND:g}.",
@@ -243,13 +254,25 @@ def _markdown(
         "",
         "![](orders.png)",
         "",
-        "## Flat impacts over the number of spheres",
+        "## Flat impacts over the number of points that touch",
         "",
         *told,
         "",
         *_table(*told_clumps(clumps)),
         "",
         "![](clumps.png)",
+    ]
+
+
+def _told_absent(absent: pd.DataFrame) -> list[str]:
+    """Cases that have no meaning on this engine, and why."""
+    if absent.empty:
+        return []
+    return [
+        "Not applicable on this engine:",
+        "",
+        *(f"- {row['case']}: {row['why']}." for row in absent.to_dict("records")),
+        "",
     ]
 
 

@@ -13,11 +13,12 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
-from dem.engine.yade.library import yade_version
+from dem.engine.kinds import engine_kind
 from dem.record.files import write_json, write_text
 from dem.run.run import _git_revision, versions
 from smarticles.verification.case import Case, Ladder, Size
 from smarticles.verification.check import Check
+from smarticles.verification.hands.kinds import hands_on
 from smarticles.verification.hard import cases as hard
 from smarticles.verification.known import cases as known
 from smarticles.verification.known.clumps import flat_impacts
@@ -27,7 +28,7 @@ T = TypeVar("T")
 # -- known answers -----------------------------------------------------------------------------------------------------
 
 
-def rows_of_answers(case: Case) -> list[dict[str, object]]:
+def rows_of_answers(case: Case, engine: str) -> list[dict[str, object]]:
     """One row per answer."""
     return [
         {
@@ -44,12 +45,13 @@ def rows_of_answers(case: Case) -> list[dict[str, object]]:
             "source": case.theory,
             "reason of the tolerance": answer.reason,
         }
-        for answer in case.answers()
+        for answer in case.answers(engine)
     ]
 
 
-def rows_of_ladder(ladder: Ladder) -> list[dict[str, object]]:
+def rows_of_ladder(ladder: Ladder, engine: str) -> list[dict[str, object]]:
     """One row per time step."""
+    order, why = ladder.scheme[engine]
     return [
         {
             "ladder": ladder.name,
@@ -58,11 +60,11 @@ def rows_of_ladder(ladder: Ladder) -> list[dict[str, object]]:
             "time step [s]": step,
             "error [unit]": error,
             "size of the motion [unit]": ladder.size,
-            "order of the scheme [1]": ladder.order,
+            "order of the scheme [1]": order,
             "about": ladder.about,
-            "why": ladder.why,
+            "why": why,
         }
-        for step, error in zip(ladder.steps, ladder.errors(ladder.steps), strict=True)
+        for step, error in zip(ladder.steps, ladder.errors(hands_on(engine), ladder.steps), strict=True)
     ]
 
 
@@ -85,21 +87,29 @@ _CLUMP_COLUMNS = {
 }
 
 
-def compute_known(folder: Path) -> None:
-    """Run everything.
+def compute_known(folder: Path, engine: str) -> None:
+    """Run everything on an engine.
 
     Args:
         folder: where the tables go.
+        engine: its name.
 
     Raises:
-        RunError: YADE is not installed, or a disk is full.
+        RunError: the engine is not installed, or a disk is full.
     """
-    write_json(folder / "versions.json", versions(("yade", yade_version())))
+    told = versions((engine, engine_kind(engine).version()))
+    absent = [{"case": case.name, "why": case.absent[engine]} for case in known.CASES if engine in case.absent]
+    write_json(folder / "versions.json", {**told, "engine": engine})
+    cases = [case for case in known.CASES if engine not in case.absent]
     _write(
-        folder / "verification.csv", [row for case in known.CASES for row in _timed(case.name, rows_of_answers, case)]
+        folder / "verification.csv", [row for one in cases for row in _timed(one.name, rows_of_answers, one, engine)]
     )
-    _write(folder / "trajectories.csv", [row for one in known.LADDERS for row in _timed(one.name, rows_of_ladder, one)])
-    impacts = _timed("flat impacts over the number of spheres", flat_impacts)
+    write_text(folder / "absent.csv", pd.DataFrame(absent, columns=["case", "why"]).to_csv(index=False))
+    _write(
+        folder / "trajectories.csv",
+        [row for one in known.LADDERS for row in _timed(one.name, rows_of_ladder, one, engine)],
+    )
+    impacts = _timed("flat impacts over the number of points", flat_impacts, hands_on(engine))
     _write(
         folder / "clumps.csv", [{_CLUMP_COLUMNS[key]: value for key, value in asdict(one).items()} for one in impacts]
     )
@@ -121,28 +131,34 @@ def _write(path: Path, rows: list[dict[str, object]]) -> None:
 COLUMNS = ["case", "form", "what is checked", "measured", "limit", "verdict", "wall time [s]", "commit"]
 
 
-def rows_of_checks(name: str, size: Size, commit: str) -> list[dict[str, Any]]:
-    """Run a case and give its rows of the table."""
+def rows_of_checks(name: str, engine: str, size: Size, commit: str) -> list[dict[str, Any]]:
+    """Run a case on an engine and give its rows of the table."""
+    if engine in hard.CASES[name].absent:
+        absent = Check("not applicable", hard.CASES[name].absent[engine], "", good=True)
+        return [_row(name, size, absent, verdict="n/a", wall=0.0, commit=commit)]
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as scratch, ProcessPoolExecutor(1, mp_context=context) as pool:
         try:
-            checks, wall = pool.submit(hard.checked, name, size, Path(scratch) / "run").result()
+            checks, wall = pool.submit(hard.checked, name, engine, size, Path(scratch) / "run").result()
         except Exception as error:
             # A defect of the suite or of the simulator: it belongs into the table like any other bad end.
             checks, wall = [Check("ends", f"{type(error).__name__}: {error}", "checked", good=False)], float("nan")
     return [
-        {
-            "case": name,
-            "form": size,
-            "what is checked": check.what,
-            "measured": check.measured,
-            "limit": check.limit,
-            "verdict": "good" if check.good else "BAD",
-            "wall time [s]": round(wall, 1),
-            "commit": commit,
-        }
-        for check in checks
+        _row(name, size, check, verdict="good" if check.good else "BAD", wall=wall, commit=commit) for check in checks
     ]
+
+
+def _row(name: str, size: Size, check: Check, *, verdict: str, wall: float, commit: str) -> dict[str, Any]:
+    return {
+        "case": name,
+        "form": size,
+        "what is checked": check.what,
+        "measured": check.measured,
+        "limit": check.limit,
+        "verdict": verdict,
+        "wall time [s]": round(wall, 1),
+        "commit": commit,
+    }
 
 
 def _write_cases(table: pd.DataFrame, out: Path) -> None:
@@ -168,11 +184,12 @@ def _write_cases(table: pd.DataFrame, out: Path) -> None:
         write_text(out / name, text)
 
 
-def run_cases(out: Path, *, form: Size, only: Sequence[str], again: bool) -> bool:
+def run_cases(out: Path, engine: str, *, form: Size, only: Sequence[str], again: bool) -> bool:
     """Run what is asked for and is not in the table yet.
 
     Args:
         out: folder of the table.
+        engine: its name.
         form: size of the cases.
         only: texts; cases whose name contains one of them. None given: all.
         again: run cases whose rows are there already, too.
@@ -188,7 +205,7 @@ def run_cases(out: Path, *, form: Size, only: Sequence[str], again: bool) -> boo
         known = (table["case"] == name) & (table["form"] == form)
         if (known.any() and not again) or (form == "short" and hard.CASES[name].short is None):
             continue
-        rows = pd.DataFrame(rows_of_checks(name, form, commit), columns=COLUMNS)
+        rows = pd.DataFrame(rows_of_checks(name, engine, form, commit), columns=COLUMNS)
         table = pd.concat([table[~known], rows], ignore_index=True) if len(table[~known]) else rows
         order = {case: k for k, case in enumerate(hard.CASES)}
         table = table.sort_values("case", key=lambda names: names.map(order), kind="stable", ignore_index=True)

@@ -22,6 +22,7 @@ from studies.base.figures import (
     draw_history,
     draw_means,
     finished,
+    legend_above,
     marker,
     told_histories,
 )
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 _ASPECT = "aspect ratio [-]"
 _SERIES = "packing_fraction"
+_WIDE = 1.4 * figures.COLUMN_WIDTH  # for the longer legend of two engines
 _SHIFT = 0.005  # in l/w, to keep error bars apart
 
 
@@ -85,7 +87,9 @@ def _draw_packing(
     definition: str,
     reading_error: float,
 ) -> list[Path]:
-    figure, axes = figures.new_figure(height=2.7)
+    several = engines_of(summary)
+    figure, axes = figures.new_figure(width=_WIDE, height=3.4) if several else figures.new_figure(height=2.7)
+    whose = TOLD.get(several[0], several[0]) if several else "simulation"
     for column, face, label in (
         ("phi_initial", "white", r"experiment, $\phi_0$ before shaking"),
         ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after shaking"),
@@ -101,12 +105,12 @@ def _draw_packing(
         )
     blue, sky = figures.BLUE, figures.SKY
     for stage, shape, colour, face, label in (
-        ("phi_0", "D", blue, "white", r"simulation, $\phi_0$ before shaking"),
-        ("phi_f relaxed", "^", sky, sky, r"simulation, $\phi_\mathrm{f}$ at rest again"),
-        ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
+        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before shaking"),
+        ("phi_f relaxed", "^", sky, sky, rf"{whose}, $\phi_\mathrm{{f}}$ at rest again"),
+        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end of shaking"),
     ):
         _draw_means(axes, judging(summary), f"{stage} {definition}", marker(shape, colour, face), label)
-    for engine in engines_of(summary)[1:]:
+    for engine in several[1:]:
         part = of_engine(summary, engine)
         time = ", ".join(sorted({f"{value:.3g}" for value in part[SHAKEN]}, key=float))
         look = {"linestyle": "none", "markersize": 4.2}
@@ -119,7 +123,10 @@ def _draw_packing(
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="best", ncols=2 if engines_of(summary) else 1)
+    if several:
+        legend_above(axes)
+    else:
+        axes.legend(loc="upper right")
     return finished(figure, path, footer)
 
 
@@ -137,7 +144,10 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(CROSSINGS_LABEL)
     axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+    if engines_of(summary):
+        legend_above(axes)
+    else:
+        axes.legend(loc="best")
     return finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])
 
 

@@ -20,7 +20,9 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine.yade.kind import contact_law_of, hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
-from smarticles.verification.bench import Targets, bodies, drive, hold
+from smarticles.verification.bench import Targets, drive
+from smarticles.verification.hands.yade import YadeHands
+from smarticles.verification.hands.yade import bodies_of as bodies
 from smarticles.verification.known.hinge import upright
 
 
@@ -44,7 +46,11 @@ def gait(
     def targets(time: float) -> np.ndarray:
         return begun * abs(1 - time / straight_in)
 
-    for time in drive(engine, scene, 2 * straight_in, targets, log=(torques, angles) if every_step else None):
+    def noted() -> None:
+        torques.append(engine.motors._hinges.torques()[0])
+        angles.append(engine.motors._hinges.angles()[0])
+
+    for time in drive(engine, scene, 2 * straight_in, targets, each=noted if every_step else None):
         if not every_step and round(time / scene.fidelity.control_interval_s) % 5:
             continue  # 1 ms
         links = bodies(engine)
@@ -177,11 +183,24 @@ def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: flo
     }
 
 
+def hold_all(engine: Any, *, blocked: str = "xyzXYZ") -> None:
+    """Hold all links of the first smarticle where they are."""
+    zero = engine._yade.vector(0, 0, 0)
+    for body in bodies(engine)[:3]:
+        body.blockedDOFs = blocked
+        body.vel, body.angVel, body.angMom = zero, zero, zero
+
+
+def let_go(engine: Any) -> None:
+    """Let go of them."""
+    hold_all(engine, blocked="")
+
+
 def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]:
     """All links held while the motors are told to straighten; then freed, or told to go back by an angle."""
     scene, engine = floating(data)
     engine.motors.articulate()
-    hold(engine, range(3))
+    hold_all(engine)
     begun = engine.state().angles[0]
     commands, torques, halted = [], [], []
 
@@ -194,7 +213,7 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
     follow(0.02, lambda t: begun - 5 * t)
     marks = [len(commands)]
     if freed:
-        hold(engine, range(3), still=False)
+        let_go(engine)
     goal = begun - 0.1 if freed else engine.motors.readings.commands[0] + back
     follow(0.1, lambda _: goal)
     return {
@@ -216,7 +235,7 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
     """Barb 1 is turned about its hinge by hand while the motor holds; torque on it at every step."""
     scene, engine = floating(data)
     engine.motors.articulate()
-    hold(engine, range(3))
+    hold_all(engine)
     begun = engine.state().angles
     state = engine.state()
     normal, hinge = state.link_rotations[0, 1, :, 2], state.vertices[0, 1]
@@ -244,7 +263,7 @@ def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest:
     scene = cases.scene_of(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
-    engine = upright(scene, gravity=0.0, height=height)
+    engine = upright(YadeHands(), scene, gravity=0.0, height=height)
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):

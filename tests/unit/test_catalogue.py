@@ -9,8 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import damping_ratio, restitution_of
-from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball
 from smarticles.verification.check import Answer
+from smarticles.verification.hands.kinds import ENGINES, hands_on
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS
+from smarticles.verification.hands.yade import ball
+from smarticles.verification.hard.cases import CASES as HARD
 from smarticles.verification.known.cases import CASES, LADDERS
 from smarticles.verification.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
@@ -21,7 +24,8 @@ def test_names_are_unique() -> None:
 
 
 def test_both_orders_are_there_and_steps_fall() -> None:
-    assert {ladder.order for ladder in LADDERS} == {1, 2}
+    for engine in ENGINES:
+        assert {ladder.scheme[engine][0] for ladder in LADDERS} == {1, 2}
     for ladder in LADDERS:
         assert len(ladder.steps) >= 3
         assert all(np.diff(ladder.steps) < 0)
@@ -44,6 +48,22 @@ def test_ball_has_one_sphere_and_the_inertia_of_a_solid_one() -> None:
     assert one.radius == BALL_RADIUS
     assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
     assert one.boxes.inertia == pytest.approx(np.full(3, 0.4 * BALL_MASS * BALL_RADIUS**2), rel=1e-12)
+
+
+def test_what_is_left_out_says_why() -> None:
+    for case in (*CASES, *HARD.values()):
+        assert set(case.absent) < set(ENGINES)  # on one of them at least
+        assert all(len(why) > 20 for why in case.absent.values())
+
+
+def test_stub_and_roller_stand_for_the_ball() -> None:
+    hands = hands_on("links")
+    stub, roller = hands.ball(), hands.roller()
+    for one in (stub, roller):
+        assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
+    assert hands.ball_turn.apply(hands.ends(stub))[:, 2].min() - stub.radius == pytest.approx(-BALL_RADIUS)
+    assert roller.boxes.inertia[0] == pytest.approx(0.4 * BALL_MASS * BALL_RADIUS**2, rel=1e-12)
+    assert roller.radius == BALL_RADIUS
 
 
 # -- the theory itself -------------------------------------------------------------------------------------------------

@@ -32,7 +32,9 @@ from dem.setting.plane import Channel
 
 Array = NDArray[np.float64]
 
-FORMAT = "links-1"
+# Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
+PASSES = 0.9
+FORMAT = "links-2"
 
 
 class LinksEngine:
@@ -168,10 +170,15 @@ class LinksEngine:
         return self._world.look().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """See the interface; the deepest contact is that of all steps since the last question."""
+        """See the interface; contacts that may have let links pass since the last question count as well.
+
+        One that is deep for some steps pushes all the same; not so once the axes of two links have crossed.
+        """
         found, world = self._world.look(), self._world
-        depths = np.maximum(found.depths, world.bodies.deepest)
+        between = world.bodies.deepest.copy()
         world.bodies.deepest[:] = 0.0
+        passed = ~(between <= PASSES * self.particle.chain.diameter)
+        depths = np.where(passed, np.maximum(found.depths, between), found.depths)
         deep = ~(depths <= limit)
         return Overlaps(
             float(depths.max(initial=0.0)), deep, found.elastic_energy, self._held(found.held, deep, APART * limit)

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 class Hands(Protocol):
     """Hands on one engine. They have no state of their own: processes send them to each other.
 
-    Velocities belong to the half step before the positions (leapfrog) on both engines: a body that is to have v at t = 0
-    under an acceleration a is pushed to v − a dt/2.
+    Velocities belong to the half step before the positions (leapfrog) on both engines: a body that is to have v at
+    t = 0 under an acceleration a is pushed to v − a dt/2.
     """
 
     @property
@@ -84,8 +84,15 @@ class Hands(Protocol):
                 hinges allow.
         """
 
-    def burden(self, engine: Engine, k: int, ratio: float) -> None:
-        """Make a smarticle `ratio` times as heavy [1]; gravity acts."""
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
+        """Make a smarticle `ratio` times as heavy [1]; gravity acts.
+
+        Args:
+            engine: the simulation.
+            k: the smarticle.
+            ratio: [1].
+            rise: time within which its weight grows where its inertia does not [s].
+        """
 
     # -- what is felt ------------------------------------------------------------------------------------------
 

@@ -47,12 +47,18 @@ def _bar(length: float, thickness: float, radius: float) -> Particle:
 
 
 class Pushed(LinksEngine):
-    """The engine under forces that no run knows."""
+    """The engine under forces that no run knows.
+
+    Args:
+        keys: of the engine.
+    """
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
         self.forces: dict[tuple[int, int], Array] = {}
         """On the centre of a link, by smarticle and link [N]."""
+        self.grown = (0.0, 0.0)
+        """When forces begin to grow, and for how long they do [s]."""
 
     def advance(self, steps: int) -> None:
         """See the interface; with hands on it, step by step."""
@@ -67,7 +73,10 @@ class Pushed(LinksEngine):
         world, dt = self._world, self.time_step
         bodies, shape, motors = world.posed(), world.shape, world.motors
         share = shape.barb_mass / shape.mass
-        for (k, link), force in self.forces.items():
+        begun, rise = self.grown
+        part = min(1.0, (self.time - begun + dt) / rise) if rise else 1.0
+        for (k, link), full in self.forces.items():
+            force = part * full
             row, axes = bodies.plane[k], bodies.axes[k]
             # About the centre of mass, in the middle link's axes.
             centre = np.array([*((row[2:4], -row[0:2], row[4:6])[link]), 0.0])
@@ -181,7 +190,7 @@ class LinksHands:
         world.shape = shape._replace(
             mass=2 * shape.barb_mass + mass, middle_mass=mass, middle_inertia=HEAVY * shape.middle_inertia
         )
-        lay_out(world.shape, *world.bodies.alpha[0], world.bodies.plane[0])
+        lay_out(world.shape, float(world.bodies.alpha[0, 0]), float(world.bodies.alpha[0, 1]), world.bodies.plane[0])
         bodies = world.posed()
         bodies.position[0] = middle + bodies.axes[0, :, :2] @ bodies.plane[0, :2]
         bodies.velocity[0] = bodies.momentum[0] = 0.0
@@ -203,17 +212,17 @@ class LinksHands:
         bodies.rate[0] = rates
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
-    def burden(self, engine: Engine, k: int, ratio: float) -> None:
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
         """See the interface: all smarticles share one mass, so that the weight alone becomes larger."""
-        weight = engine.particle.boxes.mass * engine.gravity
-        if not isinstance(engine, Pushed):
-            engine.__class__, engine.forces = Pushed, {}  # type: ignore[misc,attr-defined]
-        assert isinstance(engine, Pushed)
+        own = _own(engine)
+        if not isinstance(own, Pushed):
+            own.__class__ = Pushed  # a run's engine, built by its kind
+        assert isinstance(own, Pushed)
+        boxes = own.particle.boxes
         # A force on the middle link would turn it: all links get theirs.
-        boxes = engine.particle.boxes
-        for link in range(3):
-            share = float(boxes.link_masses[link] / boxes.mass)
-            engine.forces[k, link] = np.array([0.0, 0.0, -(ratio - 1) * weight * share])
+        weights = -(ratio - 1) * own.gravity * boxes.link_masses
+        own.forces = {(k, link): np.array([0.0, 0.0, weights[link]]) for link in range(3)}
+        own.grown = own.time, rise
 
     def floor_force(self, engine: Engine) -> Array:
         """See the interface."""

@@ -125,7 +125,7 @@ class YadeHands:
 
     def hold(self, engine: Engine) -> None:
         """See the interface."""
-        body, zero = _bodies(engine)[1], _own(engine)._yade.vector(0, 0, 0)
+        body, zero = bodies_of(engine)[1], _own(engine)._yade.vector(0, 0, 0)
         body.blockedDOFs = "xyzXYZ"
         body.vel, body.angVel, body.angMom = zero, zero, zero
 
@@ -133,13 +133,13 @@ class YadeHands:
         """See the interface."""
         own = _own(engine)
         vector, inertias = own._yade.vector, own.particle.boxes.link_inertias[:, 2]
-        for body, (along, across, spin), inertia in zip(_bodies(engine), links, inertias, strict=True):
+        for body, (along, across, spin), inertia in zip(bodies_of(engine), links, inertias, strict=True):
             body.vel, body.angVel = vector(float(along), float(across), 0.0), vector(0, 0, float(spin))
             body.angMom = vector(0, 0, float(spin * inertia))
 
-    def burden(self, engine: Engine, k: int, ratio: float) -> None:
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
         """See the interface."""
-        heavy = _bodies(engine)[k]
+        heavy = bodies_of(engine)[k]
         heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
 
     def floor_force(self, engine: Engine) -> Array:
@@ -155,7 +155,7 @@ class YadeHands:
         """See the interface."""
         own = _own(engine)
         links = len(own._assembly.bodies) // 3
-        body = _bodies(engine)[2 * links - 1]
+        body = bodies_of(engine)[2 * links - 1]
         vector, (x, y, z), reach, radius = own._yade.vector, body.pos, own.particle.reach, own.particle.radius
         if what == "velocity":
             body.vel = vector(0, math.nan, 0)
@@ -188,7 +188,7 @@ def _own(engine: Engine) -> YadeEngine:
     return engine
 
 
-def _bodies(engine: Engine) -> list[Any]:
+def bodies_of(engine: Engine) -> list[Any]:
     """States of YADE's rigid bodies: one per smarticle, or three."""
     own = _own(engine)
     return [own._omega.bodies[body].state for body in own._assembly.bodies]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -85,8 +86,10 @@ def step_below(hands: Hands, out: Path, *, share: float, count: int) -> list[Che
     data, asked, _ = _with_step(scene(hands, swing(0.04), RELAX, count=count), share)
     run = whole(data, out)
     assert run.scene is not None  # draft, and a step that is allowed
-    # At most by the whole fraction of the control period shorter.
-    return [*run.sound(), near("step taken over the step asked [1]", time_step(run.scene) / asked, 0.875, 0.12501)]
+    # Shorter, but for rounding, by as much as makes it a whole fraction of the control period.
+    fraction = run.scene.fidelity.control_interval_s / asked
+    expected = fraction / math.ceil(fraction - 1e-9)
+    return [*run.sound(), near("step taken over the step asked [1]", time_step(run.scene) / asked, expected, 1e-6)]
 
 
 def step_above(hands: Hands, out: Path, *, share: float) -> list[Check]:

@@ -2,8 +2,8 @@
 
 A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
 four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
-from nowhere, or YADE ends in numbers that are none. Every scene is run with several seeds, which move where and how
-high smarticles begin. A scene and seed that is in the table already is skipped.
+from nowhere, or the engine ends in numbers that are none. Every scene is run with several seeds, which move where and
+how high smarticles begin. A scene and seed that is in the table already is skipped.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from dem.plan.steps import stable_step
 from dem.run.run import _git_revision
 from dem.scene.scene import Scene
 from smarticles.verification.bench import lying, scene_of, watched
+from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hands.kinds import hands_on
 from smarticles.verification.hard.scenes import scene, shape_change
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
@@ -66,11 +68,10 @@ class Setting:
         where = f", {self.keys}" if self.keys else ""
         return f"{kind} {self.placed}{where}, l/w = {self.ratio:g}, {self.fidelity}"
 
-    @property
-    def data(self) -> dict[str, Any]:
+    def data(self, hands: Hands) -> dict[str, Any]:
         """The scene; nothing of it is run but its engine."""
         phases = [shape_change(1.5)] if self.articulated else []
-        data = scene(*phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
+        data = scene(hands, *phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
         if self.keys == "at the wall":
             data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
         if self.keys == "on hooks":
@@ -126,9 +127,9 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
     return Poses(np.stack([0 * heights, 0 * heights, heights], axis=1), rotations)
 
 
-def let_go(setting: Setting, seed: int, factor: float) -> dict[str, Any]:
+def let_go(hands: Hands, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
     """Let smarticles go at a factor of the stable step, and look at them; one row of the table."""
-    data = setting.data
+    data = setting.data(hands)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
         described, engine, _ = watched(data, scratch, dt=factor * stable)
@@ -172,11 +173,11 @@ def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, flo
         yield engine.time, state.kinetic_energy, total - engine.motors.work
 
 
-def climb(name: str, seed: int) -> list[dict[str, Any]]:
+def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
     """All factors of a scene and seed, up to the second that blows up."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
-        rows.append(let_go(SETTINGS[name], seed, factor))
+        rows.append(let_go(hands_on(engine), SETTINGS[name], seed, factor))
         if sum(row["energy from nowhere over lifting by d [1]"] > BLOW_UP for row in rows) == 2:
             break
     return rows
@@ -209,11 +210,12 @@ def onsets(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def run_onset(out: Path, seeds: Sequence[int]) -> None:
+def run_onset(out: Path, engine: str, seeds: Sequence[int]) -> None:
     """Run what is not in the table of runs yet, and add it there.
 
     Args:
         out: folder of the table.
+        engine: its name.
         seeds: of every scene.
     """
     path, commit = out / "onset_runs.csv", _git_revision()
@@ -223,7 +225,7 @@ def run_onset(out: Path, seeds: Sequence[int]) -> None:
             if len(runs) and ((runs["scene"] == name) & (runs["seed"] == seed)).any():
                 continue
             with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-                rows = pd.DataFrame(pool.submit(climb, name, seed).result()).assign(commit=commit)
+                rows = pd.DataFrame(pool.submit(climb, engine, name, seed).result()).assign(commit=commit)
             runs = pd.concat([runs, rows], ignore_index=True)
             runs.to_csv(path, index=False, float_format="%.4g")
             table = onsets(runs)

@@ -6,11 +6,14 @@ from functools import partial
 
 from smarticles.verification.case import Case, Ladder
 from smarticles.verification.hands.kinds import ENGINES
-from smarticles.verification.known import bouncing, clumps, floor, free, hinge, impact, oblique
+from smarticles.verification.known import bouncing, clumps, floor, free, hinge, impact, kept, oblique
 
 DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
 OBLIQUE = "impulse theory with Coulomb friction, as in MFiX DEM-05 and Chung and Ooi (2011), tests 5 to 8"
 RIGID = "rigid-body impulse theory: 1/m_eff = 1/m + (r × n)·I⁻¹(r × n), impulse (1 + e) m_eff v"
+
+YADES_TURNS = {"yade": "its turns are of first order: ladder `spin`"}
+LAWS = (("halt", 0.0), ("stall", 0.0), ("slip", 0.0), ("servo", 2e-6))
 
 CASES = (
     Case(
@@ -177,6 +180,51 @@ CASES = (
             run=partial(hinge.shaft_vibration, held=held),
         )
         for held in (True, False)
+    ),
+    *(
+        Case(
+            name=f"free gait, {law}",
+            about="two smarticles in space swing their barbs, spinning",
+            theory="nothing acts from outside: momentum and angular momentum about the centre of mass",
+            run=partial(kept.free_gait, law=law, damping=damping),
+            absent=YADES_TURNS,
+        )
+        for law, damping in LAWS
+    ),
+    *(
+        Case(
+            name=f"work on a free pair, {law}",
+            about="the same",
+            theory="work of the motors is gain of kinetic energy",
+            run=partial(kept.pair_work, law=law, damping=damping),
+            absent=YADES_TURNS,
+        )
+        for law, damping in LAWS
+        if law != "stall"
+    ),
+    Case(
+        name="thousand turns",
+        about="smarticles spin freely at 60 rad/s, at the step of a scene",
+        theory="energy and angular momentum",
+        run=kept.thousand_turns,
+        absent=YADES_TURNS,
+    ),
+    Case(
+        name="account of a pile",
+        about="100 smarticles swing their barbs in a pile, standard",
+        theory="added energy and work are what is stored and what was dissipated",
+        run=partial(kept.account, count=100, seconds=0.5),
+        absent={"yade": "dissipation is sampled there, not added up: tests/engine has its error"},
+    ),
+    *(
+        Case(
+            name=f"10 m/s and 60 rad/s, contacts of {stiffness:g} N/m",
+            about="smarticles thrown at others" + (", which so soft contacts cannot hold" if crosses else ""),
+            theory="links are solid, or the watchdog says that they were not",
+            run=partial(kept.thrown_at, stiffness=stiffness, throws=30, crosses=crosses),
+            absent={"yade": "chains are looked at now and then, not in every step: results/stability/README.md"},
+        )
+        for stiffness, crosses in ((250.0, True), (2e4, False))
     ),
 )
 

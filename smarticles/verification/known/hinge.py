@@ -310,7 +310,7 @@ def shaft_vibration(hands: Hands, *, held: bool) -> list[Answer]:
     engine = floating(hands, one, held=held)
     begun = engine.state().angles
     log: list[Array] = []
-    for _ in drive(engine, one, 0.04, lambda _: begun, log=log):
+    for _ in drive(engine, one, 0.04, lambda _: begun, each=lambda: log.append(engine.state().angles[0])):
         pass
     turned = np.array(log)[:, 0] - begun[0, 0]
     time: Array = engine.time_step * np.arange(1, len(turned) + 1, dtype=np.float64)

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
@@ -21,11 +21,11 @@ from dem.engine.links.shape import Shape
 
 @part
 def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
-    """Change momenta by the forces in `load` and `lever`, by weight and by motors.
+    """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `velocity`, `momentum` and `deepest` are written.
+        bodies: the smarticles; `velocity`, `momentum`, `deepest` and, while articulated, `load` are written.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
@@ -34,18 +34,23 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
     for i in range(bodies.position.shape[0]):
+        if motors is not None:
+            for d in range(6):
+                load[i, d] = bodies.shares[3 * i, d] + bodies.shares[3 * i + 1, d] + bodies.shares[3 * i + 2, d]
         velocity[i, 0] += share * load[i, 0]
         velocity[i, 1] += share * load[i, 1]
         velocity[i, 2] += across * (share * load[i, 2] - dt * gravity)
         momentum[i, 0] += across * dt * load[i, 3]
         momentum[i, 1] += across * dt * load[i, 4]
         momentum[i, 2] += dt * load[i, 5]
-        # Who moves by more than a radius in a step may pass through a link unseen: counted as that deep a contact.
+        # Two that move by more than a radius in a step may pass through each other unseen: counted as that deep.
         squared = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
         turning = bodies.spin[i, 0] ** 2 + bodies.spin[i, 1] ** 2 + bodies.spin[i, 2] ** 2
         stride = dt * (math.sqrt(squared) + shape.reach * math.sqrt(turning))
         if stride > shape.radius:
-            bodies.deepest[i] = max(bodies.deepest[i], stride)
+            stride = dt * _fastest_end(shape, bodies, i, motors is not None)
+        if stride > shape.radius:
+            bodies.deepest[i] = max(bodies.deepest[i], 2 * stride)
         if motors is not None:
             q1, q2 = contact_torques(shape, bodies, i)
             if motors.law < SLIP:
@@ -66,6 +71,24 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
                 bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
     if motors is not None:
         motors.elapsed[0] += dt
+
+
+@part
+def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
+    """Greatest speed of an end of a link's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
+    links, position, segments, motion = shape.kinds.shape[0], bodies.position, bodies.segments, bodies.motion
+    each, most = links * shape.offsets.shape[0], 0.0
+    for p in range(each * i, each * (i + 1)):
+        row = 3 * i + shape.kinds[p % links] if hinged else i
+        for end in range(2):
+            x = segments[p, 0] + end * segments[p, 3] - position[i, 0]
+            y = segments[p, 1] + end * segments[p, 4] - position[i, 1]
+            z = segments[p, 2] + end * segments[p, 5] - position[i, 2]
+            vx = motion[row, 0] + motion[row, 4] * z - motion[row, 5] * y
+            vy = motion[row, 1] + motion[row, 5] * x - motion[row, 3] * z
+            vz = motion[row, 2] + motion[row, 3] * y - motion[row, 4] * x
+            most = max(most, vx * vx + vy * vy + vz * vz)
+    return math.sqrt(most)
 
 
 @part
@@ -97,7 +120,7 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
         turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3] = e * norm, f * norm, g * norm, k * norm
 
 
-@part
+@inlined
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
     """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
     axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]
