@@ -221,7 +221,9 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
         found = tuple(one for one in every if engine in (None, one.engine))
         if not found:
             there = ", ".join(dict.fromkeys(one.engine for one in every))
-            msg = f"--table {file}: tells nothing of the engine {engine}, only of {there}; leave --engine out, or {_HOW}"
+            msg = (
+                f"--table {file}: tells nothing of the engine {engine}, only of {there}; leave --engine out, or {_HOW}"
+            )
             raise InputError(msg)
         first = next(iter(rows.values()))
         return AccuracyTable(

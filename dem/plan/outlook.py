@@ -12,6 +12,7 @@ from dem.plan.advice import warnings_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
+from dem.setting.fidelity import fidelities
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class Plan:
     warnings: tuple[str, ...]
     planar: bool = False
     engine: str = "yade"
+    fidelity: str = "standard"
+    stiffness_N_per_m: float = 0.0
     strands: int = 0
     correction: float = 1.0
 
@@ -100,7 +103,19 @@ class Plan:
         idle = engine_kind(self.engine).idle_knobs
         if not self.strands:
             return []
-        return [f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here"]
+        return [
+            f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here",
+            f"fidelity {self._fidelity_to_text()}",
+        ]
+
+    def _fidelity_to_text(self) -> str:
+        """The knobs of a fidelity, and by what they differ from its name."""
+        named = fidelities(self.engine)[self.fidelity]
+        shares = f"time step {self.time_step_s / self.stable_time_step_s:.2g} of the stable one"
+        told = f"{self.strands} strand{'' if self.strands == 1 else 's'}, {self.stiffness_N_per_m:g} N/m, {shares}"
+        same = (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"])
+        usual = f" (by name {named['rows']}, {named['stiffness_N_per_m']:g} N/m)"
+        return f"{self.fidelity}: {told}{'' if same else usual}"
 
     def _steps_to_text(self) -> str:
         first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
@@ -157,5 +172,7 @@ def plan(scene: Scene) -> Plan:
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
         engine=scene.engine,
+        fidelity=scene.fidelity.base,
+        stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
     )

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from templates.sweep.sweep_file import Sweep
 
 
-
 def add(commands: Commands) -> None:
     """Add the command."""
     accuracy = commands.add(
@@ -46,7 +45,7 @@ against wall time. Knobs:
   engine       the named fidelities of both engines, against converged on links; only if named in --knobs
 
 The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
-setting with finished runs. Seeds: 1 to 20 on links, 1 to 3 on YADE. An error within the scatter between seeds is not resolved, which is not
+setting with finished runs. An error within the scatter between seeds is not resolved, which is not
 the same as none: more seeds narrow it, and the same command with more --seeds runs only these.
 
 DIR gets the runs, and results/ with table, figure and advice; its work_precision.csv is what

@@ -37,7 +37,7 @@ KNOBS: Mapping[str, str] = MappingProxyType(
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
-"""From coarse to fine: links have no beads and no facets, so that their converged answer is what all are compared with."""
+"""From coarse to fine: links have neither beads nor facets, so that all are compared with their converged answer."""
 # Left as the scene has them: facets, since no knob turns them; a step by hand is refused.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _FACTORS = (1, 2, 4)
@@ -287,23 +287,33 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
     """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
-    if knob == "time-step":
-        return _numbers("time-step", "time_step_fraction", "", _with(_STEPS, base["time_step_fraction"]))
-    if knob == "restitution":
-        return _numbers("restitution", "restitution", "", _with(_RESTITUTIONS, base["restitution"])[::-1])
-    if knob == "control":
-        return _numbers("control", "control_interval_s", "s", _with(_CONTROL_INTERVALS, base["control_interval_s"]))
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
+    if knob in ("fidelity", "engine"):
+        return _fidelities(knob, str(base["engine"]), smooth=smooth)
+    return _values(knob, base, smooth=smooth)
+
+
+def _values(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
+    """Rungs of a knob that is one number."""
+    key, unit, values = {
+        "time-step": ("time_step_fraction", "", _STEPS),
+        "restitution": ("restitution", "", _RESTITUTIONS),
+        "control": ("control_interval_s", "s", _CONTROL_INTERVALS),
+        "stiffness": ("stiffness_N_per_m", "N/m", _STIFFNESSES if smooth else ()),
+        "hinge": ("hinge_stiffness_N_per_m", "N/m", ()),
+    }[knob]
+    if not values:
+        return [(f"{base[key] * n:g}", unit, f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
+    every = _with(values, base[key])
+    return _numbers(knob, key, unit, every[::-1] if knob in ("restitution", "stiffness") else every)
+
+
+def _fidelities(knob: str, engine: str, *, smooth: bool) -> list[_Point]:
+    """Named fidelities: those of an engine, or of all."""
     if knob == "fidelity":
-        one = str(base["engine"])
-        return [(name, "", f"{one}-{name}" if smooth else name, values) for name, values in _names(one).items()]
-    if knob == "engine":
-        return [(f"{one} {name}", "", f"{one}-{name}", each) for one in _ENGINES for name, each in _names(one).items()]
-    if knob == "stiffness" and smooth:
-        return _numbers("stiffness", "stiffness_N_per_m", "N/m", _with(_STIFFNESSES, base["stiffness_N_per_m"])[::-1])
-    key = {"stiffness": "stiffness_N_per_m", "hinge": "hinge_stiffness_N_per_m"}[knob]
-    return [(f"{base[key] * n:g}", "N/m", f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
+        return [(name, "", f"{engine}-{name}" if smooth else name, all_) for name, all_ in _names(engine).items()]
+    return [(f"{one} {name}", "", f"{one}-{name}", all_) for one in _ENGINES for name, all_ in _names(one).items()]
 
 
 def _names(engine: str) -> dict[str, dict[str, Value]]:
@@ -354,7 +364,9 @@ def _strands(base: Mapping[str, Value]) -> list[_Point]:
         + ("" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm")
         for shape in shapes
     ]
-    return [(name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), dict(shape)) for name, shape in zip(names, shapes, strict=True)]
+    return [
+        (name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), dict(shape)) for name, shape in zip(names, shapes, strict=True)
+    ]
 
 
 def _told_section(*, rows: int, pitch: float, diameter_m: float | None) -> str:

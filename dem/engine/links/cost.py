@@ -17,7 +17,7 @@ from dem.engine.doing import Doing
 
 
 class Rates(NamedTuple):
-    """What a smarticle of three links of one strand costs deep in a pile of the usual width: seconds per step, and per simulated second."""
+    """What a smarticle of three links of one strand costs deep in a pile of usual width, per step and per second."""
 
     step: float
     second: float
@@ -55,4 +55,4 @@ def seconds_per_second(scene: Demand, time_step: float, doing: Doing) -> float:
         found += LOOK / scene.fidelity.control_interval_s
     for cost, interval in ((SAMPLE, recording.series_interval_s), (FRAME, recording.frame_interval_s)):
         found += cost / interval if interval else 0.0
-    return found
+    return float(found)

@@ -19,8 +19,8 @@ from dem.physics.motor import MotorLaw
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
-# Of that: a pour costs about half of the same time in the full pile, since the pile grows from nothing; motors are three
-# bodies and four bonds each, and their looks.
+# Of that: a pour costs about half of the same time in the full pile, since the pile grows from nothing; motors mean
+# three bodies and four bonds for each smarticle, and looks.
 SHARES = {Doing.POUR: 0.5, Doing.ACTUATE: 1.7}
 
 

@@ -87,12 +87,16 @@ def test_the_cheapest_within_the_error_or_the_finest_within_the_hours(
         (
             0.01,
             4.0,
-            "--max-error 0.01 and --max-hours 4 contradict each other: reference on yade, the cheapest within the error, is "
-            "expected to take 30 h; accuracy goes first, so the hours give way: --max-hours 30; or accept standard on yade "
-            r"\(φ_f -0.020 ± 0.010\) with --max-error 0.02",
+            "--max-error 0.01 and --max-hours 4 contradict each other: reference on yade, the cheapest within the "
+            "error, is expected to take 30 h; accuracy goes first, so the hours give way: --max-hours 30; or accept "
+            r"standard on yade \(φ_f -0.020 ± 0.010\) with --max-error 0.02",
         ),
         (0.03, 0.1, "so the hours give way: --max-hours 2$"),
-        (None, 0.1, "--max-hours 0.1: even draft on yade is expected to take 0.5 h; give --max-hours 0.5 or a smaller scene"),
+        (
+            None,
+            0.1,
+            "--max-hours 0.1: even draft on yade is expected to take 0.5 h; give --max-hours 0.5 or a smaller scene",
+        ),
     ],
 )
 def test_limits_that_cannot_be_kept_say_which_gives_way(
@@ -106,7 +110,9 @@ def test_limits_that_cannot_be_kept_say_which_gives_way(
 def test_an_unknown_error_is_within_no_limit() -> None:
     unknown = [expected("draft", math.nan, 0.5), expected("standard", 0.02, 2.0)]
     assert pick(unknown, max_error=0.5, max_hours=None)[0].measured.fidelity == "standard"
-    with pytest.raises(InputError, match="no fidelity of the table is known to be within; the best is standard on yade"):
+    with pytest.raises(
+        InputError, match="no fidelity of the table is known to be within; the best is standard on yade"
+    ):
         pick(unknown, max_error=0.01, max_hours=None)
     # What is suggested is enough.
     assert pick(unknown, max_error=0.02, max_hours=None)[0].measured.fidelity == "standard"
@@ -175,7 +181,9 @@ def test_of_what_the_hours_allow_the_most_exact_is_taken() -> None:
 
 
 def test_an_engine_that_the_table_does_not_tell_of_is_refused(table_file: Path) -> None:
-    with pytest.raises(InputError, match="tells nothing of the engine links, only of yade; leave --engine out, or make"):
+    with pytest.raises(
+        InputError, match="tells nothing of the engine links, only of yade; leave --engine out, or make"
+    ):
         read_table(table_file, engine="links")
 
 
