@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dem.errors import InputError, nearest
-from studies import casting, chain, collapse, fracture, gravish, melting, procedures, sensitivity
+from studies import casting, chain, collapse, engines, fracture, gravish, melting, procedures, sensitivity
 from studies.base.shipped import Shipped
 
 STUDIES: Mapping[str, Shipped] = MappingProxyType(
@@ -23,6 +23,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             casting.SHIPPED,
             collapse.SHIPPED,
             chain.SHIPPED,
+            engines.SHIPPED,
         )
     }
 )

@@ -22,6 +22,7 @@ from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.demand import Demand
+from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
@@ -358,7 +359,6 @@ class KindDouble:
     name = "double"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
-    actuated_share = 1.0
     built: list[EngineDouble]
 
     def __init__(self) -> None:
@@ -379,8 +379,8 @@ class KindDouble:
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_step(self, scene: Demand) -> float:
-        return 1e-6
+    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
+        return 1e-6 / time_step
 
     def build(self, scene: Demand, time_step: float) -> EngineDouble:
         self.built.append(EngineDouble.of(scene, time_step))

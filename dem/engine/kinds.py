@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from dem.engine.demand import Demand
+from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine
 from dem.errors import InputError
@@ -50,12 +51,14 @@ class EngineKind(Protocol):
             articulated: whether barbs may turn, or have turned before.
         """
 
-    def seconds_per_step(self, scene: Demand) -> float:
-        """Wall seconds that a step of rigid smarticles costs in the full pile, one core, about."""
+    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
+        """Wall seconds that a simulated second costs, one core, about.
 
-    @property
-    def actuated_share(self) -> float:
-        """What a step costs while motors are at work, over one of rigid smarticles [1]."""
+        Args:
+            scene: the scene.
+            time_step: [s].
+            doing: what the smarticles do.
+        """
 
     def build(self, scene: Demand, time_step: float) -> Engine:
         """A simulation of a scene, empty, with a time step [s] of its phases with motors that is not checked."""

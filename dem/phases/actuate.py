@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from dem.phases.actuated import ActuatedPhase
-from dem.phases.drive import BARBS, Gait
+from dem.phases.gaits.actuated import ActuatedPhase
+from dem.phases.gaits.drive import BARBS, Gait
 from dem.setting.motion import Hold, Motion
 from dem.setting.motor import Motor
 from dem.setting.part import Duration, Part

@@ -7,8 +7,8 @@ from typing import Literal
 from pydantic import Field
 
 from dem.phases.actuate import ActiveFraction, Offsets
-from dem.phases.actuated import ActuatedPhase
-from dem.phases.drive import Gait
+from dem.phases.gaits.actuated import ActuatedPhase
+from dem.phases.gaits.drive import Gait
 from dem.setting.motion import Triangle
 from dem.setting.motor import Motor
 from dem.setting.part import REFERENCE_ASPECT_RATIO, Duration, Part

@@ -180,6 +180,10 @@ class SceneView(Protocol):
         """The container as the engine builds it."""
 
     @property
+    def smooth(self) -> bool:
+        """Whether links are taken as they are, and not as chains of spheres."""
+
+    @property
     def sphere_diameter(self) -> float:
         """[m]."""
 

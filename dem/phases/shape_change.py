@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from dem.phases.actuated import ActuatedPhase
-from dem.phases.drive import Gait
+from dem.phases.gaits.actuated import ActuatedPhase
+from dem.phases.gaits.drive import Gait
 from dem.setting.motion import Hold, Motion, Ramp, Return, Sequence
 from dem.setting.motor import Motor
 from dem.setting.part import Duration, HingeAngle, Part

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator
 from dem.body.chain import Chain, parted
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.phases.actuated import ActuatedPhase, Actuating
 from dem.phases.arrange import chain_of
-from dem.phases.drive import Drive, Gait, drive
+from dem.phases.gaits.actuated import ActuatedPhase, Actuating
+from dem.phases.gaits.drive import Drive, Gait, drive
 from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
 from dem.physics.strings import StringLaw
 from dem.setting.motion import Hold

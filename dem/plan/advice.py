@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dem.engine.kinds import engine_kind
 from dem.scene.scene import Scene
-from dem.setting.fidelity import FIDELITIES, Fidelity
+from dem.setting.fidelity import Fidelity, fidelities
 
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
@@ -23,7 +23,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
     """Knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
     fidelity = scene.fidelity
-    named = FIDELITIES[fidelity.base]
+    named = fidelities(scene.engine)[fidelity.base]
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     told = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
     if not told:

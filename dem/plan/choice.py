@@ -1,14 +1,15 @@
-"""The fidelity that a scene needs, from what was measured: a limit of the error, of the hours, or of both.
+"""The engine and fidelity that a scene needs, from what was measured: a limit of the error, of the hours, or of both.
 
 The table is the one that `smarticles accuracy` writes: what each named fidelity errs by on some scene, and how its
-processor times compare with the planned wall times. The hours are those planned for this scene, times that ratio.
+processor times compare with the planned wall times. The hours are those planned for this scene, times that ratio. One
+with the knob `engine` tells of both engines, against the same reference; one with the knob `fidelity` of a single one.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,17 @@ from dem.errors import InputError
 from dem.plan.outlook import Plan, plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import FIDELITIES
+from dem.setting.fidelity import FIDELITIES, fidelities
 
 SHIPPED = Path(__file__).with_name("work_precision.csv")
 """The table that is used unless another one is given; there only if it was measured."""
 
+ENGINES = ("yade", "links")
+"""Those that a table may tell of."""
+
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
+_ENGINE = "engine"
+_FINEST, _FINER = list(FIDELITIES)[-1], "converged"
 _KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
 _ASPECT, _COUNT, _ACTIVITY, _REFERENCE = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
@@ -58,9 +64,10 @@ class Error:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """One named fidelity as the table has it.
+    """One named fidelity of an engine as the table has it.
 
     Args:
+        engine: whose it is.
         fidelity: its name.
         errors: of what is asked for, such as φ_0 and φ_f.
         others: of what is not, to be told.
@@ -71,10 +78,16 @@ class Measured:
 
     fidelity: str
     errors: tuple[Error, ...]
+    engine: str = "yade"
     others: tuple[Error, ...] = ()
     seeds: int
     ratio: float
     is_reference: bool
+
+    @property
+    def name(self) -> str:
+        """Engine and fidelity."""
+        return f"{self.fidelity} on {self.engine}"
 
     @property
     def worst(self) -> Error:
@@ -89,7 +102,8 @@ class AccuracyTable:
 
     Args:
         path: the file.
-        fidelities: those with finished runs, in the order of `FIDELITIES`.
+        fidelities: those with finished runs, engine by engine in the order of their names.
+        reference: what errors are against, as the table calls it.
         aspect_ratio: l/w [1].
         count: smarticles [1].
         activity: types of phase, separated by spaces.
@@ -97,6 +111,7 @@ class AccuracyTable:
 
     path: Path
     fidelities: tuple[Measured, ...]
+    reference: str
     aspect_ratio: float
     count: int
     activity: str
@@ -117,7 +132,7 @@ class Expectation:
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The fidelity chosen.
+    """The engine and fidelity chosen.
 
     Args:
         planned: the plan of the scene with it, its wall times corrected by what was measured.
@@ -136,6 +151,11 @@ class Choice:
         """Its name."""
         return self.expected.measured.fidelity
 
+    @property
+    def engine(self) -> str:
+        """The engine it is on."""
+        return self.expected.measured.engine
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `--json`; an unknown number is null."""
         errors = [
@@ -143,6 +163,7 @@ class Choice:
             for error in self.expected.measured.errors
         ]
         return {
+            "engine": self.engine,
             "fidelity": self.fidelity,
             "expected_hours": self.expected.hours,
             "errors": errors,
@@ -156,19 +177,20 @@ class Choice:
         measured = self.expected.measured
         errors = "none by definition" if measured.is_reference else ", ".join(map(str, measured.errors))
         lines = [
-            f"fidelity {self.fidelity}: {self.why}",
+            f"engine {self.engine}, fidelity {self.fidelity}: {self.why}",
             f"expected: {self.expected.hours:.2g} h of one core, error {errors} ({measured.seeds} seeds)",
             *(f"note: {note}" for note in self.notes),
         ]
-        return "\n".join([*lines, f"use it: --set fidelity={self.fidelity}"])
+        return "\n".join([*lines, f"use it: --engine {self.engine} --set fidelity={self.fidelity}"])
 
 
-def read_table(path: Path | None, *, of: Sequence[str] = PACKING) -> AccuracyTable:
+def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None) -> AccuracyTable:
     """Read a table of `smarticles accuracy`.
 
     Args:
         path: the file; None: the one that ships.
         of: what errors are asked for, keys of `QUANTITIES`.
+        engine: the only one that may be chosen; None: any that the table tells of.
 
     Raises:
         InputError: there is none, it is another table, or it does not tell of named fidelities.
@@ -188,16 +210,26 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING) -> AccuracyTab
         if column not in (reader.fieldnames or ()):
             msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
             raise InputError(msg)
-    rows = {row[_VALUE]: row for row in reader if row[_KNOB] == "fidelity" and row[_VALUE] in FIDELITIES}
+    every_row = list(reader)
+    rows = _rows_of_fidelities(every_row)
     try:
-        found = tuple(_measured(rows[name], of) for name in FIDELITIES if name in rows and int(rows[name][_SEEDS]) > 0)
-        if not any(one.is_reference for one in found) or len(found) < 2:
+        every = [_measured(one, name, row, of) for (one, name), row in rows.items() if int(row[_SEEDS]) > 0]
+        reference = _reference(every_row, {row[_KNOB] for row in rows.values()})
+        if reference is None or len(every) < 2:
             msg = f"--table {file}: tells of fewer than two named fidelities with runs; {_HOW}"
             raise InputError(msg)
-        first = rows[found[0].fidelity]
+        found = tuple(one for one in every if engine in (None, one.engine))
+        if not found:
+            there = ", ".join(dict.fromkeys(one.engine for one in every))
+            msg = (
+                f"--table {file}: tells nothing of the engine {engine}, only of {there}; leave --engine out, or {_HOW}"
+            )
+            raise InputError(msg)
+        first = next(iter(rows.values()))
         return AccuracyTable(
             path=file,
             fidelities=found,
+            reference=reference,
             aspect_ratio=float(first[_ASPECT]),
             count=round(float(first[_COUNT])),
             activity=first[_ACTIVITY],
@@ -209,18 +241,42 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING) -> AccuracyTab
         raise InputError(msg) from None
 
 
-def _measured(row: dict[str, str], of: Sequence[str]) -> Measured:
+def _rows_of_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
+    """Rows of named fidelities by engine and name, coarse to fine.
+
+    One reference goes for all: where the table has the knob `engine`, its rows; otherwise those of the knob `fidelity`.
+    """
+    both = {row[_VALUE]: row for row in rows if row[_KNOB] == _ENGINE}
+    # Before there was a second engine, tables did not name it.
+    alone = {f"{row.get(_ENGINE) or 'yade'} {row[_VALUE]}": row for row in rows if row[_KNOB] == "fidelity"}
+    named = both or alone
+    return {
+        (engine, name): named[f"{engine} {name}"]
+        for engine in ENGINES
+        for name in fidelities(engine)
+        if f"{engine} {name}" in named
+    }
+
+
+def _reference(rows: Sequence[dict[str, str]], knobs: Collection[str]) -> str | None:
+    """What errors are against, such as "links converged": it need not be a named fidelity."""
+    found = (row for row in rows if row[_KNOB] in knobs and row[_REFERENCE] == "reference")
+    return next((row[_VALUE] for row in found if int(row[_SEEDS]) > 0), None)
+
+
+def _measured(engine: str, name: str, row: dict[str, str], of: Sequence[str]) -> Measured:
     ratio = _number(row[_RATIO])
     errors = {
-        name: Error(
-            of=symbol, value=_number(row[f"{name} error [%]"]) / 100, band=_number(row[f"{name} error 95 % [%]"]) / 100
+        key: Error(
+            of=symbol, value=_number(row[f"{key} error [%]"]) / 100, band=_number(row[f"{key} error 95 % [%]"]) / 100
         )
-        for name, symbol in QUANTITIES.items()
+        for key, symbol in QUANTITIES.items()
     }
     return Measured(
-        fidelity=row[_VALUE],
-        errors=tuple(error for name, error in errors.items() if name in of),
-        others=tuple(error for name, error in errors.items() if name not in of),
+        engine=engine,
+        fidelity=name,
+        errors=tuple(error for key, error in errors.items() if key in of),
+        others=tuple(error for key, error in errors.items() if key not in of),
         seeds=int(row[_SEEDS]),
         ratio=ratio if ratio > 0 else 1.0,
         is_reference=row[_REFERENCE] == "reference",
@@ -238,10 +294,10 @@ def _number(text: str) -> float:
 def choose(
     scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
 ) -> Choice:
-    """The fidelity for a scene: the cheapest within the error, else the finest within the hours.
+    """Engine and fidelity for a scene: the cheapest within the error, else the most exact within the hours.
 
     Args:
-        scene: the scene; its own fidelity does not matter.
+        scene: the scene; its own engine and fidelity do not matter.
         table: what was measured.
         max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
         max_hours: longest wall time on one core [h].
@@ -254,37 +310,42 @@ def choose(
     refused: list[InputError] = []
     for one in table.fidelities:
         try:
-            plans[one.fidelity] = plan(_with_fidelity(scene, one.fidelity)).corrected(one.ratio)
+            plans[one.name] = plan(_with_fidelity(scene, one)).corrected(one.ratio)
         except InputError as error:  # such as two rows in a section that is square
             refused.append(error)
             continue
-        expected.append(Expectation(measured=one, hours=plans[one.fidelity].wall_s / 3600))
+        expected.append(Expectation(measured=one, hours=plans[one.name].wall_s / 3600))
     if not expected:
         raise refused[0]
     picked, why = pick(expected, max_error=max_error, max_hours=max_hours)
     return Choice(
-        planned=plans[picked.measured.fidelity],
+        planned=plans[picked.measured.name],
         expected=picked,
         why=why,
         notes=(*map(str, refused), *_notes(scene, table, picked.measured, max_error)),
     )
 
 
-def _with_fidelity(scene: Scene, name: str) -> Scene:
-    return parse_scene({**scene.model_dump(mode="json"), "fidelity": name}, source=f"{scene.name} at fidelity {name}")
+def _with_fidelity(scene: Scene, measured: Measured) -> Scene:
+    data = {**scene.model_dump(mode="json"), "engine": measured.engine, "fidelity": measured.fidelity}
+    return parse_scene(data, source=f"{scene.name} at fidelity {measured.name}")
 
 
 def pick(
     expected: Sequence[Expectation], *, max_error: float | None, max_hours: float | None
 ) -> tuple[Expectation, str]:
-    """What keeps the limits, and in words which one; arguments and errors as `choose`, fidelities coarse to fine."""
+    """What keeps the limits, and in words which one; arguments and errors as `choose`, fidelities coarse to fine.
+
+    Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
+    engines' finest the one whose error is known and least.
+    """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:
         if quick:
-            return quick[-1], f"the finest within --max-hours {max_hours:g}"
+            return _most_exact(quick), f"the most exact within --max-hours {max_hours:g}"
         least = min(expected, key=lambda one: one.hours)
         msg = (
-            f"--max-hours {max_hours:g}: even {least.measured.fidelity} is expected to take {least.hours:.2g} h; "
+            f"--max-hours {max_hours:g}: even {least.measured.name} is expected to take {least.hours:.2g} h; "
             f"give --max-hours {_above(least.hours)} or a smaller scene"
         )
         raise InputError(msg)
@@ -293,7 +354,7 @@ def pick(
         known = [one for one in expected if not math.isnan(one.measured.worst.value)]
         best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
         msg = (
-            f"--max-error {max_error:g}: no fidelity of the table is known to be within; the best is {best.fidelity}, "
+            f"--max-error {max_error:g}: no fidelity of the table is known to be within; the best is {best.name}, "
             f"{best.worst}; give --max-error {_above(abs(best.worst.value))} or a table with finished reference runs"
         )
         raise InputError(msg)
@@ -302,15 +363,24 @@ def pick(
         limits = f"--max-error {max_error:g}" + ("" if max_hours is None else f" and --max-hours {max_hours:g}")
         return need, f"the cheapest within {limits}"
     msg = (
-        f"--max-error {max_error:g} and --max-hours {max_hours:g} contradict each other: {need.measured.fidelity}, the "
+        f"--max-error {max_error:g} and --max-hours {max_hours:g} contradict each other: {need.measured.name}, the "
         f"cheapest within the error, is expected to take {need.hours:.2g} h; accuracy goes first, so the hours give "
         f"way: --max-hours {_above(need.hours)}"
     )
     known = [one for one in quick if not math.isnan(one.measured.worst.value)]
     if known:
         best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
-        msg += f"; or accept {best.fidelity} ({best.worst}) with --max-error {_above(abs(best.worst.value))}"
+        msg += f"; or accept {best.name} ({best.worst}) with --max-error {_above(abs(best.worst.value))}"
     raise InputError(msg)
+
+
+def _most_exact(able: Sequence[Expectation]) -> Expectation:
+    finest = {one.measured.engine: one for one in able}.values()
+    return min(finest, key=lambda one: (not one.measured.is_reference, _or_inf(abs(one.measured.worst.value))))
+
+
+def _or_inf(number: float) -> float:
+    return math.inf if math.isnan(number) else number
 
 
 def _above(number: float) -> str:
@@ -323,7 +393,6 @@ def _above(number: float) -> str:
 
 def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: float | None) -> tuple[str, ...]:
     notes = []
-    reference = next(one.fidelity for one in table.fidelities if one.is_reference)
     if not measured.is_reference:
         others = ", ".join(str(error) for error in measured.others if not math.isnan(error.value))
         if others:
@@ -336,8 +405,8 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
                 f"not assured: the scatter of {measured.seeds} seeds allows an error up to {max(bounds):.2g}, more "
                 f"than --max-error {max_error:g}; measure with more seeds"
             )
-    if reference != "reference":
-        notes.append(f"errors are against {reference}: the table has no finished runs of reference")
+    if not table.reference.endswith((_FINEST, _FINER)):
+        notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST}")
     here = {
         "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
-from dem.engine.effect import Adds
+from dem.engine.doing import Doing
+from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.plan.advice import warnings_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
-
-# A pour costs about half of the same time in the full pile, since the pile grows from nothing.
-POUR_SHARE = 0.5
+from dem.setting.fidelity import fidelities
 
 
 @dataclass(frozen=True)
@@ -51,6 +50,8 @@ class Plan:
     warnings: tuple[str, ...]
     planar: bool = False
     engine: str = "yade"
+    fidelity: str = "standard"
+    stiffness_N_per_m: float = 0.0
     strands: int = 0
     correction: float = 1.0
 
@@ -102,7 +103,19 @@ class Plan:
         idle = engine_kind(self.engine).idle_knobs
         if not self.strands:
             return []
-        return [f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here"]
+        return [
+            f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here",
+            f"fidelity {self._fidelity_to_text()}",
+        ]
+
+    def _fidelity_to_text(self) -> str:
+        """The knobs of a fidelity, and by what they differ from its name."""
+        named = fidelities(self.engine)[self.fidelity]
+        shares = f"time step {self.time_step_s / self.stable_time_step_s:.2g} of the stable one"
+        told = f"{self.strands} strand{'' if self.strands == 1 else 's'}, {self.stiffness_N_per_m:g} N/m, {shares}"
+        same = (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"])
+        usual = f" (by name {named['rows']}, {named['stiffness_N_per_m']:g} N/m)"
+        return f"{self.fidelity}: {told}{'' if same else usual}"
 
     def _steps_to_text(self) -> str:
         first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
@@ -113,6 +126,17 @@ class Plan:
 def _told(wall: float) -> str:
     """A wall time for a person: tenths of seconds where seconds would say nothing."""
     return f"{wall:.1f} s" if wall < 10 else f"{wall:.0f} s"
+
+
+def _doing(scene: Scene, index: int) -> Doing:
+    """What smarticles do in a phase, as far as its cost goes."""
+    phase = scene.phases[index]
+    if phase.pours:
+        return Doing.POUR
+    if phase.actuates:
+        return Doing.ACTUATE
+    shaken = EffectName.CONTAINER_MOTION in phase.calls(scene, index)
+    return Doing.SHAKE if shaken else Doing.REST
 
 
 def plan(scene: Scene) -> Plan:
@@ -128,8 +152,7 @@ def plan(scene: Scene) -> Plan:
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
-        share = POUR_SHARE if phase.pours else kind.actuated_share if phase.actuates else 1.0
-        wall = kind.seconds_per_step(scene) / dt * estimate * share
+        wall = kind.seconds_per_second(scene, dt, _doing(scene, index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
@@ -149,5 +172,7 @@ def plan(scene: Scene) -> Plan:
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
         engine=scene.engine,
+        fidelity=scene.fidelity.base,
+        stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
     )

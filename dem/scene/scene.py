@@ -24,7 +24,7 @@ from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import check
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
-from dem.setting.fidelity import FIDELITIES, Fidelity
+from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.motor import Motor
 from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
@@ -55,7 +55,7 @@ class Scene(Part):
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]")
     fidelity: Fidelity = Field(
-        default_factory=lambda: Fidelity(base="standard", **FIDELITIES["standard"]),
+        default_factory=lambda given: Fidelity(base="standard", **fidelities(given.get("engine", ""))["standard"]),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="stages of the run, in order")
@@ -63,7 +63,7 @@ class Scene(Part):
 
     @field_validator("fidelity", mode="before")
     @classmethod
-    def _fidelity_by_name(cls, value: Any) -> Any:
+    def _fidelity_by_name(cls, value: Any, info: ValidationInfo) -> Any:
         if isinstance(value, str):
             value = {"base": value}
         if not isinstance(value, Mapping):
@@ -72,7 +72,7 @@ class Scene(Part):
         if not isinstance(base, str) or base not in FIDELITIES:
             msg = f"unknown fidelity {base!r}; known: {', '.join(FIDELITIES)}"
             raise ValueError(msg)
-        return {"base": base, **FIDELITIES[base], **value}
+        return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
 
     @field_validator("hooks", mode="before")
     @classmethod

@@ -79,3 +79,23 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
         "hinge_stiffness_N_per_m": 14500.0,
     },
 }
+
+# On the links engine, chosen by results/accuracy-links. What has no meaning there is as in `FIDELITIES`.
+_ON_LINKS: Mapping[str, Mapping[str, Any]] = {
+    "draft": {"rows": 1, "stiffness_N_per_m": 250.0},
+    "standard": {"rows": 1, "stiffness_N_per_m": 500.0},
+    "reference": {"rows": 2, "stiffness_N_per_m": 1000.0},
+}
+_IDLE = FIDELITIES["standard"]
+_BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "links": {name: {**_IDLE, **knobs} for name, knobs in _ON_LINKS.items()}
+}
+
+
+def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
+    """The named fidelities of an engine, from coarse to fine: the same names on all, about the same errors.
+
+    Args:
+        engine: as in `Scene.engine`; those of YADE for one that is not known.
+    """
+    return _BY_ENGINE.get(engine, FIDELITIES)

@@ -44,6 +44,7 @@ BLACK = "#1a1a1a"
 BLUE = "#0072b2"
 SKY = "#56b4e9"
 ORANGE = "#d55e00"
+GREEN = "#009e73"
 GREY = "#6e6e6e"
 """Okabe and Ito's colours: told apart with every common colour blindness, and in grey print."""
 

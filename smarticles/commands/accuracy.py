@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from templates.sweep.expand import Point
     from templates.sweep.sweep_file import Sweep
 
-_SEEDS = "1,2,3"
-
 
 def add(commands: Commands) -> None:
     """Add the command."""
@@ -37,13 +35,14 @@ Makes variants of a scene, each with one knob turned, several seeds each, runs t
 against wall time. Knobs:
 
   time-step    time step over the stable one: 0.9, 0.45, 0.225
-  stiffness    of contacts: ×1, ×2, ×4; the time step follows
+  stiffness    of contacts: ×1, ×2, ×4; the time step follows. On links 125 to 4000 N/m
   section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows.
-               On links strands alone
+               On links one, two and three strands
   restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
   control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
-  fidelity     draft, standard, reference
+  fidelity     draft, standard, reference; on links also what is finer yet, converged
+  engine       the named fidelities of both engines, against converged on links; only if named in --knobs
 
 The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
 setting with finished runs. An error within the scatter between seeds is not resolved, which is not
@@ -63,7 +62,9 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
     add_scene(accuracy)
     add_engine(accuracy, "run the whole ladder on this engine instead of what the scene says")
     accuracy.add_argument("--out", type=Path, metavar="DIR", help="directory of the ladder")
-    accuracy.add_argument("--seeds", default=_SEEDS, metavar="1,2,…", help=f"seeds of each setting; default: {_SEEDS}")
+    accuracy.add_argument(
+        "--seeds", metavar="1,2,…", help="seeds of each setting, also as 1-20; default: 1,2,3, and 1-20 on links"
+    )
     accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to turn; default: all that the scene calls for")
     accuracy.add_argument(
         "--max-run-hours",
@@ -87,21 +88,22 @@ class _Expanded:
         sweep: the sweep of it.
         points: its runs.
         expected_s: expected wall time of a run by setting [s].
+        seeds: of each setting.
     """
 
     ladder: Ladder
     sweep: Sweep
     points: Sequence[Point]
     expected_s: Mapping[str, float]
+    seeds: Sequence[int]
 
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """`smarticles accuracy`."""
-    from studies.accuracy.ladder import parse_seeds  # noqa: PLC0415
     from studies.accuracy.rung import BASE  # noqa: PLC0415
 
-    seeds = parse_seeds(arguments.seeds)
-    expanded = _expanded(arguments, seeds)
+    expanded = _expanded(arguments)
+    seeds = expanded.seeds
     if not arguments.dry_run and arguments.out is None:
         msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
         raise InputError(msg)
@@ -131,19 +133,28 @@ def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Accuracy:
     return Accuracy(rungs=rungs, expected_s=expected_s)
 
 
-def _expanded(arguments: argparse.Namespace, seeds: Sequence[int]) -> _Expanded:
+def _expanded(arguments: argparse.Namespace) -> _Expanded:
     from dem.scene.reading import load_scene  # noqa: PLC0415
-    from studies.accuracy.ladder import affordable, build_ladder, ladder_sweep, parse_knobs  # noqa: PLC0415
+    from studies.accuracy.ladder import (  # noqa: PLC0415
+        affordable,
+        build_ladder,
+        default_seeds,
+        ladder_sweep,
+        parse_knobs,
+        parse_seeds,
+    )
     from templates.sweep.expand import expand  # noqa: PLC0415
 
+    seeds = None if arguments.seeds is None else parse_seeds(arguments.seeds)
     knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
     scene = load_scene(arguments.scene, engine_settings(arguments))
     ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
     expected_s = {setting: expected_wall_s(one) for setting, one in ladder.scenes.items()}
     if arguments.max_run_hours is not None:
         ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
+    seeds = seeds or default_seeds(scene)
     sweep = ladder_sweep(scene, ladder, seeds)
-    return _Expanded(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s)
+    return _Expanded(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s, seeds=seeds)
 
 
 def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
@@ -157,9 +168,10 @@ def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
     for rung in ladder.rungs:
         planned = plan(ladder.scenes[rung.setting])
         own = "reference" if references[rung.knob] == rung else ""
-        shape = [planned.time_step_s, planned.spheres_per_smarticle]
+        section = f"{planned.strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
+        shape = [planned.time_step_s, section]
         rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(expanded.expected_s[rung.setting])])
-    header = ["knob", "value", "setting", "", "time step s", "spheres", "expected wall s"]
+    header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]
     slots = min(jobs or slots_here(), len(expanded.points))
     hours = seeds * sum(expanded.expected_s[setting] for setting in ladder.settings) / 3600
     lines = [columns(header, rows), *(f"left out: {line}" for line in ladder.left_out)]

@@ -25,9 +25,10 @@ def add(commands: Commands) -> None:
         text="""
 Shows the phases, what acts in each and why, time step, spheres and the expected wall time.
 
-With --max-error, --max-hours or both, the fidelity is chosen instead of the scene's own: the cheapest
-whose measured error of the packing fractions φ_0 and φ_f (or of what --of says) is within the one, or
-the finest within the other. What was measured stands in a table that `smarticles accuracy` writes.""",
+With --max-error, --max-hours or both, engine and fidelity are chosen instead of the scene's own: the
+cheapest whose measured error of the packing fractions φ_0 and φ_f (or of what --of says) is within the
+one, or the most exact within the other; with --engine, of that engine. What was measured stands in a
+table that `smarticles accuracy SCENE --knobs engine` writes.""",
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference
@@ -43,7 +44,7 @@ the finest within the other. What was measured stands in a table that `smarticle
         "--max-error",
         type=positive_number,
         metavar="E",
-        help="largest relative error against the reference fidelity, e.g. 0.03",
+        help="largest relative error against the reference of the table, e.g. 0.03",
     )
     plan.add_argument(
         "--of",
@@ -90,5 +91,8 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
             msg = f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}"
             raise InputError(msg)
     return choose(
-        scene, read_table(arguments.table, of=of), max_error=arguments.max_error, max_hours=arguments.max_hours
+        scene,
+        read_table(arguments.table, of=of, engine=arguments.engine),
+        max_error=arguments.max_error,
+        max_hours=arguments.max_hours,
     )

@@ -41,7 +41,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
   smarticles study gravish --quick --out demo
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            on another machine, or to leave cores free
-  smarticles study gravish --out gravish-yade --engine yade  every run on one engine
+  smarticles study gravish --out gravish-yade --engine yade    every run on one engine
   smarticles study sensitivity --out sensitivity
   smarticles study procedures --quick --out procedures-quick
   smarticles study procedures --out procedures --analyse     what the finished runs say so far

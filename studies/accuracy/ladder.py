@@ -17,7 +17,7 @@ import yaml
 from dem.errors import InputError, nearest
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import FIDELITIES, Fidelity
+from dem.setting.fidelity import Fidelity, fidelities
 from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE, Rung
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import SEED, Sweep, SweepFile
@@ -31,19 +31,27 @@ KNOBS: Mapping[str, str] = MappingProxyType(
         "control": "time between two looks of the motor control; where the scene actuates",
         "hinge": "stiffness of the hinges' pins; where the scene actuates",
         "fidelity": "the named fidelities, all knobs together",
+        "engine": "the named fidelities of all engines, against the converged one of links; only where it is asked for",
     }
 )
 
 _OF_MOTORS = frozenset({"control", "hinge"})
+_ENGINES = ("yade", "links")
+"""From coarse to fine: links have neither beads nor facets, so that all are compared with their converged answer."""
 # Left as the scene has them: facets, since no knob turns them; a step by hand is refused.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _FACTORS = (1, 2, 4)
+_STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
+_STRANDS = (1, 2, 3)
+_CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
+"""Finer than the finest name on links, in what was found to matter: what the names are compared with."""
 _STEPS = (0.9, 0.45, 0.225)
 _PITCHES = (1.3, 1.0, 0.5)
 _RESTITUTIONS = (0.2, 0.5, 0.7, 0.9)
 _CONTROL_INTERVALS = (4e-4, 2e-4, 1e-4)
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_ROWS = max(_ROWS)
+_MOST_SEEDS = 1000
 _SWEEP, _TEMPLATE = Path("accuracy.yaml"), Path("accuracy.yaml.j2")
 
 
@@ -74,22 +82,33 @@ class Ladder:
         return {knob: found[knob] for knob in self.knobs}
 
 
+def default_seeds(scene: Scene) -> tuple[int, ...]:
+    """The seeds that a ladder has unless it is told: twenty where they are cheap, three on YADE."""
+    return tuple(range(1, 21 if scene.smooth else 4))
+
+
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Seeds from `1,2,3`.
+    """Seeds from `1,2,3` or `1-20`.
 
     Raises:
         InputError: there is none, one is no whole number from 0, or one is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
-    if not words or not all(word.isascii() and word.isdigit() for word in words):
-        msg = f"--seeds {text!r}: must be whole numbers from 0, such as 1,2,3"
+    if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
+        msg = f"--seeds {text!r}: must be whole numbers from 0, such as 1,2,3 or 1-20"
         raise InputError(msg)
-    seeds = tuple(int(word) for word in words)
+    seeds: list[int] = []
+    for word in words:
+        first, _, last = word.partition("-")
+        if last and not 0 <= int(last) - int(first) < _MOST_SEEDS:
+            msg = f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}"
+            raise InputError(msg)
+        seeds += range(int(first), int(last or first) + 1)
     for seed in seeds:
         if seeds.count(seed) > 1:
             msg = f"--seeds {text}: {seed} is given twice, and would count twice; leave one out"
             raise InputError(msg)
-    return seeds
+    return tuple(seeds)
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
@@ -145,7 +164,9 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
         msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
         raise InputError(msg)
     chosen = knobs or [
-        knob for knob in KNOBS if (driven or knob not in _OF_MOTORS) and not (scene.smooth and knob == "hinge")
+        knob
+        for knob in KNOBS
+        if (driven or knob not in _OF_MOTORS) and not (scene.smooth and knob == "hinge") and knob != "engine"
     ]
     base = _variables(scene)
     template = _template(scene)
@@ -228,13 +249,17 @@ def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
 def _variables(scene: Scene) -> dict[str, Value]:
     """What the knobs turn, as the scene has it."""
     turned = [key for key in Fidelity.model_fields if key not in _FIXED]
-    return {**{key: getattr(scene.fidelity, key) for key in turned}, "restitution": scene.contact.restitution}
+    return {
+        "engine": scene.engine,
+        **{key: getattr(scene.fidelity, key) for key in turned},
+        "restitution": scene.contact.restitution,
+    }
 
 
 def _template(scene: Scene) -> str:
     """The scene as a template: all that the knobs turn is a variable."""
     data = scene.model_dump(mode="json")
-    data |= {"name": "{{ title }}", SEED: "{{ seed }}"}
+    data |= {"name": "{{ title }}", SEED: "{{ seed }}", "engine": "{{ engine }}"}
     data["contact"]["restitution"] = "{{ restitution }}"
     data["fidelity"] |= {key: f"{{{{ {key} }}}}" for key in data["fidelity"] if key not in _FIXED}
     text = str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
@@ -262,18 +287,42 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
     """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
-    if knob == "time-step":
-        return _numbers("time-step", "time_step_fraction", "", _with(_STEPS, base["time_step_fraction"]))
-    if knob == "restitution":
-        return _numbers("restitution", "restitution", "", _with(_RESTITUTIONS, base["restitution"])[::-1])
-    if knob == "control":
-        return _numbers("control", "control_interval_s", "s", _with(_CONTROL_INTERVALS, base["control_interval_s"]))
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
+    if knob in ("fidelity", "engine"):
+        return _fidelities(knob, str(base["engine"]), smooth=smooth)
+    return _values(knob, base, smooth=smooth)
+
+
+def _values(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
+    """Rungs of a knob that is one number."""
+    key, unit, values = {
+        "time-step": ("time_step_fraction", "", _STEPS),
+        "restitution": ("restitution", "", _RESTITUTIONS),
+        "control": ("control_interval_s", "s", _CONTROL_INTERVALS),
+        "stiffness": ("stiffness_N_per_m", "N/m", _STIFFNESSES if smooth else ()),
+        "hinge": ("hinge_stiffness_N_per_m", "N/m", ()),
+    }[knob]
+    if not values:
+        return [(f"{base[key] * n:g}", unit, f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
+    every = _with(values, base[key])
+    return _numbers(knob, key, unit, every[::-1] if knob in ("restitution", "stiffness") else every)
+
+
+def _fidelities(knob: str, engine: str, *, smooth: bool) -> list[_Point]:
+    """Named fidelities: those of an engine, or of all."""
     if knob == "fidelity":
-        return [(name, "", name, {"base": name, "diameter_m": None, **values}) for name, values in FIDELITIES.items()]
-    key = {"stiffness": "stiffness_N_per_m", "hinge": "hinge_stiffness_N_per_m"}[knob]
-    return [(f"{base[key] * n:g}", "N/m", f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
+        return [(name, "", f"{engine}-{name}" if smooth else name, all_) for name, all_ in _names(engine).items()]
+    return [(f"{one} {name}", "", f"{one}-{name}", all_) for one in _ENGINES for name, all_ in _names(one).items()]
+
+
+def _names(engine: str) -> dict[str, dict[str, Value]]:
+    """What each named fidelity of an engine sets, coarse to fine; on links what is finer yet comes last."""
+    shared: dict[str, Value] = {"engine": engine, "diameter_m": None}
+    found = {name: {**shared, "base": name, **knobs} for name, knobs in fidelities(engine).items()}
+    if engine == _ENGINES[-1]:
+        found["converged"] = {**list(found.values())[-1], **_CONVERGED}
+    return found
 
 
 def _numbers(knob: str, key: str, unit: str, values: Sequence[float]) -> list[_Point]:
@@ -304,14 +353,20 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """One, two and three strands of a smooth link, by the scene's own rule of their diameter."""
-    shapes = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
+    """Strands of a smooth link, by the scene's own rule of their diameter."""
+    shapes = [{"rows": rows, "diameter_m": None} for rows in _STRANDS]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
         shapes.append(own)
     shapes.sort(key=lambda shape: shape["rows"] or 0)
-    names = [f"{shape['rows']}-strands" + ("" if shape["diameter_m"] is None else "-own") for shape in shapes]
-    return [(name.replace("-", " "), "", name, dict(shape)) for name, shape in zip(names, shapes, strict=True)]
+    names = [
+        f"{shape['rows']} strand{'' if shape['rows'] == 1 else 's'}"
+        + ("" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm")
+        for shape in shapes
+    ]
+    return [
+        (name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), dict(shape)) for name, shape in zip(names, shapes, strict=True)
+    ]
 
 
 def _told_section(*, rows: int, pitch: float, diameter_m: float | None) -> str:

@@ -26,7 +26,7 @@ from studies.base.runs import DEFINITION, duration
 from studies.base.variants import VARIANT, variant_of
 
 KNOB, VALUE, UNIT, REFERENCE, VERDICT = "knob", "value", "unit", "reference", "verdict"
-ACTIVITY, COUNT = "activity", "smarticles [-]"
+ACTIVITY, COUNT, ENGINE = "activity", "smarticles [-]", "engine"
 COST, WALL = "processor time per simulated time of the last activity [s/s]", "wall time [s]"
 """A run is one thread, and waits for nothing; unlike its wall time, its processor time is not what others leave."""
 
@@ -57,7 +57,7 @@ RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "ref
 """Verdicts: an error beyond its seed-to-seed band; none that is; the reference itself; no band, or no runs."""
 
 _AVERAGED = (COST, WALL, EXPECTED, *COMPARED.values(), RESIDUAL, GAP)
-_OF_SETTING = (TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
+_OF_SETTING = (ENGINE, TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
 
 
 def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str, object]:
@@ -91,9 +91,11 @@ def accuracy_row(run: RunManifest, expected_s: Mapping[str, float]) -> dict[str,
         ASPECT: round(run.aspect_ratio, 6),
         COUNT: run.count,
         ACTIVITY: " ".join(dict.fromkeys(phase.type for phase in active)),
+        ENGINE: run.engine,
         "fidelity": run.fidelity,
         TIME_STEP: run.time_step,
-        SPHERES: run.spheres_per_smarticle,
+        # Links that are no chains have spheres in pictures alone.
+        SPHERES: run.spheres_per_smarticle if run.engine == "yade" else math.nan,
         COST: _or_nan(last.cpu_time) / time if time > 0 else math.nan,
         WALL: _or_nan(run.wall_time),
         EXPECTED: cpu / expected if expected > 0 else math.nan,

@@ -79,10 +79,18 @@ def binned(histories: Sequence[History], width: float) -> tuple[NDArray[np.float
     return (first + np.arange(count) + 0.5)[whole] * width, means[:, whole]
 
 
-def draw_history(axes: Axes, histories: Sequence[History], width: float, *, colour: str, label: str) -> None:
-    """The mean over seeds as a line, from the lowest to the highest seed as a band."""
+def draw_history(
+    axes: Axes,
+    histories: Sequence[History],
+    width: float,
+    *,
+    colour: str,
+    label: str | None = None,
+    style: Any = "solid",
+) -> None:
+    """The mean over seeds as a line of some style, from the lowest to the highest seed as a band."""
     centres, means = binned(histories, width)
-    axes.plot(centres, means.mean(axis=0), color=colour, label=label)
+    axes.plot(centres, means.mean(axis=0), color=colour, label=label, linestyle=style)
     if len(means) > 1:
         axes.fill_between(centres, means.min(axis=0), means.max(axis=0), color=colour, alpha=0.25, linewidth=0)
 

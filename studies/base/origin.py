@@ -67,11 +67,14 @@ class Origin:
         used, total = len(self.manifests), len(self.manifests) + len(self.missing)
         fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
         versions = []
-        for name in ("smarticles", "git", "yade"):
-            found = sorted({run.versions.get(name, "unknown") for run in self.manifests})
+        engines = list(dict.fromkeys(run.engine for run in self.manifests))
+        for name in ("smarticles", "git", *engines):
+            by_it = [run for run in self.manifests if name not in engines or run.engine == name]
+            found = sorted({run.versions.get(name, "unknown") for run in by_it})
             versions.append(f"{name} {', '.join(found)}")
         return (
-            f"Study {self.study}, fidelity {fidelities}: {used} of {total} runs{lacking}; {points}",
+            f"Study {self.study}, fidelity {fidelities}{_told_engines(engines)}: {used} of {total} runs{lacking}; "
+            f"{points}",
             *statements,
             f"Reference: {self.reference.statement}.",
             f"Note: {self.note}",
@@ -106,6 +109,11 @@ class Origin:
         return MappingProxyType(written)
 
 
+def _told_engines(engines: Sequence[str]) -> str:
+    """Which engines, unless it is the usual one alone."""
+    return "" if list(engines) == ["yade"] else f", engine {' and '.join(engines)}"
+
+
 def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str]) -> str:
     """Everything about the origin of a study's results as JSON; of φ where its tables have such columns."""
     try:
@@ -134,6 +142,7 @@ def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str])
                 "aspect_ratio": run.aspect_ratio,
                 "seed": run.seed,
                 "fidelity": run.fidelity,
+                "engine": run.engine,
                 "started": run.started,
                 "command": run.command,
                 "versions": dict(run.versions),

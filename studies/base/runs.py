@@ -18,6 +18,12 @@ from postprocess.statistics.columns import SEED
 Row = Mapping[str, object]
 """Cells of one row of a table, by the names of its columns."""
 
+ENGINE = "engine"
+"""Column of tables of runs of several engines."""
+
+ENGINES = ("links", "yade")
+"""Engines in the order of tables and figures: that of the many runs first."""
+
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction that is compared with Gravish's."""
 
@@ -87,8 +93,16 @@ class Collected:
         """What the finished runs say of themselves."""
         return tuple(run.manifest for run in self.runs)
 
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The engines that the finished runs were computed by, as in `ENGINES`."""
+        present = {run.manifest.engine for run in self.runs}
+        return tuple(name for name in ENGINES if name in present) + tuple(sorted(present - set(ENGINES)))
+
     def table(self) -> pd.DataFrame:
-        """The rows of all runs."""
+        """The rows of all runs; with their engine where there are several."""
+        if len(self.engines) > 1:
+            return pd.DataFrame([{ENGINE: run.manifest.engine, **row} for run in self.runs for row in run.rows])
         return pd.DataFrame([row for run in self.runs for row in run.rows])
 
     def refuse_mixture(
@@ -149,9 +163,9 @@ class Collected:
         Raises:
             InputError: There are two.
         """
-        seen: dict[tuple[str, int], MeasuredRun] = {}
+        seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
-            key = (value(run), run.manifest.seed)
+            key = (value(run), run.manifest.seed, run.manifest.engine)
             if key in seen:
                 msg = (
                     f"study {self.study}: {name} = {key[0]} with seed {key[1]} is given twice, "

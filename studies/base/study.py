@@ -46,11 +46,13 @@ class Study(ABC, Generic[Judgement]):
         name: Of the study.
         text_name: Name of the Markdown file that tells everything.
         one_fidelity: Whether all runs must have the same.
+        one_engine: Whether all runs must be of the same engine; where not, the table of runs tells which.
     """
 
     name: str
     text_name: str
     one_fidelity: bool = True
+    one_engine: bool = True
 
     def analyse(
         self, run_dirs: Sequence[Path | str], output: Path | str, *, note: str, command: str
@@ -78,6 +80,8 @@ class Study(ABC, Generic[Judgement]):
         found = collect_runs(self.name, run_dirs, self.measure)
         if self.one_fidelity:
             found.refuse_mixture("fidelity", lambda run: run.manifest.fidelity)
+        if self.one_engine:
+            found.refuse_mixture("engine", lambda run: run.manifest.engine)
         self.refuse(found)
         tables = self.tabulate(found)
         judged = self.judge(tables)

@@ -11,9 +11,9 @@ import pandas as pd
 
 from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.collapse_time import CollapseTime
+from studies.base.column import COM, DEFINITIONS, collapse_of, column_history, vibration
 from studies.base.runs import duration
-from studies.collapse.column import COM, DEFINITIONS, collapse_of, column_history, vibration
-from studies.collapse.time import CollapseTime
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, HEIGHT_BEFORE = "container radius [m]", "com height before vibration [m]"

@@ -12,6 +12,7 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import read_series
 from postprocess.report import figures
+from studies.base.engines import TOLD, engines_of, judging, of_engine
 from studies.base.figures import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,
@@ -21,9 +22,12 @@ from studies.base.figures import (
     draw_history,
     draw_means,
     finished,
+    legend_above,
     marker,
     told_histories,
 )
+from studies.base.runs import ENGINES
+from studies.base.shaken import SHAKEN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 
 _ASPECT = "aspect ratio [-]"
 _SERIES = "packing_fraction"
+_WIDE = 1.4 * figures.COLUMN_WIDTH  # for the longer legend of two engines
 _SHIFT = 0.005  # in l/w, to keep error bars apart
 
 
@@ -82,7 +87,9 @@ def _draw_packing(
     definition: str,
     reading_error: float,
 ) -> list[Path]:
-    figure, axes = figures.new_figure(height=2.7)
+    several = engines_of(summary)
+    figure, axes = figures.new_figure(width=_WIDE, height=3.4) if several else figures.new_figure(height=2.7)
+    whose = TOLD.get(several[0], several[0]) if several else "simulation"
     for column, face, label in (
         ("phi_initial", "white", r"experiment, $\phi_0$ before shaking"),
         ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after shaking"),
@@ -98,15 +105,28 @@ def _draw_packing(
         )
     blue, sky = figures.BLUE, figures.SKY
     for stage, shape, colour, face, label in (
-        ("phi_0", "D", blue, "white", r"simulation, $\phi_0$ before shaking"),
-        ("phi_f relaxed", "^", sky, sky, r"simulation, $\phi_\mathrm{f}$ at rest again"),
-        ("phi_f", "D", blue, blue, r"simulation, $\phi_\mathrm{f}$ at the end of shaking"),
+        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before shaking"),
+        ("phi_f relaxed", "^", sky, sky, rf"{whose}, $\phi_\mathrm{{f}}$ at rest again"),
+        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end of shaking"),
     ):
-        _draw_means(axes, summary, f"{stage} {definition}", marker(shape, colour, face), label)
+        _draw_means(axes, judging(summary), f"{stage} {definition}", marker(shape, colour, face), label)
+    for engine in several[1:]:
+        part = of_engine(summary, engine)
+        time = ", ".join(sorted({f"{value:.3g}" for value in part[SHAKEN]}, key=float))
+        look = {"linestyle": "none", "markersize": 4.2}
+        for stage, face, when in (
+            ("phi_0", "white", r"$\phi_0$"),
+            ("phi_f", figures.GREEN, rf"$\phi_\mathrm{{f}}$ after {time} s"),
+        ):
+            squares = {**marker("s", figures.GREEN, face), **look}
+            _draw_means(axes, part, f"{stage} {definition}", squares, f"{TOLD[engine]}, {when}", shift=2 * _SHIFT)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="upper right")
+    if several:
+        legend_above(axes)
+    else:
+        axes.legend(loc="upper right")
     return finished(figure, path, footer)
 
 
@@ -116,17 +136,25 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
         ("crossings before", "white", "before shaking", -_SHIFT),
         ("crossings after", figures.BLUE, "at the end of shaking", _SHIFT),
     ):
-        _draw_means(axes, summary, quantity, marker("D", figures.BLUE, face), label, shift=shift)
+        _draw_means(axes, judging(summary), quantity, marker("D", figures.BLUE, face), label, shift=shift)
+        for engine in engines_of(summary)[1:]:
+            look = {**marker("s", figures.GREEN, "white" if face == "white" else figures.GREEN), "linestyle": "none"}
+            part = of_engine(summary, engine)
+            _draw_means(axes, part, quantity, look, f"{TOLD[engine]}, {label}", shift=shift + 2 * _SHIFT)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(CROSSINGS_LABEL)
     axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+    if engines_of(summary):
+        legend_above(axes)
+    else:
+        axes.legend(loc="best")
     return finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])
 
 
 def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence[str]) -> list[Path]:
     figure, axes = figures.new_figure(height=2.7)
-    histories: dict[float, list[History]] = {}
+    first = next((name for name in ENGINES if any(run.engine == name for run in manifests)), "")
+    histories: dict[tuple[float, str], list[History]] = {}
     without, ends = [], []
     for run in manifests:
         try:
@@ -134,19 +162,26 @@ def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence
         except InputError:
             without.append(run.directory.name)
         else:
-            histories.setdefault(round(run.aspect_ratio, 6), []).append(history)
+            histories.setdefault((round(run.aspect_ratio, 6), run.engine), []).append(history)
             ends.append(history.active)
     width = bin_width(ends)
-    decimals = 1 if all(round(ratio, 1) == ratio for ratio in histories) else 2
-    colours = figures.sequence(len(histories), last=0.9)
-    for (ratio, seeds), colour in zip(sorted(histories.items()), colours, strict=True):
-        draw_history(axes, seeds, width, colour=colour, label=f"{ratio:.{decimals}f}")
+    ratios = sorted({ratio for ratio, _ in histories})
+    decimals = 1 if all(round(ratio, 1) == ratio for ratio in ratios) else 2
+    colours = dict(zip(ratios, figures.sequence(len(ratios), last=0.9), strict=True))
+    for (ratio, engine), seeds in sorted(histories.items()):
+        if engine == first:
+            draw_history(axes, seeds, width, colour=colours[ratio], label=f"{ratio:.{decimals}f}")
+        else:
+            draw_history(axes, seeds, width, colour=colours[ratio], style=(0, (2, 1)))
+    others = sorted({TOLD.get(engine, engine) for _, engine in histories if engine != first})
     draw_ends(axes, ends)
     axes.set_xlabel("time since shaking began [s]")
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     if histories:
         axes.legend(title=r"$l/w$", loc="center left", bbox_to_anchor=(1.0, 0.5))
     told = [told_histories(width, "Shaking")]
+    if others:
+        told.append(f"Dashed: {', '.join(others)}; lines without dashes: {TOLD.get(first, first)}.")
     if without:
         told.append(f"No time series of φ: {', '.join(without)}.")
     return finished(figure, path, [*told, *footer])

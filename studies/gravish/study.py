@@ -20,9 +20,19 @@ from postprocess.measures.packing import DEFINITIONS
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import told_number
+from studies.base.engines import (
+    TOLD,
+    by_engine,
+    compared_engines,
+    engine_lines,
+    engines_of,
+    judging,
+    of_engine,
+    told_engines,
+)
 from studies.base.references import DIGITISING_ERROR, GRAVISH, SHAKE_TIME, Reference, read_reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
-from studies.base.shaken import STAGES, WHEN, measured_row, told_shaken
+from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
+from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
 from studies.base.study import Analysis, Study, Tables
 from studies.gravish import figures
 from studies.gravish.findings import (
@@ -32,6 +42,12 @@ from studies.gravish.findings import (
     steps_between_ratios,
     summarise_runs,
 )
+
+COMPARED = (
+    *(f"{stage} {DEFINITION} [-]" for stage in STAGES),
+    *(f"crossings {when} [-]" for when in ("before", "after", "relaxed")),
+)
+"""What is compared between engines: columns of the table of runs."""
 
 
 class Gravish(Study[Question]):
@@ -47,6 +63,7 @@ class Gravish(Study[Question]):
 
     name = "gravish"
     text_name = "deviations.md"
+    one_engine = False
 
     def __init__(self, definitions: Sequence[str] = tuple(DEFINITIONS)) -> None:
         unknown = set(definitions) - set(DEFINITIONS)
@@ -65,18 +82,31 @@ class Gravish(Study[Question]):
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs, means over seeds, deviations from Gravish's points, and steps between neighbouring aspect ratios."""
-        runs = runs_table(found).sort_values([ASPECT, SEED], ignore_index=True)
-        summary = summarise_runs(runs, read_reference())
-        return {
+        runs = runs_table(found).sort_values([ASPECT, SEED], ignore_index=True, kind="stable")
+        reference = read_reference()
+        summary = by_engine(runs, lambda part: summarise_runs(part, reference))
+        tables = {
             "runs": runs,
             "summary": summary,
-            "deviations": deviations_from_reference(summary),
-            "steps": steps_between_ratios(summary),
+            "deviations": by_engine(summary, deviations_from_reference),
+            "steps": by_engine(summary, steps_between_ratios),
         }
+        if engines_of(runs):
+            # Piles that were shaken for different times agree before shaking at most.
+            before = [name for name in COMPARED if "phi_0" in name or "before" in name]
+            after = [name for name in COMPARED if name in runs.columns and name not in before]
+            tables["engines"] = pd.concat(
+                [
+                    compared_engines(runs, [ASPECT], before),
+                    compared_engines(runs, [ASPECT], after, alike=[SHAKEN]),
+                ],
+                ignore_index=True,
+            )
+        return tables
 
     def judge(self, tables: Tables) -> tuple[Question, ...]:
-        """Answers to the study's questions."""
-        return answers(tables["runs"], tables["summary"], tables["deviations"], tables["steps"])
+        """Answers to the study's questions, by the engine that judges."""
+        return answers(*(judging(tables[name]) for name in ("runs", "summary", "deviations", "steps")))
 
     def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
         """`verdicts.csv`."""
@@ -88,12 +118,15 @@ class Gravish(Study[Question]):
 
     def statements(self, analysis: Analysis[Question]) -> tuple[str, ...]:
         """Which runs, and how φ is taken."""
-        runs = analysis.tables["runs"]
+        every = analysis.tables["runs"]
+        runs = judging(every)
         counts = runs.groupby(ASPECT).size()
+        others = told_engines(every)
         ratios = " ".join(f"{ratio:g}" for ratio in counts.index)
         return (
             f"l/w {ratios}, {told_seeds(runs, counts, 'l/w')}; shaken for {told_shaken(runs)} "
             f"(Gravish: {SHAKE_TIME:g} s).",
+            *([others, *_others_shaken(every)] if others else []),
             f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame). "
             f"{told_bars(counts, 'l/w')}.",
         )
@@ -102,13 +135,14 @@ class Gravish(Study[Question]):
         """Answers, and deviations by stage and point."""
         deviations = analysis.tables["deviations"]
         stages = []
-        for stage, part in deviations.groupby("stage", sort=False):
+        for stage, part in judging(deviations).groupby("stage", sort=False):
             percent = part["deviation [%]"]
             largest = percent.loc[percent.abs().idxmax()]
             numbers = [f"{percent.abs().mean():.1f} %", f"{percent.mean():+.1f} %", f"{largest:+.1f} %"]
             stages.append([str(stage), STAGES[str(stage)], str(len(part)), *numbers])
         points = [
             [
+                *_engine_cell(row),
                 row["stage"],
                 f"{row[ASPECT]:g}",
                 str(row[SEEDS]),
@@ -132,7 +166,8 @@ class Gravish(Study[Question]):
             "",
             "## Points",
             "",
-            *table_lines(["stage", "l/w", "seeds", "φ", "Gravish", "deviation"], points),
+            *table_lines([*_engine_header(deviations), "stage", "l/w", "seeds", "φ", "Gravish", "deviation"], points),
+            *engine_lines(analysis.tables.get("engines"), {"l/w": lambda row: f"{row[ASPECT]:g}"}),
         ]
 
     def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
@@ -149,8 +184,10 @@ class Gravish(Study[Question]):
 
     def table(self, analysis: Analysis[Question]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
         """Deviations from Gravish's points."""
+        deviations = analysis.tables["deviations"]
         rows = [
             [
+                *_engine_cell(row),
                 row["stage"],
                 row[ASPECT],
                 row[SEEDS],
@@ -159,10 +196,26 @@ class Gravish(Study[Question]):
                 f"{row['phi Gravish [-]']:.4f}",
                 f"{row['deviation [%]']:+.1f}",
             ]
-            for row in analysis.tables["deviations"].to_dict("records")
+            for row in deviations.to_dict("records")
         ]
-        return ["φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"], rows
+        return [*_engine_header(deviations), "φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"], rows
 
     def told(self, analysis: Analysis[Question]) -> Sequence[str]:
         """Questions with their answers."""
         return [f"{one.question} {one.answer.upper()}\n    {one.evidence}" for one in analysis.judged]
+
+
+def _engine_header(table: pd.DataFrame) -> list[str]:
+    return [ENGINE] if ENGINE in table.columns else []
+
+
+def _engine_cell(row: pd.Series | dict[str, object]) -> list[object]:
+    return [row[ENGINE]] if ENGINE in row else []
+
+
+def _others_shaken(runs: pd.DataFrame) -> list[str]:
+    """How long the runs of the other engines were shaken, where it is another time."""
+    first, *others = engines_of(runs)
+    own = told_shaken(of_engine(runs, first))
+    times = {TOLD[name]: told_shaken(of_engine(runs, name)) for name in others}
+    return [f"{name} was shaken for {time}." for name, time in times.items() if time != own]

@@ -12,6 +12,8 @@ from dem.record.manifest import RunManifest
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
+from studies.base.activity import ENERGY, PHI_ACTIVE, height_history
+from studies.base.engines import TOLD, engines_of, judging, of_engine
 from studies.base.figures import (
     ASPECT_LABEL,
     COLOURS,
@@ -40,10 +42,10 @@ from studies.base.procedures import (
     THETA,
     of_procedure,
 )
-from studies.procedures.measure import ENERGY, PHI_ACTIVE, height_history
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 _SHOWN_ASPECT = 0.7
 """Aspect ratio whose heights are drawn against time, as in the paper [-]."""
@@ -75,7 +77,7 @@ def draw(
     Args:
         output: Folder.
         points: See `base.procedures.points`.
-        runs: See `measure.procedure_row`.
+        runs: See `activity.procedure_row`.
         manifests: The runs, in the order of the table.
         footer: Origin, one statement each.
 
@@ -156,11 +158,13 @@ def _of_aspects(points: pd.DataFrame) -> list[_Line]:
 def _draw_panel(path: Path, panel: _Panel, points: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     figure, axes = figures.new_figure(height=2.8)
     known = points[points[panel.quantity].notna()]
-    lines = [line for line in panel.lines(known) if len(line.points)]
+    lines = [line for line in panel.lines(judging(known)) if len(line.points)]
     for line in lines:
         x, values = line.points[panel.x] + line.shift, line.points[panel.quantity]
         half_widths = line.points[marked(panel.quantity, "95 %")].to_numpy()
         draw_means(axes, x, values, half_widths, look=line.look, label=line.label)
+    for engine in engines_of(known)[1:]:
+        _draw_beside(axes, panel, of_engine(known, engine), TOLD.get(engine, engine))
     axes.set_xlabel(ASPECT_LABEL if panel.x == ASPECT else THETA_LABEL)
     axes.set_ylabel(panel.label)
     if not lines:
@@ -174,10 +178,24 @@ def _draw_panel(path: Path, panel: _Panel, points: pd.DataFrame, footer: Sequenc
     return finished(figure, path, [*([_APART] if shifted else []), *footer])
 
 
+def _draw_beside(axes: Axes, panel: _Panel, points: pd.DataFrame, engine: str) -> None:
+    """The points of another engine: open green markers, set apart sideways by twice as much, told once."""
+    label: str | None = f"the same on {engine}: green"
+    apart = 0.012 if panel.x == ASPECT else 0.6
+    for line in panel.lines(points):
+        if len(line.points):
+            half_widths = line.points[marked(panel.quantity, "95 %")].to_numpy()
+            look = {**line.look, "color": figures.GREEN, "markerfacecolor": "white", "linestyle": "none"}
+            x, values = line.points[panel.x] + line.shift + apart, line.points[panel.quantity]
+            draw_means(axes, x, values, half_widths, look=look, label=label or "_")
+            label = None
+
+
 def _draw_heights(
     path: Path, runs: pd.DataFrame, manifests: Sequence[RunManifest], footer: Sequence[str]
 ) -> list[Path]:
     """h/h0 against time of each procedure, at the aspect ratio of the paper or the nearest one."""
+    runs = judging(runs)
     aspect = min(runs[ASPECT].unique(), key=lambda value: abs(value - _SHOWN_ASPECT))
     at_aspect = runs[runs[ASPECT] == aspect]
     by_name = {run.directory.name: run for run in manifests}

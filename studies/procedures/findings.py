@@ -16,6 +16,7 @@ import pandas as pd
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.seeds import difference, mean_over_seeds
+from studies.base.activity import ENERGY, HALF, HEIGHT, PHI_ACTIVE, STRAIGHT
 from studies.base.procedures import (
     AMPLITUDE,
     CROSSINGS,
@@ -30,7 +31,6 @@ from studies.base.procedures import (
     paired,
 )
 from studies.procedures.effects import against_amplitude, against_aspect, by_aspect, compared, pairs_of
-from studies.procedures.measure import ENERGY, HALF, HEIGHT, PHI_ACTIVE, STRAIGHT
 
 FLAT = 0.2
 """⟨N⟩ is flat if it changes by less than this share of its mean over the aspect ratios [-]."""
@@ -46,7 +46,7 @@ def findings(table: pd.DataFrame) -> tuple[Finding, ...]:
     """All findings, judged.
 
     Args:
-        table: See `measure.samples`.
+        table: See `activity.samples`.
     """
     judges: Sequence[Callable[[pd.DataFrame], Finding]] = (
         _rises,

@@ -2,7 +2,7 @@
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: smarticles poured
 into a cylinder go through one of three activities. What is measured of a run is in
-`studies.procedures.measure`, what the paper found and how it is judged in `studies.procedures.findings`.
+`studies.base.activity`, what the paper found and how it is judged in `studies.procedures.findings`.
 """
 
 from __future__ import annotations
@@ -15,19 +15,22 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
+from postprocess.statistics.points import ToldTable, told_means
+from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, QUANTITIES, procedure_row, samples, static_spread
+from studies.base.engines import by_engine, compared_engines, engine_lines, engines_of, judging, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, AMPLITUDE, CROSSINGS, NAMED, PHI, PROCEDURE, THETA, points, refuse_unlike
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
+from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.procedures import figures
 from studies.procedures.findings import findings
-from studies.procedures.measure import ENERGY, HEIGHT, PHI_ACTIVE, QUANTITIES, procedure_row, samples, static_spread
 
 
 class Procedures(PaperStudy):
     """Runs of one activity between two rests; static is the state before it."""
 
     name = "procedures"
+    one_engine = False
     title = "Procedures of smarticles against the findings of Savoie et al."
     quantities = QUANTITIES
     named = NAMED
@@ -46,34 +49,52 @@ class Procedures(PaperStudy):
         return MeasuredRun(manifest=run, rows=[procedure_row(run)])
 
     def refuse(self, found: Collected) -> None:
-        """Other numbers of smarticles, other durations of an activity, a point and seed twice."""
-        found.refuse_other_counts()
+        """Other numbers of smarticles at one aspect ratio, other durations of an activity, a point and seed twice."""
+        found.refuse_mixed_counts()
         refuse_unlike(found)
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
-        runs = runs_table(found).sort_values([PROCEDURE, THETA, ASPECT, SEED], ignore_index=True)
-        return {"runs": runs, "points": points(samples(runs), QUANTITIES)}
+        runs = runs_table(found).sort_values([PROCEDURE, THETA, ASPECT, SEED], ignore_index=True, kind="stable")
+        tables = {"runs": runs, "points": by_engine(runs, lambda part: points(samples(part), QUANTITIES))}
+        if engines_of(runs):
+            alike = by_engine(runs, samples)
+            tables["engines"] = compared_engines(alike, [PROCEDURE, THETA, ASPECT], QUANTITIES)
+        return tables
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
-        """The findings, by samples."""
-        return findings(samples(tables["runs"]))
+        """The findings, by samples of the engine that judges."""
+        return findings(samples(judging(tables["runs"])))
 
     def about_runs(self, analysis: Analysis[Finding]) -> tuple[str, ...]:
         """Which runs, and how φ, ⟨N⟩ and the energy are taken."""
-        runs = analysis.tables["runs"]
-        counts = analysis.tables["points"].set_index([PROCEDURE, ASPECT, THETA])[SEEDS]
+        every = analysis.tables["runs"]
+        runs, others = judging(every), told_engines(every)
+        counts = judging(analysis.tables["points"]).set_index([PROCEDURE, ASPECT, THETA])[SEEDS]
         ratios = " ".join(f"{ratio:g}" for ratio in sorted(runs[ASPECT].unique()))
         times = ", ".join(f"{name} {time:.3g} s" for name, time in runs.groupby(PROCEDURE)[ACTIVE].first().items())
+        numbers = told_range(runs.groupby(ASPECT)["smarticles [-]"].first())
         return (
-            f"l/w {ratios}, {analysis.found.manifests[0].count} smarticles, {told_seeds(runs, counts, 'point')}; "
-            f"active for: {times}.",
+            f"l/w {ratios}, {numbers} smarticles, {told_seeds(runs, counts, 'point')}; active for: {times}.",
+            *([others] if others else []),
             f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}), ⟨N⟩ the links of others through a smarticle's plane: φ_f "
             "is the mean over the last 20 frames of the activity, as in the paper, ⟨N⟩ that over the frames of the "
             "relaxation after it; static ones are means over the frames of the relaxation before it (runs of one l/w "
             f"and seed agree there within {static_spread(runs):.2g} in φ). h0 is the mean height of the centre of mass "
             "there. Energy: work of the motors, or of the shaken container without its own weight. Procedures are "
             f"compared at θ = {AMPLITUDE:g}°. {told_bars(counts, 'point')}.",
+        )
+
+    def table(self, analysis: Analysis[Finding]) -> ToldTable:
+        """Means over seeds with their standard errors, engine by engine where there are several."""
+        points_ = analysis.tables["points"]
+        engine = {"engine": lambda point: str(point[ENGINE])} if engines_of(points_) else {}
+        return told_means(points_, {**engine, **self.named}, self.shown)
+
+    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
+        """The engines compared, if there are several."""
+        return engine_lines(
+            analysis.tables.get("engines"), {name: told for name, told in NAMED.items() if name != "seeds"}
         )
 
     @property

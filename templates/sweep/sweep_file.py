@@ -236,6 +236,11 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
         InputError: the sweep has no constant that names its engine.
     """
     content = sweep.content
+    points = content.points
+    columns = [*(sweep.table or [{}])[0], *(points.zip_ or {}), *(points.grid or {}), *(points.list_ or [{}])[0]]
+    if ENGINE in columns:
+        msg = f"{sweep.path}: points: 'engine' is a variable, so its runs are on several; leave --engine {engine} out"
+        raise InputError(msg)
     if ENGINE not in content.constants:
         msg = (
             f"{sweep.path}: constants: there is no 'engine' that could be {engine}; add `engine: yade` there, and "

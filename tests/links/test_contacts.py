@@ -257,5 +257,5 @@ def test_what_contacts_remember_survives_a_new_list() -> None:
     before = memory()
     assert len(before) > 10
     skins = world.skins
-    build(world.shape, world.bodies, world.pairs, world.cells, skins[1], 2 * skins[3], skins[4], skins[5], skins[6])
+    build(world.shape, world.bodies, world.pairs, world.cells, skins[1], skins[3], skins[4], skins[5], skins[6])
     assert memory() == before

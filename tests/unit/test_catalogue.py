@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import damping_ratio, restitution_of
-from smarticles.verification.bench import BALL_MASS, BALL_RADIUS
 from smarticles.verification.check import Answer
 from smarticles.verification.hands.kinds import ENGINES, hands_on
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS
 from smarticles.verification.hands.yade import ball
 from smarticles.verification.hard.cases import CASES as HARD
 from smarticles.verification.known.cases import CASES, LADDERS

@@ -13,6 +13,7 @@ Indices = NDArray[np.int32]
 PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
 SURFACES = 3  # that an end of a link can touch at once: floor, wall, ceiling; or two walls of a channel
+BINS = 4  # of the search for neighbours, per link
 SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
 
 
@@ -35,7 +36,7 @@ class Bodies(NamedTuple):
         motion: (N, 6) or (3 N, 6) velocity at the centre of mass [m/s] and angular velocity [rad/s] of each rigid
             body: of whole smarticles while welded, of links while articulated.
         load: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight.
-        lever: (N, 2) torque of contacts about the hinges on each barb, positive ones raise the angle [N m].
+        shares: (3 N, 6) the same on each link while articulated; (0, 6) while welded.
         deepest: (N,) deepest contact since the last question, as the step after would take it [m].
     """
 
@@ -51,7 +52,7 @@ class Bodies(NamedTuple):
     segments: Array
     motion: Array
     load: Array
-    lever: Array
+    shares: Array
     deepest: Array
 
 
@@ -64,11 +65,15 @@ class Pairs(NamedTuple):
         slip: (P, SLOTS, 4) stretch of the tangential springs at each point [m], and their energy [J].
         used: (P,) which of the points touched in the last step, as bits.
         near: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list.
+        touching: (P,) places of the pairs that touch or did so in the last step.
+        nearest: (P, 2) where these are nearest to each other, in lengths of either link.
         counts: (4,) pairs, near pairs, times the list was built, times the tight one was.
         wide_marks: (N S, 7) ends of all links when the list was built and their skins [m].
         near_marks: (N S, 7) the same for the tight list.
         wide_centres: (N, 3) centres of mass when the list was built [m].
         near_centres: (N, 3) the same for the tight list [m].
+        owner: (N S,) smarticle that each link belongs to.
+        kind: (N S,) which of its links it is: 0 barb 1, 1 the middle link, 2 barb 2.
     """
 
     first: Indices
@@ -76,43 +81,47 @@ class Pairs(NamedTuple):
     slip: Array
     used: NDArray[np.uint8]
     near: Indices
+    touching: Indices
+    nearest: Array
     counts: NDArray[np.int64]
     wide_marks: Array
     near_marks: Array
     wide_centres: Array
     near_centres: Array
+    owner: Indices
+    kind: Indices
 
 
 class Cells(NamedTuple):
-    """What the search for neighbours needs for itself. Pieces are parts of links, no longer than half a cell.
+    """What the search for neighbours needs for itself.
 
     Args:
-        owners: (pieces,) links, by cell, in order within each.
-        cells: (pieces,) cells of each link, by link.
-        begins: (N S + 1,) where each link begins in `cells`.
-        visited: (cells,) the last link that each cell was looked at for.
+        keys: (N S,) bin of each link.
+        order: (N S,) links by bin, in order within each.
+        starts: (bins + 2,) where each bin begins in `order`, from the second number on.
         marks: (N S, 7) as in `Pairs`.
         centres: (N, 3) as in `Pairs`.
-        boxes: (N S, 6) lower and upper corners of boxes about links and their skins [m].
-        starts: (cells + 2,) where each cell begins in `owners`, from the second number on.
-        rows: (N S + 1,) where the old list's rows begin.
-        seen: (N S,) the last link that each link was looked at for.
-        first: (P,) the list before.
-        second: (P,) the same.
-        slip: (P, SLOTS, 4) the same.
+        boxes: (N S, 6) lower and upper corners of boxes about links [m], by bin.
+        close: (N S,) links that may be near the one that is looked at.
+        rows: (N S + 2,) where the list's rows begin.
+        lower: (P,) links with the lower numbers, as pairs are found.
+        upper: (P,) the others.
+        first: (P,) the same by rows.
+        second: (P,) the same by rows.
+        slip: (P, SLOTS, 4) what the list before remembers.
         used: (P,) the same.
     """
 
-    owners: Indices
-    cells: Indices
-    begins: Indices
-    visited: Indices
+    keys: Indices
+    order: Indices
+    starts: Indices
     marks: Array
     centres: Array
     boxes: Array
-    starts: Indices
+    close: Indices
     rows: Indices
-    seen: Indices
+    lower: Indices
+    upper: Indices
     first: Indices
     second: Indices
     slip: Array
@@ -276,7 +285,7 @@ def no_bodies(links: int) -> Bodies:
     f = np.zeros
     return Bodies(
         f((0, 3)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 2)), f((0, 2)), f((0, PLANE)), f((0, 3)), f((0, 3, 3)),
-        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 2)), f(0),
+        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 6)), f(0),
     )  # fmt: skip
 
 
@@ -285,35 +294,40 @@ def joined(one: Bodies, other: Bodies) -> Bodies:
     return Bodies(*(np.concatenate(arrays) for arrays in zip(one, other, strict=True)))
 
 
-def pairs_for(links: int, smarticles: int, capacity: int) -> Pairs:
-    """An empty list with room for `capacity` pairs of `links` links of some smarticles."""
+def pairs_for(smarticles: int, kinds: NDArray[np.int64], capacity: int) -> Pairs:
+    """An empty list with room for `capacity` pairs of links of some smarticles, whose links are of these kinds."""
+    links = smarticles * len(kinds)
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
         np.zeros((capacity, SLOTS, 4)),
         np.zeros(capacity, np.uint8),
         np.zeros(capacity, np.int32),
+        np.zeros(capacity, np.int32),
+        np.zeros((capacity, 2)),
         np.zeros(4, np.int64),
         np.zeros((links, 7)),
         np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
         np.zeros((smarticles, 3)),
+        np.repeat(np.arange(smarticles, dtype=np.int32), len(kinds)),
+        np.tile(kinds.astype(np.int32), smarticles),
     )
 
 
-def cells_for(links: int, smarticles: int, pieces: int, capacity: int, cells: int) -> Cells:
-    """Room for a search among `links` links of some smarticles, so many pieces, pairs and cells."""
+def cells_for(links: int, smarticles: int, capacity: int) -> Cells:
+    """Room for a search among `links` links of some smarticles, and for so many pairs."""
     return Cells(
-        np.zeros(pieces, np.int32),
-        np.zeros(pieces, np.int32),
-        np.zeros(links + 1, np.int32),
-        np.zeros(cells, np.int32),
+        np.zeros(links, np.int32),
+        np.zeros(links, np.int32),
+        np.zeros(BINS * links + 66, np.int32),
         np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
         np.zeros((links, 6)),
-        np.zeros(cells + 2, np.int32),
-        np.zeros(links + 1, np.int32),
         np.zeros(links, np.int32),
+        np.zeros(links + 2, np.int32),
+        np.zeros(capacity, np.int32),
+        np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
         np.zeros((capacity, SLOTS, 4)),

@@ -38,6 +38,15 @@ def part(function: F) -> F:
     return numba.njit(**OPTIONS)(function)  # type: ignore[no-any-return]
 
 
+def inlined(function: F) -> F:
+    """The same for a small part, which becomes one with its callers.
+
+    Every array is some ten arguments to a call, and `Bodies` alone are fourteen arrays: a call costs more than most
+    small parts do.
+    """
+    return numba.njit(forceinline=True, **OPTIONS)(function)  # type: ignore[no-any-return]
+
+
 def kernel(function: F) -> F:
     """Compile a function at its first call from Python, and keep the code for later processes."""
     compiled = numba.njit(**OPTIONS)(function)

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 # Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
-FORMAT = "links-1"
+FORMAT = "links-2"
 
 
 class LinksEngine:

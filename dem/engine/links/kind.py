@@ -7,16 +7,15 @@ from collections.abc import Sequence
 import numba
 
 from dem.engine.demand import Demand
+from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.links.adds import ADDS, ORDER
 from dem.engine.links.compiler import stamp
+from dem.engine.links.cost import seconds_per_second
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.stable_step import links_stable_time_step
 from dem.physics.contact import ContactLaw, contact_law
 from dem.physics.motor import MotorLaw
-
-# Wall seconds per link, strand and step in a dense pile, one core, measured on a shaken pile of 270.
-COST_PER_LINK_STEP = 2.0e-7
 
 
 class LinksKind:
@@ -25,7 +24,6 @@ class LinksKind:
     name = "links"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
-    actuated_share = 1.3
 
     def version(self) -> str:
         """See the interface: the sources' own hash, and the compiler."""
@@ -53,10 +51,9 @@ class LinksKind:
             strings=scene.pulled_by,
         )
 
-    def seconds_per_step(self, scene: Demand) -> float:
+    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
         """See the interface."""
-        links = (3 if scene.smarticle.boxes.barb_length > 0 else 1) * scene.fidelity.rows**2
-        return COST_PER_LINK_STEP * links * scene.count
+        return seconds_per_second(scene, time_step, doing)
 
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
         """See the interface."""

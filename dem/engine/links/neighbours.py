@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
-from dem.engine.links.compiler import part
-from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
 
 GOOD, REBUILD, FULL = 0, 1, 2
@@ -86,43 +86,57 @@ def mark(shape: Shape, bodies: Bodies, marks: Array, centres: Array, least: floa
         marks[p, 6] = min(most, least + time * math.sqrt(fastest))
 
 
-@part
-def _near(segments: Array, p: int, q: int, reach: float) -> bool:
-    """Whether two axes are nearer than `reach` [m]."""
+@inlined
+def _off_lines(segments: Array, p: int, q: int, reach: float) -> bool:
+    """Whether the lines that two axes are on are farther apart than `reach` [m]; without a division."""
     ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
     vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
     wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-    # Most are told apart by the lines that they are on, without a division.
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     across = wx * nx + wy * ny + wz * nz
-    squared = reach * reach
-    if across * across > squared * (nx * nx + ny * ny + nz * nz):
-        return False
-    s, t = nearest_on_segments(
+    return bool(across * across > reach * reach * (nx * nx + ny * ny + nz * nz))
+
+
+@inlined
+def _near(segments: Array, p: int, q: int, reach: float, inverse_p: float, inverse_q: float) -> bool:
+    """Whether two axes, of known inverse squares of their lengths [1/m²], are nearer than `reach` [m]."""
+    ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
+    vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
+    wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+    s, t = nearest(
         ux * ux + uy * uy + uz * uz,
         ux * vx + uy * vy + uz * vz,
         vx * vx + vy * vy + vz * vz,
         ux * wx + uy * wy + uz * wz,
         vx * wx + vy * wy + vz * wz,
+        inverse_p,
+        inverse_q,
     )
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    return bool(x * x + y * y + z * z < squared)
+    return bool(x * x + y * y + z * z < reach * reach)
 
 
 @part
 def tighten(shape: Shape, bodies: Bodies, pairs: Pairs, least: float, most: float, time: float) -> None:
     """Make the tight list from the wide one; see `mark` for the skins."""
     mark(shape, bodies, pairs.near_marks, pairs.near_centres, least, most, time)
-    marks, first, second = pairs.near_marks, pairs.first, pairs.second
-    diameter = 2 * shape.radius
+    marks, first, second, near, used = pairs.near_marks, pairs.first, pairs.second, pairs.near, pairs.used
+    diameter, inverses, kind = 2 * shape.radius, shape.inverses, pairs.kind
     count = 0
+    # Every pair is written down, and the next one over it unless it counts: no branch, which would be mispredicted.
     for k in range(pairs.counts[0]):
         p, q = first[k], second[k]
-        reach = diameter + marks[p, 6] + marks[q, 6]
+        near[count] = k
+        count += (used[k] != 0) | (not _off_lines(bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6]))
+    lines, count = count, 0
+    for m in range(lines):
+        k = near[m]
+        p, q = first[k], second[k]
+        near[count] = k
         # Contacts stay in the list until the step in which they end has forgotten them.
-        if pairs.used[k] or _near(bodies.segments, p, q, reach):
-            pairs.near[count] = k
-            count += 1
+        count += (used[k] != 0) | _near(
+            bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6], inverses[kind[p]], inverses[kind[q]]
+        )
     pairs.counts[1] = count
     pairs.counts[3] += 1
 
@@ -134,9 +148,9 @@ def build(
 ) -> int:  # fmt: skip
     """Make the wide list anew, and carry over what contacts remember.
 
-    Every link is cut into pieces, and noted in all cells that the middles of its pieces are in. Two links that are
-    nearer than the greatest reach have pieces whose middles are nearer than it and a piece, in cells of that size that
-    touch each other.
+    Every link has a box about itself, its skin and half of what a pair needs besides. Boxes are sorted into strips
+    along y and, within a strip, into short bins along x, by their lower corners: all that can overlap a box are in a
+    few runs of neighbours in memory, from its own bin up to that of its upper corner.
 
     Args:
         shape: what all smarticles have in common.
@@ -147,178 +161,161 @@ def build(
         least: the thinnest skin [m].
         most: the thickest skin [m].
         time: for which a skin is to be good [s].
-        piece: length of the longest piece [m].
+        piece: width of a strip [m].
 
     Returns:
-        GOOD, or FULL where there is no room for all pairs or pieces: then the list is as it was.
+        GOOD, or FULL where there is no room for all pairs: then the list is as it was.
     """
-    segments, owners, starts = bodies.segments, cells.owners, cells.starts
-    count = segments.shape[0]
-    size = 2 * (shape.radius + most + inner) + piece
-    x0, y0, z0 = math.inf, math.inf, math.inf
-    x1, y1, z1 = -math.inf, -math.inf, -math.inf
-    for p in range(count):
-        x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
-        x0, y0, z0 = min(x0, x, x + segments[p, 3]), min(y0, y, y + segments[p, 4]), min(z0, z, z + segments[p, 5])
-        x1, y1, z1 = max(x1, x, x + segments[p, 3]), max(y1, y, y + segments[p, 4]), max(z1, z, z + segments[p, 5])
-    room = starts.shape[0] - 2
-    nx, ny, nz = 1 + _cell(x1 - x0, size, room), 1 + _cell(y1 - y0, size, room), 1 + _cell(z1 - z0, size, room)
-    # What lies beyond the last cell is put into it: links that are neighbours stay in cells that touch.
-    while nx * ny * nz > room:
-        if nx >= ny and nx >= nz:
-            nx = (nx + 1) // 2
-        elif ny >= nz:
-            ny = (ny + 1) // 2
-        else:
-            nz = (nz + 1) // 2
-    total = nx * ny * nz
-    for cell in range(total + 2):
-        starts[cell] = 0
-    number = 0
-    for p in range(count):
-        cuts, last = _cuts(segments, p, piece), -1
-        cells.begins[p] = number
-        if number + cuts > cells.cells.shape[0]:
-            return FULL
-        for k in range(cuts):
-            s = (k + 0.5) / cuts
-            a = _cell(segments[p, 0] + s * segments[p, 3] - x0, size, nx - 1)
-            b = _cell(segments[p, 1] + s * segments[p, 4] - y0, size, ny - 1)
-            c = _cell(segments[p, 2] + s * segments[p, 5] - z0, size, nz - 1)
-            cell = (a * ny + b) * nz + c
-            if cell != last:
-                cells.cells[number] = cell
-                starts[cell + 1] += 1
-                number += 1
-                last = cell
-    cells.begins[count] = number
-    for cell in range(total):
-        starts[cell + 1] += starts[cell]
-    starts[total + 1] = number
-    # Filled from behind, each cell's start moves down to where it belongs: cell c is starts[c + 1] … starts[c + 2].
-    for p in range(count - 1, -1, -1):
-        for k in range(cells.begins[p + 1] - 1, cells.begins[p] - 1, -1):
-            place = starts[cells.cells[k] + 1] - 1
-            starts[cells.cells[k] + 1] = place
-            owners[place] = p
     mark(shape, bodies, cells.marks, cells.centres, least, most, time)
-    found = _search(shape, bodies, cells, nx, ny, nz, 2 * (shape.radius + inner))
+    found = _search(shape, bodies, pairs, cells, 2 * (shape.radius + inner), piece)
     if found < 0:
         return FULL
-    _carry(pairs, cells, found, count)
-    mark(shape, bodies, pairs.wide_marks, pairs.wide_centres, least, most, time)
+    _carry(pairs, cells, found)
+    for p in range(cells.marks.shape[0]):
+        for d in range(7):
+            pairs.wide_marks[p, d] = cells.marks[p, d]
+    for i in range(cells.centres.shape[0]):
+        for d in range(3):
+            pairs.wide_centres[i, d] = cells.centres[i, d]
     pairs.counts[0] = found
     pairs.counts[2] += 1
     return GOOD
 
 
-@part
-def _cell(offset: float, size: float, last: int) -> int:
-    return int(min(max(offset / size, 0.0), float(last)))
+@inlined
+def _bin(offset: float, size: float, last: int) -> int:
+    """Which bin an offset is in; what lies beyond the last one is in it, and so is what is no number."""
+    return int(min(offset / size, float(last))) if offset > 0.0 else 0
+
+
+@inlined
+def _box(marks: Array, p: int, d: int, more: float) -> tuple[float, float]:
+    """Lower and upper bound of a link along an axis with its skin and more [m]."""
+    start, end, more = marks[p, d], marks[p, 3 + d], more + marks[p, 6]
+    return min(start, end) - more, max(start, end) + more
 
 
 @part
-def _cuts(segments: Array, p: int, piece: float) -> int:
-    squared = segments[p, 3] ** 2 + segments[p, 4] ** 2 + segments[p, 5] ** 2
-    return math.ceil(math.sqrt(squared) / piece)
-
-
-@part
-def _search(shape: Shape, bodies: Bodies, cells: Cells, nx: int, ny: int, nz: int, bare: float) -> int:
-    """Write all pairs into the scratch list of `cells`; their number, or -1 where there is no room.
+def _search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: float) -> int:
+    """Write all pairs into the scratch list of `cells`, in rows by the first link.
 
     Args:
         shape: what all smarticles have in common.
         bodies: the smarticles.
-        cells: filled; `first`, `second` and the notes of what was seen are written.
-        nx: cells along x.
-        ny: cells along y.
-        nz: cells along z.
+        pairs: tells owners and kinds.
+        cells: `marks` are filled; the rest is written.
         bare: reach of a pair without skins [m].
+        piece: width of a strip [m].
+
+    Returns:
+        Their number, or -1 where there is no room.
     """
-    segments, owners, starts, marks = bodies.segments, cells.owners, cells.starts, cells.marks
-    seen, visited, places, begins = cells.seen, cells.visited, cells.cells, cells.begins
-    first, second = cells.first, cells.second
-    count, each = segments.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
-    capacity = first.shape[0]
+    marks, starts, keys, order, boxes = cells.marks, cells.starts, cells.keys, cells.order, cells.boxes
+    owner, close = pairs.owner, cells.close
+    count = marks.shape[0]
+    x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for p in range(count):
-        seen[p] = -1
-    for cell in range(nx * ny * nz):
-        visited[cell] = -1
-    boxes = cells.boxes
+        low, high = _box(marks, p, 0, 0.5 * bare)
+        x0, x1 = min(x0, low), max(x1, low)
+        low, high = _box(marks, p, 1, 0.5 * bare)
+        y0, y1, tallest = min(y0, low), max(y1, low), max(tallest, high - low)
+    room = starts.shape[0] - 2
+    ny = 1 + _bin(y1 - y0, piece, int(math.sqrt(room)) - 1)
+    nx = 1 + _bin(x1 - x0, 0.25 * piece, room // ny - 1)
+    # As wide as need be: of links that are far away, the last strips and bins have all.
+    width, size = piece, 0.25 * piece
+    total = nx * ny
+    for key in range(total + 2):
+        starts[key] = 0
     for p in range(count):
+        x, _ = _box(marks, p, 0, 0.5 * bare)
+        y, _ = _box(marks, p, 1, 0.5 * bare)
+        key = _bin(y - y0, width, ny - 1) * nx + _bin(x - x0, size, nx - 1)
+        keys[p] = key
+        starts[key + 1] += 1
+    for key in range(total):
+        starts[key + 1] += starts[key]
+    starts[total + 1] = count
+    # Filled from behind, each bin's start moves down to where it belongs: bin k is starts[k + 1] … starts[k + 2].
+    for p in range(count - 1, -1, -1):
+        place = starts[keys[p] + 1] - 1
+        starts[keys[p] + 1] = place
+        order[place] = p
+    for m in range(count):
+        p = order[m]
         for d in range(3):
-            boxes[p, d] = min(marks[p, d], marks[p, 3 + d]) - marks[p, 6]
-            boxes[p, 3 + d] = max(marks[p, d], marks[p, 3 + d]) + marks[p, 6]
-    total = 0
+            boxes[m, d], boxes[m, 3 + d] = _box(marks, p, d, 0.5 * bare)
+    rows, lower, upper = cells.rows, cells.lower, cells.upper
+    for p in range(count + 2):
+        rows[p] = 0
+    capacity, number = lower.shape[0], 0
+    for m in range(count):
+        p = order[m]
+        lx, ly, lz, hx, hy, hz = boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
+        own, mine, skin = owner[p], keys[p] // nx, bare + marks[p, 6]
+        inverse = shape.inverses[pairs.kind[p]]
+        column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
+        for strip in range(_bin(ly - tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
+            # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
+            begin = starts[strip * nx + column + (1 if strip >= mine else 2)]
+            if strip == mine:
+                begin = m + 1
+            # Written down and overwritten without a branch, as in `tighten`.
+            hits = 0
+            for n in range(begin, starts[strip * nx + last + 2]):
+                close[hits] = order[n]
+                hits += not (
+                    (boxes[n, 1] > hy)
+                    | (boxes[n, 4] < ly)
+                    | (boxes[n, 2] > hz)
+                    | (boxes[n, 5] < lz)
+                    | (boxes[n, 0] > hx)
+                )
+            boxed, hits = hits, 0
+            for n in range(boxed):
+                q = close[n]
+                close[hits] = q
+                hits += not (_off_lines(bodies.segments, p, q, skin + marks[q, 6]) | (owner[q] == own))
+            if number + hits > capacity:
+                return -1
+            for n in range(hits):
+                q = close[n]
+                lower[number], upper[number] = min(p, q), max(p, q)
+                number += _near(bodies.segments, p, q, skin + marks[q, 6], inverse, shape.inverses[pairs.kind[q]])
+    for k in range(number):
+        rows[lower[k] + 2] += 1
     for p in range(count):
-        x0, y0, z0 = boxes[p, 0] - bare, boxes[p, 1] - bare, boxes[p, 2] - bare
-        x1, y1, z1 = boxes[p, 3] + bare, boxes[p, 4] + bare, boxes[p, 5] + bare
-        # Links of the same smarticle come right after each other.
-        after = (p // each + 1) * each - 1
-        mine = bare + marks[p, 6]
-        for k in range(begins[p], begins[p + 1]):
-            cell = places[k]
-            a, b, c = cell // (ny * nz), (cell // nz) % ny, cell % nz
-            for aa in range(max(0, a - 1), min(nx, a + 2)):
-                for bb in range(max(0, b - 1), min(ny, b + 2)):
-                    for cc in range(max(0, c - 1), min(nz, c + 2)):
-                        other = (aa * ny + bb) * nz + cc
-                        if visited[other] == p:
-                            continue
-                        visited[other] = p
-                        # Links stand in order in a cell: from behind, until they have had their turn already.
-                        m = starts[other + 2] - 1
-                        begin = starts[other + 1]
-                        while m >= begin:
-                            q = owners[m]
-                            m -= 1
-                            if q <= after:
-                                break
-                            if seen[q] == p:
-                                continue
-                            seen[q] = p
-                            if (
-                                (boxes[q, 0] > x1)
-                                | (boxes[q, 1] > y1)
-                                | (boxes[q, 2] > z1)
-                                | (boxes[q, 3] < x0)
-                                | (boxes[q, 4] < y0)
-                                | (boxes[q, 5] < z0)
-                            ):
-                                continue
-                            reach = mine + marks[q, 6]
-                            if _near(segments, p, q, reach):
-                                if total == capacity:
-                                    return -1
-                                first[total] = p
-                                second[total] = q
-                                total += 1
-    return total
+        rows[p + 2] += rows[p + 1]
+    first, second = cells.first, cells.second
+    for k in range(number):
+        p = lower[k]
+        place = rows[p + 1]
+        rows[p + 1] = place + 1
+        first[place], second[place] = p, upper[k]
+    return number
 
 
 @part
-def _carry(pairs: Pairs, cells: Cells, found: int, links: int) -> None:
+def _carry(pairs: Pairs, cells: Cells, found: int) -> None:
     """Let the new list of `cells` take the place of the old one, with what contacts remember."""
-    rows, old = cells.rows, pairs.counts[0]
-    rows[:] = 0
-    for k in range(old):
-        rows[pairs.first[k] + 1] += 1
-    for p in range(links):
-        rows[p + 1] += rows[p]
+    rows, slip, used, kept = cells.rows, cells.slip, cells.used, 0
+    for k in range(pairs.counts[0]):
+        if pairs.used[k]:
+            cells.lower[kept], cells.upper[kept], used[kept] = pairs.first[k], pairs.second[k], pairs.used[k]
+            for slot in range(3):
+                for d in range(4):
+                    slip[kept, slot, d] = pairs.slip[k, slot, d]
+                    pairs.slip[k, slot, d] = 0.0
+            pairs.used[k] = 0
+            kept += 1
     for k in range(found):
-        p, q = cells.first[k], cells.second[k]
-        cells.used[k] = 0
+        pairs.first[k], pairs.second[k], pairs.used[k] = cells.first[k], cells.second[k], 0
+    for k in range(kept):
+        p, q = cells.lower[k], cells.upper[k]
         for m in range(rows[p], rows[p + 1]):
             if pairs.second[m] == q:
-                if pairs.used[m]:
-                    cells.used[k] = pairs.used[m]
-                    for slot in range(3):
-                        for d in range(4):
-                            cells.slip[k, slot, d] = pairs.slip[m, slot, d]
+                pairs.used[m] = used[k]
+                for slot in range(3):
+                    for d in range(4):
+                        pairs.slip[m, slot, d] = slip[k, slot, d]
                 break
-    for k in range(found):
-        pairs.first[k], pairs.second[k], pairs.used[k] = cells.first[k], cells.second[k], cells.used[k]
-        for slot in range(3):
-            for d in range(4):
-                pairs.slip[k, slot, d] = cells.slip[k, slot, d] if cells.used[k] else 0.0

@@ -32,6 +32,7 @@ class Shape(NamedTuple):
         radius: of the sphere that sweeps the links.
         offsets: (strands,) of the strands along the normal.
         kinds: (links,) which links carry contact: 0 barb 1, 1 the middle link, 2 barb 2.
+        inverses: (3,) inverse squares of the lengths of the links' axes [1/m²].
         reach: how far the axes of the links reach from the centre of mass, in the shape that it is poured in.
     """
 
@@ -47,6 +48,7 @@ class Shape(NamedTuple):
     radius: float
     offsets: Array
     kinds: NDArray[np.int64]
+    inverses: Array
     reach: float
 
 
@@ -60,6 +62,7 @@ def shape_of(particle: Particle) -> Shape:
     length, barb = boxes.middle_length, boxes.barb_length
     rows = particle.chain.rows
     reach = (boxes.thickness_normal - particle.chain.diameter) / 2
+    end, tip = length / 2 if barb > 0 else length / 2 - radius, max(0.0, barb - radius)
     barbed = barb > radius  # the tip of a shorter one is inside the sphere at the hinge
     return Shape(
         mass=boxes.mass,
@@ -69,11 +72,12 @@ def shape_of(particle: Particle) -> Shape:
         arm=barb / 2,
         middle_inertia=np.ascontiguousarray(inertias[1]),
         barb_inertia=np.ascontiguousarray(inertias[0]),
-        end=length / 2 if barb > 0 else length / 2 - radius,
-        tip=max(0.0, barb - radius),
+        end=end,
+        tip=tip,
         radius=radius,
         offsets=np.zeros(1) if rows == 1 else np.linspace(-reach, reach, rows),
         kinds=np.array([0, 1, 2] if barbed else [1], dtype=np.int64),
+        inverses=np.array([1 / extent**2 if extent > 0 else 0.0 for extent in (tip, 2 * end, tip)]),
         reach=_reach(boxes),
     )
 

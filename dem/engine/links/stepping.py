@@ -18,7 +18,7 @@ from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
 from dem.engine.links.shape import Shape
 
 LOST, WORK = 0, 1  # places in `totals`
-NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, PIECE = range(7)  # places in `skins`
+NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, STRIP = range(7)  # places in `skins`
 
 
 @part
@@ -42,14 +42,14 @@ def look_for_neighbours(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells
         pairs: written.
         cells: scratch.
         skins: (7,) of the tight and of the wide list: thinnest and thickest skin [m], time that skins are to be good
-            for [s]; then the longest piece of a link [m].
+            for [s]; then the width of a strip, see `build` [m].
     """
     if not moved(bodies, pairs.near_marks, pairs.near_centres):
         return GOOD
     # The tight list is good for less than its thickest skin, which the wide one leaves room for.
     if moved(bodies, pairs.wide_marks, pairs.wide_centres):
         inner, least, most = skins[NEAR_MOST], skins[WIDE_LEAST], skins[WIDE_MOST]
-        if build(shape, bodies, pairs, cells, inner, least, most, skins[WIDE_TIME], skins[PIECE]) == FULL:
+        if build(shape, bodies, pairs, cells, inner, least, most, skins[WIDE_TIME], skins[STRIP]) == FULL:
             return FULL
     tighten(shape, bodies, pairs, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
     return GOOD
@@ -133,7 +133,7 @@ def advance(
         bodies.load[:] = 0.0
         ground.force[:] = 0.0
         if motors is not None:
-            bodies.lever[:] = 0.0
+            bodies.shares[:] = 0.0
         lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
         if channel is None:
             lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)

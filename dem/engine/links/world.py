@@ -43,10 +43,12 @@ from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
 
-# Skins and the longest piece of a link, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
-NEAR_SKINS, WIDE_SKINS, PIECE = (0.04, 0.15), (0.12, 0.8), 1.0
-NEAR_STEPS, WIDE_STEPS = 6, 80  # that they are to last, about
+# Skins and the width of a strip of the search for neighbours, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
+NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
+NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built
+LISTS = ("first", "second", "slip", "used", "near")  # of pairs
+LOOKED = ("touching", "nearest")  # made anew in every step
 GROWTH = 1.5  # of a list that is full
 
 
@@ -109,15 +111,16 @@ class World:
             Law(law.normal_stiffness, law.tangential_stiffness, damping, damping * law.tangential_damping, friction)
             for damping, friction in ((law.normal_damping, law.friction), (law.wall_damping, law.wall_friction))
         )
-        self.each = len(self.shape.kinds) * len(self.shape.offsets)
+        self.kinds = np.tile(self.shape.kinds, len(self.shape.offsets))
+        self.each = len(self.kinds)
         self.bodies: Bodies = no_bodies(self.each)
-        self.pairs: Pairs = pairs_for(0, 0, 256)
-        self.cells: Cells = cells_for(0, 0, 0, 256, 64)
+        self.pairs: Pairs = pairs_for(0, self.kinds, 256)
+        self.cells: Cells = cells_for(0, 0, 256)
         self.ends = Ends(np.zeros((0, 2, SURFACES, 4)), np.zeros((0, 2), np.uint8))
         self.ledger: Array | None = np.zeros((256, 11)) if self.account else None
         self.out, self.row = np.zeros((ROWS, COLUMNS)), np.zeros(PLANE)
         diameter = 2 * self.shape.radius
-        self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, PIECE])
+        self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])
 
     @property
     def count(self) -> int:
@@ -146,7 +149,7 @@ class World:
         new, boxes = len(poses.positions), self.particle.boxes
         fresh = no_bodies(self.each)
         rigid = 3 if self.articulated else 1
-        sizes = {"segments": new * self.each, "motion": new * rigid}
+        sizes = {"segments": new * self.each, "motion": new * rigid, "shares": 3 * new if self.articulated else 0}
         fresh = Bodies(
             *(
                 np.zeros((sizes.get(name, new), *array.shape[1:]), array.dtype)
@@ -161,10 +164,9 @@ class World:
         for i in range(new):
             lay_out(self.shape, *boxes.angles, fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
-        links = self.count * self.each
         old = self.pairs
-        self.pairs = pairs_for(links, self.count, len(old.first))._replace(
-            first=old.first, second=old.second, slip=old.slip, used=old.used, near=old.near, counts=old.counts
+        self.pairs = pairs_for(self.count, self.kinds, len(old.first))._replace(
+            counts=old.counts, **{name: getattr(old, name) for name in (*LISTS, *LOOKED)}
         )
         self.forget_places()
         self._make_room_at_fixtures()
@@ -197,7 +199,10 @@ class World:
     def set_articulated(self, articulated: bool) -> None:
         """Have velocities for each link, or for whole smarticles."""
         self.articulated = articulated
-        self.bodies = self.bodies._replace(motion=np.zeros(((3 if articulated else 1) * self.count, 6)))
+        n = self.count
+        self.bodies = self.bodies._replace(
+            motion=np.zeros((3 * n if articulated else n, 6)), shares=np.zeros((3 * n if articulated else 0, 6))
+        )
 
     def forget_places(self) -> None:
         """Have neighbours looked for anew at the next step."""
@@ -209,16 +214,9 @@ class World:
         links = self.count * self.each
         capacity = max(capacity, 12 * links + 256, len(self.pairs.first))
         if capacity > len(self.pairs.first):
-            grown = (
-                longer(getattr(self.pairs, name), capacity) for name in ("first", "second", "slip", "used", "near")
-            )
-            first, second, slip, used, near = grown
-            self.pairs = self.pairs._replace(first=first, second=second, slip=slip, used=used, near=near)
-        longest = [self.shape.tip, 2 * self.shape.end, self.shape.tip]
-        piece = self.skins[-1]
-        pieces = sum(math.ceil(longest[kind] / piece + 1e-9) for kind in self.shape.kinds) * len(self.shape.offsets)
-        if len(self.cells.rows) != links + 1 or len(self.cells.first) != capacity:
-            self.cells = cells_for(links, self.count, pieces * self.count, capacity, 4 * pieces * self.count + 64)
+            self.pairs = self.pairs._replace(**{n: longer(getattr(self.pairs, n), capacity) for n in (*LISTS, *LOOKED)})
+        if len(self.cells.order) != links or len(self.cells.first) != capacity:
+            self.cells = cells_for(links, self.count, capacity)
         if self.ledger is not None:
             rows = 3 * capacity // 2 + 6 * links
             if len(self.ledger) < rows:
@@ -310,9 +308,10 @@ class World:
             for name, array in values._asdict().items():
                 if isinstance(array, np.ndarray):
                     found[f"{group}.{name}"] = array
-        for name in ("first", "second", "slip", "used"):
-            found[f"pairs.{name}"] = getattr(self.pairs, name)[:pairs]
-        found["pairs.near"] = self.pairs.near[:near]
+        for name in LISTS:
+            found[f"pairs.{name}"] = getattr(self.pairs, name)[: near if name == "near" else pairs]
+        for name in LOOKED:
+            found[f"pairs.{name}"] = getattr(self.pairs, name)[:0]
         return found
 
     def _groups(self) -> dict[str, Any]:

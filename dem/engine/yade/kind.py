@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dem.engine.demand import Demand
+from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.yade.construction import ADDS, in_order
 from dem.engine.yade.engine import YadeEngine
@@ -18,6 +19,9 @@ from dem.physics.motor import MotorLaw
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
+# Of that: a pour costs about half of the same time in the full pile, since the pile grows from nothing; motors mean
+# three bodies and four bonds for each smarticle, and looks.
+SHARES = {Doing.POUR: 0.5, Doing.ACTUATE: 1.7}
 
 
 class YadeKind:
@@ -26,8 +30,6 @@ class YadeKind:
     name = "yade"
     damps_once_per_look = True
     idle_knobs: tuple[str, ...] = ()
-    # Three bodies and four bonds each, and the motors' looks.
-    actuated_share = 1.7
 
     def version(self) -> str:
         """See the interface."""
@@ -55,9 +57,10 @@ class YadeKind:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
         return stable
 
-    def seconds_per_step(self, scene: Demand) -> float:
+    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
         """See the interface."""
-        return COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
+        per_step = COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
+        return per_step / time_step * SHARES.get(doing, 1.0)
 
     def build(self, scene: Demand, time_step: float) -> YadeEngine:
         """See the interface."""

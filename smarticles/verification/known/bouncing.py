@@ -9,17 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import ContactLaw
-from smarticles.verification.bench import (
-    BALL_MASS,
-    BALL_RADIUS,
-    Array,
-    G,
-    add,
-    ball_law,
-    law_of,
-    scene,
-)
+from smarticles.verification.bench import Array, G, add, ball_law, law_of, scene
 from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS
 from smarticles.verification.known.theory import bounced
 
 # The error varies with where in a step a contact begins and where it ends. Starts are spread over some steps, and

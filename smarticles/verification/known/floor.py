@@ -12,19 +12,10 @@ from dem.body.particle import Particle
 from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
-from smarticles.verification.bench import (
-    BALL_MASS,
-    BALL_RADIUS,
-    STIFFNESS,
-    Array,
-    G,
-    add,
-    ball_law,
-    law_of,
-    scene,
-)
+from smarticles.verification.bench import Array, G, add, ball_law, law_of, scene
 from smarticles.verification.check import Answer
 from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS, STIFFNESS
 
 FRICTION = 0.4
 

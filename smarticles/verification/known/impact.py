@@ -13,19 +13,10 @@ from scipy.spatial.transform import Rotation
 from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw, typical_effective_mass
 from dem.plan.steps import time_step
-from smarticles.verification.bench import (
-    BALL_MASS,
-    BALL_RADIUS,
-    STIFFNESS,
-    UPRIGHT,
-    Array,
-    add,
-    ball_law,
-    law_of,
-    scene,
-)
+from smarticles.verification.bench import UPRIGHT, Array, add, ball_law, law_of, scene
 from smarticles.verification.check import Answer
 from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS, STIFFNESS
 from smarticles.verification.known.theory import dashpot_impact
 
 CONTACT_TIME = math.pi * math.sqrt(BALL_MASS / STIFFNESS)  # s, of an elastic ball on the floor

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from smarticles.verification.bench import BALL_MASS, BALL_RADIUS, ball_law
+from smarticles.verification.bench import ball_law
 from smarticles.verification.check import Answer
 from smarticles.verification.hands.interface import Hands
+from smarticles.verification.hands.sizes import BALL_MASS, BALL_RADIUS
 from smarticles.verification.known.impact import CONTACT_TIME, ONSET, RESOLVED, ball_impact
 
 FRICTION = 0.4

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenes import small
 
 from dem.phases.actuate import Actuate
-from dem.phases.drive import Drive, actuated, drive
+from dem.phases.gaits.drive import Drive, actuated, drive
 from dem.phases.internal_oscillation import InternalOscillation
 from dem.phases.shape_change import ShapeChange
 from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash

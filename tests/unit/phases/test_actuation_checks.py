@@ -10,7 +10,7 @@ import pytest
 from scenes import chain
 
 from dem.errors import InputError
-from dem.phases.actuation_checks import actuation_warnings, overshoot
+from dem.phases.gaits.checks import actuation_warnings, overshoot
 from dem.plan.advice import warnings_of
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
@@ -154,7 +154,7 @@ def test_scene_without_actuated_phases_is_not_asked(scene_data: SceneData, monke
     bare = {"fidelity": {"control_interval_s": 3e-4, "pitch": 0.4}, "smarticle__aspect_ratio": 0}
     checked(scene_data, relax, **bare)
     refused(scene_data, SHAPE_CHANGE, **bare)
-    monkeypatch.setattr("dem.phases.actuated.check_actuated", lambda scene, index: 1 / 0)
+    monkeypatch.setattr("dem.phases.gaits.actuated.check_actuated", lambda scene, index: 1 / 0)
     checked(scene_data, relax)
     with pytest.raises(ZeroDivisionError):
         checked(scene_data, SHAPE_CHANGE)

@@ -73,3 +73,21 @@ def test_hooks_that_are_far_enough_apart_are_not() -> None:
     for apart, count in ((0.99 * enough, 1), (1.01 * enough, 0)):
         found = hooked([DEPOSIT, RELAX, PULL], lower_height_m=5e-3, upper_height_m=5e-3 + apart)
         assert len(found) == count
+
+
+def test_knobs_that_do_nothing_on_links_are_told_where_they_are_set() -> None:
+    assert warnings_of(small({"engine": "links"})) == ()
+    knobs = {"base": "draft", "pitch": 0.5, "wall_facets": 128}
+    assert warnings_of(small({"fidelity": knobs})) == ()
+    (told,) = warnings_of(small({"engine": "links", "fidelity": knobs}))
+    assert told == (
+        "fidelity: pitch (0.5), wall_facets (128) have no meaning on the engine links; leave out what does nothing"
+    )
+
+
+def test_a_plan_says_what_is_different_on_links() -> None:
+    lines = plan(small({"engine": "links", "fidelity": "reference"})).to_text().splitlines()
+    assert "smarticles of smooth links of 2 strands" in lines[0]
+    assert lines[1] == (
+        "engine links: fidelity.rows are strands; pitch, wall_facets, hinge_stiffness_N_per_m have no meaning here"
+    )

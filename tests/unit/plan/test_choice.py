@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -86,12 +87,16 @@ def test_the_cheapest_within_the_error_or_the_finest_within_the_hours(
         (
             0.01,
             4.0,
-            "--max-error 0.01 and --max-hours 4 contradict each other: reference, the cheapest within the error, is "
-            "expected to take 30 h; accuracy goes first, so the hours give way: --max-hours 30; or accept standard "
-            r"\(φ_f -0.020 ± 0.010\) with --max-error 0.02",
+            "--max-error 0.01 and --max-hours 4 contradict each other: reference on yade, the cheapest within the "
+            "error, is expected to take 30 h; accuracy goes first, so the hours give way: --max-hours 30; or accept "
+            r"standard on yade \(φ_f -0.020 ± 0.010\) with --max-error 0.02",
         ),
         (0.03, 0.1, "so the hours give way: --max-hours 2$"),
-        (None, 0.1, "--max-hours 0.1: even draft is expected to take 0.5 h; give --max-hours 0.5 or a smaller scene"),
+        (
+            None,
+            0.1,
+            "--max-hours 0.1: even draft on yade is expected to take 0.5 h; give --max-hours 0.5 or a smaller scene",
+        ),
     ],
 )
 def test_limits_that_cannot_be_kept_say_which_gives_way(
@@ -105,7 +110,9 @@ def test_limits_that_cannot_be_kept_say_which_gives_way(
 def test_an_unknown_error_is_within_no_limit() -> None:
     unknown = [expected("draft", math.nan, 0.5), expected("standard", 0.02, 2.0)]
     assert pick(unknown, max_error=0.5, max_hours=None)[0].measured.fidelity == "standard"
-    with pytest.raises(InputError, match="no fidelity of the table is known to be within; the best is standard"):
+    with pytest.raises(
+        InputError, match="no fidelity of the table is known to be within; the best is standard on yade"
+    ):
         pick(unknown, max_error=0.01, max_hours=None)
     # What is suggested is enough.
     assert pick(unknown, max_error=0.02, max_hours=None)[0].measured.fidelity == "standard"
@@ -124,11 +131,60 @@ def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -
     assert "(one core, corrected by 2 as measured at this fidelity; machines differ" in chosen.planned.to_text()
     assert "(one core; machines differ by a factor of two)" in plain.to_text()
     text = chosen.to_text()
-    assert text.startswith("fidelity standard: the cheapest within --max-error 0.03\nexpected: ")
+    assert text.startswith("engine yade, fidelity standard: the cheapest within --max-error 0.03\nexpected: ")
     assert "φ_0 +0.010 ± 0.015, φ_f -0.020 ± 0.020 (3 seeds)" in text
     assert "allows an error up to 0.04, more than --max-error 0.03" in text
-    assert text.endswith("use it: --set fidelity=standard")
+    assert text.endswith("use it: --engine yade --set fidelity=standard")
     assert chosen.to_dict()["errors"][1] == {"of": "φ_f", "value": -0.02, "band": 0.02}
+
+
+BOTH = f"""\
+{HEADER}
+fidelity,draft,,base,3,0.7,60,shake,1.5,-9,1.5,9,2,-30,12,resolved
+fidelity,reference,,x,3,0.7,60,shake,1,0,1,0,1.2,0,5,reference
+engine,yade draft,,yade-draft,3,0.7,60,shake,1.5,-2,1.5,6,2,-30,12,resolved
+engine,yade standard,,yade-standard,3,0.7,60,shake,1,1,1.5,-2,2,-20,10,not resolved
+engine,yade reference,,yade-reference,0,,,,,,,,,,,unknown
+engine,links draft,,links-draft,20,0.7,60,shake,1,3,1,7,1,-20,2,resolved
+engine,links standard,,base,20,0.7,60,shake,1,1,1,2,1,-20,2,resolved
+engine,links reference,,x,20,0.7,60,shake,1,-1,1,0.5,1.2,1,5,not resolved
+engine,links converged,,y,20,0.7,60,shake,1,0,1,0,1.2,0,5,reference
+"""
+
+
+def test_engines_are_chosen_between_against_one_reference(tmp_path: Path) -> None:
+    file = tmp_path / "both.csv"
+    file.write_text(BOTH, encoding="utf-8")
+    table = read_table(file)
+    assert table.reference == "links converged"
+    names = [one.name for one in table.fidelities]
+    assert names == ["draft on yade", "standard on yade", "draft on links", "standard on links", "reference on links"]
+    scene = scene_of()
+    chosen = choose(scene, table, max_error=0.03)
+    assert (chosen.engine, chosen.fidelity) == ("links", "standard")
+    assert chosen.planned == plan(scene_of(engine="links", fidelity="standard")).corrected(1)
+    assert chosen.to_text().startswith("engine links, fidelity standard: the cheapest within --max-error 0.03\n")
+    assert chosen.to_text().endswith("use it: --engine links --set fidelity=standard")
+    assert chosen.to_dict()["engine"] == "links"
+    # The reference where the hours allow it, whatever stands before or after it in the table.
+    assert choose(scene, table, max_hours=1e6).expected.measured.name == "reference on links"
+    own = choose(scene, read_table(file, engine="yade"), max_error=0.03)
+    assert (own.engine, own.fidelity) == ("yade", "standard")
+    assert not any("no finished runs" in note for note in own.notes)
+
+
+def test_of_what_the_hours_allow_the_most_exact_is_taken() -> None:
+    links = replace(expected("standard", 0.01, 0.1), measured=replace(THREE[0].measured, engine="links"))
+    assert pick([*THREE[:2], links], max_error=None, max_hours=4)[0] is THREE[1]
+    exact = replace(links, measured=replace(expected("standard", 0.01, 0.1).measured, engine="links"))
+    assert pick([*THREE[:2], exact], max_error=None, max_hours=4)[0] is exact
+
+
+def test_an_engine_that_the_table_does_not_tell_of_is_refused(table_file: Path) -> None:
+    with pytest.raises(
+        InputError, match="tells nothing of the engine links, only of yade; leave --engine out, or make"
+    ):
+        read_table(table_file, engine="links")
 
 
 def test_an_assured_error_needs_no_caution_and_another_scene_does(table_file: Path) -> None:

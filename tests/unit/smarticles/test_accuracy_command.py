@@ -117,14 +117,14 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
 
     limited = smarticles("plan", base, "--max-error", "0.05", "--table", table)
     assert limited.status == 0
-    assert limited.out.startswith("fidelity standard: the cheapest within --max-error 0.05\n")
+    assert limited.out.startswith("engine yade, fidelity standard: the cheapest within --max-error 0.05\n")
     assert "smarticles of 25 spheres" in limited.out
     answer = json.loads(smarticles("plan", base, "--max-hours", "1000", "--table", table, "--json").out)
     assert answer["choice"]["fidelity"] == "reference"
     assert answer["spheres_per_smarticle"] > 100
     refused = smarticles("plan", base, "--max-error", "0.001", "--max-hours", "0.01", "--table", table)
     assert refused.status == 2
-    assert "contradict each other: reference, the cheapest within the error" in refused.err
+    assert "contradict each other: reference on yade, the cheapest within the error" in refused.err
     assert "the hours give way" in refused.err
 
 

@@ -206,7 +206,7 @@ def finished_study(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) 
             frames_per_phase=2,
         )
         manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest["scene_sha256"] = point.scene_sha256
+        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
     # What remains fails before YADE is needed.
     (out / "scenes" / f"{points[-1].name}.yaml").write_text("count: []")
@@ -217,19 +217,19 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     said = smarticles("study", "gravish", "--quick", "--out", finished_study)
     assert said.status == 1
     lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 9 runs instead of 24; ")
-    assert "shake_s: 1.5 instead of 5.0" in lines[0]
-    assert lines[2].split()[:4] == ["phi_0", "0.4", "3", "0.1050"]
+    assert lines[0].startswith("not the full study: 18 runs instead of 73; ")
+    assert "shake_s: 1.5 instead of 20.0" in lines[0]
+    assert lines[2].split()[:5] == ["links", "phi_0", "0.4", "3", "0.1050"]
     assert "Is phi_f above phi_0 at every l/w? YES" in lines
     results = finished_study / "results"
     figures = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
     assert figures
     assert all(Path(figure).is_file() for figure in figures)
-    assert lines[-1] == f"picture of lw0.70_seed1: {results / 'run.png'}"
+    assert lines[-1] == f"picture of lw0.70_links_seed1: {results / 'run.png'}"
     assert (results / "run.png").is_file()
-    assert "1 of 9 runs are missing: lw1.00_seed3: " in said.err.splitlines()[-1]
+    assert "1 of 18 runs are missing: lw1.00_yade_seed1: " in said.err.splitlines()[-1]
     missing = (results / "missing.csv").read_text(encoding="utf-8")
-    assert "lw1.00_seed3" in missing
+    assert "lw1.00_yade_seed1" in missing
     # The quick analysis leaves out what takes seconds per run.
     header = (results / "runs.csv").read_text(encoding="utf-8").splitlines()[0]
     assert "phi_f voxel [-]" in header
@@ -240,8 +240,8 @@ def test_a_study_can_be_analysed_without_starting_a_run(finished_study: Path, sm
     said = smarticles("study", "gravish", "--quick", "--analyse", "--out", finished_study)
     assert said.status == 0
     assert "Is phi_f above phi_0 at every l/w? YES" in said.out.splitlines()
-    assert "lw1.00_seed3" in (finished_study / "results" / "missing.csv").read_text(encoding="utf-8")
-    assert not (finished_study / "runs" / "lw1.00_seed3").exists()
+    assert "lw1.00_yade_seed1" in (finished_study / "results" / "missing.csv").read_text(encoding="utf-8")
+    assert not (finished_study / "runs" / "lw1.00_yade_seed1").exists()
 
 
 def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, smarticles: Smarticles) -> None:
@@ -263,6 +263,7 @@ def test_the_study_of_procedures_is_analysed(
         run = write_run(
             out / "runs" / point.name,
             aspect_ratio=values["l_over_w"],
+            seed=values["seed"],
             theta=values["theta_deg"],
             count=6,
             frames_per_phase=1,
@@ -274,23 +275,23 @@ def test_the_study_of_procedures_is_analysed(
             work=1e-5,
         )
         manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest["scene_sha256"] = point.scene_sha256
+        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
     monkeypatch.setattr("studies.procedures.figures.draw", lambda *_, **__: [])
     said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 11 runs instead of 87; ")
-    assert lines[1].split()[:10] == ["procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again", "⟨N⟩"]
-    assert [line.split()[0] for line in lines[2:14]] == (
+    assert lines[0].startswith("not the full study: 36 runs instead of 151; ")
+    assert lines[1].split()[:10] == ["engine", "procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again"]
+    assert [line.split()[1] for line in lines[2:14]] == (
         ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3
     )
     assert "FOUND: Shape change: the centre of mass rises when the smarticles straighten" in lines
     assert "NO DATA: Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5" in lines
     findings = (out / "results" / "findings.csv").read_text(encoding="utf-8")
-    assert "Study procedures, fidelity draft: 10 of 11 runs, 1 missing" in findings
-    assert "internal30_lw1.00_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
+    assert "Study procedures, fidelity draft, engine links and yade: 35 of 36 runs, 1 missing" in findings
+    assert "internal10_lw0.70_yade_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -310,6 +311,24 @@ def test_what_a_study_does_not_have_is_refused(
     said = smarticles("study", "sensitivity", *words, "--out", tmp_path / "out")
     assert said.status == 2
     assert said.err.startswith(f"smarticles: error: {message}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("sweep", sweep_file, "--engine", "links", "--out", tmp_path / "out")
+    assert said.status == 2
+    assert "constants: there is no 'engine' that could be links; add `engine: yade` there, and" in said.err
+    said = smarticles("sweep", study_file("gravish"), "--engine", "links", "--dry-run")
+    assert said.out.splitlines()[-1].startswith("64 runs, ")
+    said = smarticles("sweep", study_file("gravish"), "--engine", "yode", "--dry-run")
+    assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
+
+
+def test_a_study_of_both_engines_refuses_one(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("study", "engines", "--engine", "links", "--out", tmp_path / "out")
+    assert said.status == 2
+    assert said.err.startswith("smarticles: error: --engine links: study engines cannot be run on it (")
+    assert len(said.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -360,7 +379,7 @@ def test_a_study_of_sensitivity_is_analysed(
             packing=(0.1, 0.1, after),
         )
         manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest["scene_sha256"] = point.scene_sha256
+        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
     said = smarticles("study", study, "--out", out)

@@ -20,6 +20,7 @@ from studies.accuracy.measure import (
     COMPARED,
     COST,
     COUNT,
+    ENGINE,
     EXPECTED,
     GAP,
     RESIDUAL,
@@ -51,6 +52,7 @@ def table_of(phi_f, rungs=STEPS, *, phi_0=None):
     rows = [
         {
             **{VARIANT: setting, SEED: seed, ASPECT: 0.7, COUNT: 60, ACTIVITY: "shake", TIME_STEP: 1e-5, SPHERES: 18},
+            ENGINE: "yade",
             **{COST: COSTS[setting], WALL: 10.0, EXPECTED: 1.0, RESIDUAL: math.nan, GAP: math.nan},
             **{COMPARED["phi_0"]: (phi_0 or {}).get(setting, 0.1) + 1e-3 * seed, COMPARED["phi_f"]: value},
             COMPARED["height"]: 3e-3 + 1e-4 * seed,

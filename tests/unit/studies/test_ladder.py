@@ -7,15 +7,16 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.drive import actuated
+from dem.phases.gaits.drive import actuated
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
-from dem.setting.fidelity import FIDELITIES
+from dem.setting.fidelity import FIDELITIES, fidelities
 from studies.accuracy.ladder import (
     KNOBS,
     Ladder,
     affordable,
     build_ladder,
+    default_seeds,
     ladder_sweep,
     parse_knobs,
     parse_seeds,
@@ -143,11 +144,60 @@ def test_settings_that_differ_in_nothing_but_their_name_run_once(tmp_path: Path)
 
 def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
     ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
-    assert ladder.knobs == tuple(KNOBS)
+    assert ladder.knobs == tuple(knob for knob in KNOBS if knob != "engine")
     assert [name for name, _ in labels(ladder, "control")] == ["0.0004 s", "0.0002 s", "0.0001 s"]
     assert [name for name, _ in labels(ladder, "hinge")] == ["5000 N/m", "10000 N/m", "20000 N/m"]
     assert ladder.scenes["control-0.0001"].fidelity.control_interval_s == 1e-4
     assert ladder.scenes["hinge-x2"].fidelity.hinge_stiffness_N_per_m == 10000
+
+
+def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, OSCILLATION, "engine=links", "fidelity=standard")
+    ladder = build_ladder(scene, source="scene.yaml")
+    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "control", "fidelity")
+    own = f"{scene.fidelity.stiffness_N_per_m:g} N/m"
+    values = [f"{k:g} N/m" for k in (125, 250, 500, 1000, 2000, 4000)]
+    assert labels(ladder, "stiffness") == [
+        (value, BASE if value == own else f"stiffness-{value.removesuffix(' N/m')}") for value in values
+    ]
+    assert [name for name, _ in labels(ladder, "section")] == ["1 strand", "2 strands", "3 strands"]
+    idle = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
+    assert len({tuple(getattr(one.fidelity, key) for key in idle) for one in ladder.scenes.values()}) == 1
+    # Named fidelities are those of the engine, and run once where a knob alone makes them.
+    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference", "converged"]
+    for rung in ladder.rungs:
+        if rung.knob == "fidelity" and rung.value != "converged":
+            turned = ladder.scenes[rung.setting].fidelity.model_dump()
+            assert {key: turned[key] for key in turned if key != "base"}.items() >= fidelities("links")[
+                rung.value
+            ].items()
+    with pytest.raises(InputError, match="--knobs: hinge turns nothing: the engine links has no pins"):
+        build_ladder(scene, source="scene.yaml", knobs=["hinge"])
+
+
+@pytest.mark.parametrize("engine", ["yade", "links"])
+def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: str, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SCENE, f"engine={engine}", "fidelity=standard")
+    ladder = build_ladder(scene, source="scene.yaml", knobs=["engine"])
+    found = dict(labels(ladder, "engine"))
+    assert list(found) == [*(f"{one} {name}" for one in ("yade", "links") for name in FIDELITIES), "links converged"]
+    assert found[f"{engine} standard"] == BASE
+    assert ladder.references()["engine"].label == "links converged"
+    finer, finest = (ladder.scenes[found[f"links {name}"]].fidelity for name in ("converged", "reference"))
+    assert finer.rows > finest.rows
+    assert finer.stiffness_N_per_m > finest.stiffness_N_per_m
+    del found["links converged"]
+    for name, setting in found.items():
+        one = ladder.scenes[setting]
+        assert one.engine == name.split()[0]
+        assert one.fidelity.model_dump().items() >= fidelities(one.engine)[name.split()[1]].items()
+    points = {point.name: point.scene for point in expand(ladder_sweep(scene, ladder, (7,)))}
+    assert {points[f"{setting}_seed7"].engine for setting in found.values()} == {"yade", "links"}
+
+
+def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
+    assert default_seeds(scene_of(tmp_path)) == (1, 2, 3)
+    assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
 
 
 def test_types_of_phase_that_actuate_are_those_of_the_simulator(tmp_path: Path) -> None:
@@ -207,6 +257,10 @@ def test_knobs_are_known_and_in_order() -> None:
 
 def test_seeds_are_whole_numbers_each_once() -> None:
     assert parse_seeds("3, 1,20") == (3, 1, 20)
+    assert parse_seeds("1-3,7") == (1, 2, 3, 7)
+    for text in ("3-1", "0-99999"):
+        with pytest.raises(InputError, match=f"{text} must go up, by fewer than 1000"):
+            parse_seeds(text)
     for text in ("", "1,x", "1.5", "-1", "²"):
         with pytest.raises(InputError, match="must be whole numbers from 0, such as 1,2,3"):
             parse_seeds(text)

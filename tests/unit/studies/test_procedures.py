@@ -13,8 +13,8 @@ from synthetic import SyntheticRun, write_run
 from dem.errors import InputError
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
+from studies.base.activity import ENERGY, HALF, HEIGHT, QUANTITIES, STRAIGHT, half_compaction
 from studies.base.procedures import CROSSINGS, PHI, PROCEDURE, THETA
-from studies.procedures.measure import ENERGY, HALF, HEIGHT, QUANTITIES, STRAIGHT, half_compaction
 from studies.procedures.study import Procedures
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study procedures --out 'my study'"}

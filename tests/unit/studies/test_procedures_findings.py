@@ -8,9 +8,9 @@ import pytest
 
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import findings_table
+from studies.base.activity import ENERGY, HALF, HEIGHT, PHI_ACTIVE, QUANTITIES, STRAIGHT
 from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.procedures.findings import findings
-from studies.procedures.measure import ENERGY, HALF, HEIGHT, PHI_ACTIVE, QUANTITIES, STRAIGHT
 
 ASPECTS = (0.4, 0.55, 0.7, 0.85, 1.0)
 AMPLITUDES = {0.4: (5, 10, 15), 0.5: (5, 10, 15, 20), 0.7: (5, 10, 15, 20, 30), 1.0: (5, 10, 15, 20, 30)}

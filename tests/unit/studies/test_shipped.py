@@ -22,7 +22,7 @@ from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.base.shipped import differences
 from studies.registry import STUDIES, study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep_file import load_sweep
+from templates.sweep.sweep_file import load_sweep, on_engine
 
 FOLDER = Path(studies.__file__).parent
 
@@ -34,21 +34,65 @@ def points(*, quick: bool) -> list[Point]:
 def test_the_full_study_is_the_papers() -> None:
     with (FOLDER / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    found = points(quick=False)
+    found = [point for point in points(quick=False) if not point.again]
+    # Seed by seed, so that an interrupted study has all aspect ratios.
     assert [(p.scene.smarticle.aspect_ratio, p.scene.count, p.scene.seed) for p in found] == [
-        (float(row["l_over_w"]), int(row["n"]), seed) for row in rows for seed in (1, 2, 3)
+        (float(row["l_over_w"]), int(row["n"]), seed) for seed in range(1, 9) for row in rows
     ]
-    assert len(found) == 24
-    assert found[9].name == "lw0.70_seed1"
-    for point, row in zip(found[::3], rows, strict=True):
+    assert len(found) == 64
+    assert {point.scene.engine for point in found} == {"links"}
+    assert found[3].name == "lw0.70_links_seed1"
+    for point, row in zip(found[:8], rows, strict=True):
         deposit, rest, shake, again = point.scene.phases
         assert isinstance(deposit, Deposit)
         assert deposit.per_layer == int(row["per_layer"])
         assert isinstance(shake, Shake)
-        assert (shake.duration_s, shake.frequency_hz, shake.peak_acceleration_g) == (5.0, 30, 2)
+        assert (shake.duration_s, shake.frequency_hz, shake.peak_acceleration_g) == (20.0, 30, 2)
         assert isinstance(rest, Relax)
         assert isinstance(again, Relax)
         assert rest.duration_s == again.duration_s == 0.5
+
+
+@pytest.mark.parametrize("name", ["gravish", "procedures"])
+def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
+    found = expand(load_sweep(study_file(name)))
+    again = [point for point in found if point.again]
+    assert again == found[-len(again) :]
+    assert len(again) == {"gravish": 9, "procedures": 6}[name]
+    for point in again:
+        assert point.scene.engine == "yade"
+        twin = next(p for p in found if p.name == point.name.replace("yade", "links"))
+        assert twin.scene.model_copy(update={"engine": "yade"}) == point.scene
+        # What is random comes from the seed alone.
+        assert twin.scene.seed_for("poses") == point.scene.seed_for("poses")
+
+
+@pytest.mark.parametrize("name", sorted(set(STUDIES) - {"engines"}))
+@pytest.mark.parametrize("engine", ["yade", "links"])
+def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
+    sweep = load_sweep(study_file(name))
+    assert isinstance(sweep.content.constants["engine"], str)
+    found = expand(on_engine(sweep, engine))
+    assert {point.scene.engine for point in found} == {engine}
+    assert not any(point.again for point in found)
+
+
+def test_the_study_of_engines_pairs_every_run() -> None:
+    for quick in (False, True):
+        found = expand(load_sweep(study_file("engines", quick=quick)))
+        assert len(found) == (20 if quick else 120)
+        for point in found:
+            assert point.scene.name == f"{point.values['case']}/{point.values['variant']}"
+            assert point.scene.engine == ("links" if point.values["variant"] == "links" else "yade")
+        names = {point.name for point in found}
+        assert {name.replace("_links_", "_yade_") for name in names} <= names
+        piles = [point for point in found if point.values["case"] != "chain"]
+        pitches = {point.values["variant"]: point.scene.fidelity.pitch for point in piles}
+        assert pitches["yade"] == 1.0
+        assert pitches["pitch-0.5"] == 0.5
+    sweep = load_sweep(study_file("engines"))
+    with pytest.raises(InputError, match=r"'engine' is a variable.*; leave --engine links out"):
+        on_engine(sweep, "links")
 
 
 def test_the_counts_are_those_of_the_reference() -> None:
@@ -58,19 +102,25 @@ def test_the_counts_are_those_of_the_reference() -> None:
             assert int(row["layers"]) * int(row["per_layer"]) == int(row["n"])
 
 
-def test_the_quick_variant_has_the_three_aspect_ratios_and_seeds() -> None:
+def test_the_quick_variant_shakes_five_aspect_ratios_for_gravishs_time_and_yade_for_less() -> None:
     found = points(quick=True)
-    assert {p.scene.smarticle.aspect_ratio for p in found} == {0.4, 0.7, 1.0}
-    assert {p.scene.seed for p in found} == {1, 2, 3}
+    once, again = [p for p in found if not p.again], [p for p in found if p.again]
+    assert {p.scene.smarticle.aspect_ratio for p in once} == {0.4, 0.5, 0.7, 0.9, 1.0}
+    assert {p.scene.seed for p in once} == {1, 2, 3}
+    assert {(p.scene.engine, p.values["shake_s"]) for p in once} == {("links", 20.0)}
+    assert [(p.scene.engine, p.scene.smarticle.aspect_ratio, p.values["shake_s"]) for p in again] == [
+        ("yade", ratio, 1.5) for ratio in (0.4, 0.7, 1.0)
+    ]
 
 
 def test_the_quick_variant_says_how_it_differs() -> None:
     lines = differences(points(quick=True), points(quick=False))
-    assert lines[0] == "9 runs instead of 24"
-    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
-    assert any(line.startswith("shake_s: ") and line.endswith(" instead of 5.0") for line in lines)
+    assert lines[0] == "18 runs instead of 73"
+    assert "l_over_w: only 0.4, 0.5, 0.7, 0.9, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
+    assert "shake_s: 1.5 instead of 20.0" in lines
+    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5, 6, 7, 8" in lines
     # Columns that follow from l/w, and what is the same, are not told.
-    assert not any(line.startswith(("n:", "layers:", "seed:", "title:")) for line in lines)
+    assert not any(line.startswith(("n:", "layers:", "engine:", "title:")) for line in lines)
 
 
 def test_nothing_differs_from_itself() -> None:
@@ -125,19 +175,20 @@ def procedures(*, quick: bool) -> list[Point]:
 
 
 def test_the_procedures_are_those_of_the_paper() -> None:
-    found = procedures(quick=False)
-    assert len(found) == 87
+    every = procedures(quick=False)
+    assert len(every) == 151
+    assert len({point.scene_sha256 for point in every}) == 151
+    found = every[:145]
     # Seed by seed, so that an interrupted study has all points.
-    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3) for _ in range(29)]
-    assert len({point.scene_sha256 for point in found}) == 87
+    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3, 4, 5) for _ in range(29)]
+    counts = {0.4: (494, 13), 0.5: (390, 13), 0.55: (349, 12), 0.7: (270, 10), 0.85: (242, 9), 1.0: (192, 8)}
     for point in found:
         deposit, rest, activity, again = point.scene.phases
         assert isinstance(deposit, Deposit)
-        assert deposit.per_layer == 10
         assert isinstance(rest, Relax)
         assert isinstance(again, Relax)
         assert rest.duration_s == again.duration_s == 0.5
-        assert point.scene.count == 100
+        assert (point.scene.count, deposit.per_layer) == counts[point.scene.smarticle.aspect_ratio]
         assert point.scene.fidelity.base == "draft"
         assert point.scene.recording.energy
         if isinstance(activity, Shake):
@@ -178,14 +229,14 @@ def test_amplitudes_are_left_out_by_the_rule_of_the_hinge() -> None:
 
 def test_the_quick_procedures_say_how_they_differ() -> None:
     found = procedures(quick=True)
-    assert len(found) == 11
-    assert {point.scene.seed for point in found} == {1}
+    assert len(found) == 36
     lines = differences(found, procedures(quick=False))
-    assert lines[0] == "11 runs instead of 87"
-    assert {"count: 60 instead of 100", "shake_s: 2.0 instead of 5.0", "oscillate_s: 2.0 instead of 5.0"} <= set(lines)
+    assert lines[0] == "36 runs instead of 151"
+    assert {"share: 0.25 instead of 1.0", "shake_s: 2.0 instead of 5.0"} <= set(lines)
+    assert "oscillate_s: 2.0 instead of 5.0" in lines
     assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.55, 0.7, 0.85, 1.0" in lines
     assert "theta_deg: only 0, 10, 30 of 0, 5, 10, 15, 20, 30" in lines
-    assert "seed: only 1 of 1, 2, 3" in lines
+    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5" in lines
 
 
 def test_every_sweep_file_is_that_of_a_study_in_the_registry() -> None:

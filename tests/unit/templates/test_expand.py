@@ -9,7 +9,7 @@ from sweep_cases import SCENE, SWEEP, WriteSweep
 
 from dem.errors import InputError
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep_file import load_sweep
+from templates.sweep.sweep_file import load_sweep, on_engine
 
 COUNTS = "l_over_w,n,label\n0.4,494,long\n0.7,270,middle\n1.0,192,short\n"
 
@@ -46,6 +46,70 @@ def test_seed_by_seed_all_points_have_the_first_seed_first(write_sweep: WriteSwe
     found = points(text, write_sweep)
     assert [point.name for point in found] == ["n10_seed2", "n20_seed2", "n10_seed1", "n20_seed1"]
     assert {point.scene_sha256 for point in found} == {point.scene_sha256 for point in points(SWEEP, write_sweep)}
+
+
+AGAIN = """\
+schema_version: 1
+name: test
+template: scene.yaml.j2
+run_name: "{{ engine }}{{ count }}_seed{{ seed }}"
+constants: {engine: links, share: 1.0}
+points:
+  grid: {n: [10, 20]}
+derived: {count: (share * n) | int}
+repeats: {seeds: [1, 2]}
+again: {constants: {engine: yade, share: 0.5}, only: {n: [20], seed: [2]}}
+"""
+ENGINE_SCENE = SCENE.replace("seed:", "engine: {{ engine }}\nseed:")
+
+
+def test_some_points_come_again_with_other_constants(write_sweep: WriteSweep) -> None:
+    found = points(AGAIN, write_sweep, scene=ENGINE_SCENE)
+    names = ["links10_seed1", "links10_seed2", "links20_seed1", "links20_seed2", "yade10_seed2"]
+    assert [point.name for point in found] == names
+    assert [point.again for point in found] == [False] * 4 + [True]
+    # What is derived follows.
+    assert (found[-1].scene.engine, found[-1].scene.count) == ("yade", 10)
+
+
+def test_on_one_engine_nothing_comes_again(write_sweep: WriteSweep) -> None:
+    sweep = load_sweep(write_sweep(AGAIN, scene=ENGINE_SCENE))
+    assert [point.name for point in expand(on_engine(sweep, "yade"))] == [
+        "yade10_seed1",
+        "yade10_seed2",
+        "yade20_seed1",
+        "yade20_seed2",
+    ]
+    with pytest.raises(InputError, match="there is no 'engine' that could be links"):
+        on_engine(load_sweep(write_sweep(SWEEP)), "links")
+    grid = AGAIN.replace("{n: [10, 20]}", "{n: [10, 20], engine: [links, yade]}").replace("engine: links, ", "")
+    grid = grid.replace("engine: yade, ", "")
+    with pytest.raises(InputError, match="'engine' is a variable, so its runs are on several"):
+        on_engine(load_sweep(write_sweep(grid, scene=ENGINE_SCENE)), "links")
+
+
+def test_points_that_come_again_count(write_sweep: WriteSweep) -> None:
+    with pytest.raises(InputError, match="5 runs, more than 4"):
+        expand(load_sweep(write_sweep(AGAIN, scene=ENGINE_SCENE)), max_points=4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("seed: [2]", "sead: [2]", r"again.only.sead: no such variable; did you mean 'seed'\?"),
+        ("seed: [2]", "seed: [3]", "again.only.seed: no point has 3; there are 1, 2"),
+        (
+            "constants: {engine: yade,",
+            "constants: {enigne: yade,",
+            "'enigne' is none of the constants",
+        ),
+        ("constants: {engine: yade, share: 0.5}, ", "", "again.constants: missing"),
+        ("only:", "olny:", r"again.olny: unknown key; did you mean 'only'\?"),
+    ],
+)
+def test_what_comes_again_must_be_known(write_sweep: WriteSweep, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        points(AGAIN.replace(old, new), write_sweep, scene=ENGINE_SCENE)
 
 
 def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:

@@ -168,7 +168,7 @@ def push_hooks(
     Args:
         shape: what all smarticles have in common.
         law: of contacts with fixtures.
-        bodies: the smarticles; `load`, `lever` and `deepest` are written.
+        bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         ground: the fixtures; `force` is written.
         hooks: the hooks; what contacts remember is brought up to date.
         hinged: None while welded.

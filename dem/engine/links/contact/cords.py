@@ -39,7 +39,7 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, dt: float) -> 
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `load` and `lever` are written.
+        bodies: the smarticles; `load` or `shares` is written.
         cords: the strings; `anchor`, `sums` and `knot` are written.
         hinged: None while welded.
         dt: time step [s].

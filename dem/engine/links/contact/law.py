@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Law
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined
 
 
-@part
+@inlined
 def resist(
     law: Law,
     load: float,
@@ -55,9 +55,10 @@ def resist(
     off = sx * nx + sy * ny + sz * nz
     sx, sy, sz = sx - off * nx + tx * dt, sy - off * ny + ty * dt, sz - off * nz + tz * dt
     stiffness, limit = law.shear * weight, law.friction * normal
-    squared = stiffness * stiffness * (sx * sx + sy * sy + sz * sz)
+    length = sx * sx + sy * sy + sz * sz
+    squared = stiffness * stiffness * length
     damping = law.shear_damping * weight
-    slip[3] = 0.5 * squared / stiffness
+    slip[3] = 0.5 * stiffness * length
     if squared > limit * limit:
         cut = limit / math.sqrt(squared)
         sx, sy, sz = sx * cut, sy * cut, sz * cut

@@ -25,8 +25,8 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array
-from dem.engine.links.compiler import part
-from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact.nearest import nearest
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
 POINTS, BARE = 3, 6
@@ -36,7 +36,7 @@ PX, NX, LOAD, CARRIED, WEIGHT = 0, 3, 6, 7, 8
 COLUMNS = 9
 
 
-@part
+@inlined
 def _clamp(value: float) -> float:
     return min(1.0, max(0.0, value))
 
@@ -64,27 +64,63 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
     ux, uy, uz, vx, vy, vz = p[3], p[4], p[5], q[3], q[4], q[5]
     a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
     d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
-    s, t = nearest_on_segments(a, b, c, d, e)
+    inverse_a, inverse_c = 1 / a, 1 / c
+    s, t = nearest(a, b, c, d, e, inverse_a, inverse_c)
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
     squared = x * x + y * y + z * z
     if squared >= diameter * diameter:
         return 0
-    distance = math.sqrt(squared)
+    return 1 + meet_at(
+        p, q, diameter, stiffness, bend_p, bend_q, a, b, c, d, e, s, t, inverse_a, inverse_c,
+        x, y, z, math.sqrt(squared), out,
+    )  # fmt: skip
+
+
+@inlined
+def meet_at(
+    p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool,
+    a: float, b: float, c: float, d: float, e: float, s: float, t: float,
+    inverse_a: float, inverse_c: float, x: float, y: float, z: float, distance: float, out: Array,
+) -> int:  # fmt: skip
+    """The same for links that touch, whose nearest points are known; the number of rows with bare forces.
+
+    Args:
+        p: as in `meet`.
+        q: as in `meet`.
+        diameter: as in `meet`.
+        stiffness: as in `meet`.
+        bend_p: as in `meet`.
+        bend_q: as in `meet`.
+        a: u·u, of vectors p + s u and q + t v along the links, see `nearest_on_segments`.
+        b: u·v.
+        c: v·v.
+        d: u·(p - q).
+        e: v·(p - q).
+        s: of the nearest point of the first link.
+        t: of that of the second one.
+        inverse_a: 1 / (u·u).
+        inverse_c: 1 / (v·v).
+        x: from the second nearest point to the first [m].
+        y: the same.
+        z: the same.
+        distance: of the two [m].
+        out: as in `meet`.
+    """
     deepest = diameter - distance
     _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * deepest, 1.0)
     out[1, WEIGHT] = out[2, WEIGHT] = 0.0
     out[ENERGY, 0] = 0.5 * stiffness * deepest * deepest
-    bare = _lie_along(p, q, a, b, c, d, e, deepest, diameter, stiffness, out)
+    bare = _lie_along(p, q, a, b, d, e, inverse_a, inverse_c, deepest, diameter, stiffness, out)
     if bend_p:
-        bare = _hinge(p, q, diameter, stiffness, True, _clamp(e / c), -1.0, bare, out)
+        bare = _hinge(p, q, diameter, stiffness, True, _clamp(e * inverse_c), -1.0, bare, out)
         if bend_q:
             bare = _hinge(p, q, diameter, stiffness, True, 0.0, 1.0, bare, out)
     if bend_q:
-        bare = _hinge(p, q, diameter, stiffness, False, _clamp(-d / a), -1.0, bare, out)
-    return 1 + bare
+        bare = _hinge(p, q, diameter, stiffness, False, _clamp(-d * inverse_a), -1.0, bare, out)
+    return bare
 
 
-@part
+@inlined
 def _note(
     out: Array, k: int, p: Array, q: Array, s: float, t: float,
     x: float, y: float, z: float, distance: float, load: float, weight: float,
@@ -94,19 +130,20 @@ def _note(
     row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
     row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
     row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
-    row[3], row[4], row[5] = x / distance, y / distance, z / distance
+    inverse = 1 / distance
+    row[3], row[4], row[5] = x * inverse, y * inverse, z * inverse
     row[6] = row[7] = load
     row[8] = weight
 
 
-@part
+@inlined
 def _lie_along(
-    p: Array, q: Array, a: float, b: float, c: float, d: float, e: float,
+    p: Array, q: Array, a: float, b: float, d: float, e: float, inverse_a: float, inverse_c: float,
     deepest: float, diameter: float, stiffness: float, out: Array,
 ) -> int:  # fmt: skip
     """Add what the two ends of the stretch carry over which links lie along each other; the number of bare forces."""
     # Where on the first link, in its lengths, are the second one's ends?
-    start, end = -d / a, (b - d) / a
+    start, end = -d * inverse_a, (b - d) * inverse_a
     lower, upper, lower_t, upper_t = start, end, 0.0, 1.0
     if b < 0.0:
         lower, upper, lower_t, upper_t = end, start, 1.0, 0.0
@@ -115,9 +152,9 @@ def _lie_along(
     own_lower, own_upper = lower <= 0.0, upper >= 1.0
     s1, s2, t1, t2 = lower, upper, lower_t, upper_t
     if own_lower:
-        s1, t1 = 0.0, _clamp(e / c)
+        s1, t1 = 0.0, _clamp(e * inverse_c)
     if own_upper:
-        s2, t2 = 1.0, _clamp((b + e) / c)
+        s2, t2 = 1.0, _clamp((b + e) * inverse_c)
     wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     x1, y1, z1 = wx + s1 * p[3] - t1 * q[3], wy + s1 * p[4] - t1 * q[4], wz + s1 * p[5] - t1 * q[5]
     first = x1 * x1 + y1 * y1 + z1 * z1
@@ -133,7 +170,8 @@ def _lie_along(
     grown, growth = 1.0, 0.0
     if along < 1.0:
         grown, growth = along * along * (3 - 2 * along), 6 * along * (1 - along) / diameter
-    x, y = (depth1 / deepest) ** 2, (depth2 / deepest) ** 2
+    inverse = 1 / deepest
+    x, y = (depth1 * inverse) ** 2, (depth2 * inverse) ** 2
     share = 1 - grown * x * y
     out[0, 6] = out[0, 7] = stiffness * deepest * share
     out[ENERGY, 0] *= 2 - share
@@ -154,7 +192,7 @@ def _lie_along(
     return bare
 
 
-@part
+@inlined
 def _hinge(
     p: Array, q: Array, diameter: float, stiffness: float, of_first: bool, other: float, sign: float,
     bare: int, out: Array,
@@ -172,7 +210,8 @@ def _hinge(
     row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
     row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
     row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
-    row[3], row[4], row[5] = load * x / distance, load * y / distance, load * z / distance
+    push = load / distance
+    row[3], row[4], row[5] = push * x, push * y, push * z
     # Friction and dashpots go with what is left: taken from the point that is nearest, and added to the same.
     rest = -load
     for _ in range(POINTS):

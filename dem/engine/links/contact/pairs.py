@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
-from dem.engine.links.contact.meeting import BARE, POINTS, meet
-from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links.contact.meeting import BARE, POINTS, meet_at
+from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
 
 
-@part
+@inlined
 def push(
     shape: Shape, bodies: Bodies, i: int, kind: int, hinged: Any,
     x: float, y: float, z: float, fx: float, fy: float, fz: float,
@@ -21,7 +22,7 @@ def push(
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `load` and, while articulated, `lever` are added to.
+        bodies: the smarticles; `load`, or `shares` while articulated, is added to.
         i: the smarticle.
         kind: the link.
         hinged: None while welded.
@@ -32,27 +33,19 @@ def push(
         fy: the same.
         fz: the same.
     """
-    load, position = bodies.load, bodies.position
+    position = bodies.position
+    row = i if hinged is None else 3 * i + kind
+    load = bodies.load if hinged is None else bodies.shares
     rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
-    mx, my, mz = ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
-    load[i, 0] += fx
-    load[i, 1] += fy
-    load[i, 2] += fz
-    load[i, 3] += mx
-    load[i, 4] += my
-    load[i, 5] += mz
-    if hinged is not None and kind != 1:
-        axes, row = bodies.axes, bodies.plane[i]
-        k, sign, hx = (0, -1.0, -shape.half - row[0]) if kind == 0 else (1, 1.0, shape.half - row[0])
-        hy = -row[1]
-        ax = axes[i, 0, 0] * hx + axes[i, 0, 1] * hy
-        ay = axes[i, 1, 0] * hx + axes[i, 1, 1] * hy
-        az = axes[i, 2, 0] * hx + axes[i, 2, 1] * hy
-        mx, my, mz = mx - (ay * fz - az * fy), my - (az * fx - ax * fz), mz - (ax * fy - ay * fx)
-        bodies.lever[i, k] += sign * (axes[i, 0, 2] * mx + axes[i, 1, 2] * my + axes[i, 2, 2] * mz)
+    load[row, 0] += fx
+    load[row, 1] += fy
+    load[row, 2] += fz
+    load[row, 3] += ry * fz - rz * fy
+    load[row, 4] += rz * fx - rx * fz
+    load[row, 5] += rx * fy - ry * fx
 
 
-@part
+@inlined
 def put_down(
     ledger: Array, rows: tuple[int, int], owners: tuple[int, int],
     x: float, y: float, z: float, fx: float, fy: float, fz: float, known: float,
@@ -87,7 +80,7 @@ def push_apart(
     Args:
         shape: what all smarticles have in common.
         law: of their contacts.
-        bodies: the smarticles; `load`, `lever` and `deepest` are written.
+        bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         pairs: pairs that may touch; `slip` and `used` are brought up to date.
         hinged: None while welded.
         ledger: of forces that dissipate; None where nobody asks.
@@ -98,34 +91,43 @@ def push_apart(
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, position, motion = bodies.segments, bodies.position, bodies.motion
-    links = shape.kinds.shape[0]
-    each = links * shape.offsets.shape[0]
-    diameter = 2 * shape.radius
+    owner, kind = pairs.owner, pairs.kind
+    diameter, inverses = 2 * shape.radius, shape.inverses
     reach = diameter * diameter
     lost = 0.0
+    # First who touches, without a branch that would be mispredicted, then what they do.
+    count = 0
     for k in range(pairs.counts[1]):
         pair = pairs.near[k]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
         vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
         wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-        s, t = nearest_on_segments(
-            ux * ux + uy * uy + uz * uz,
-            ux * vx + uy * vy + uz * vz,
-            vx * vx + vy * vy + vz * vz,
-            ux * wx + uy * wy + uz * wz,
-            vx * wx + vy * wy + vz * wz,
-        )
+        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        s, t = nearest(a, b, c, d, e, inverses[kind[p]], inverses[kind[q]])
         x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-        if x * x + y * y + z * z >= reach:
-            if pairs.used[pair]:
-                lost += _forget(pairs, pair, 7)
+        pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
+        count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
+    for k in range(count):
+        pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
+        p, q = pairs.first[pair], pairs.second[pair]
+        ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
+        vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
+        wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+        squared = x * x + y * y + z * z
+        if squared >= reach:
+            lost += _forget(pairs, pair, 7)
             continue
-        kind_p, kind_q = shape.kinds[p % links], shape.kinds[q % links]
-        found = meet(segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
-        if found == 0:  # by rounding
-            continue
-        i, j = p // each, q // each
+        i, j, kind_p, kind_q = owner[p], owner[q], kind[p], kind[q]
+        distance = math.sqrt(squared)
+        found = 1 + meet_at(
+            segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, a, b, c, d, e, s, t,
+            inverses[kind_p], inverses[kind_q], x, y, z, distance, out,
+        )  # fmt: skip
         row_i, row_j = i, j
         if hinged is not None:
             row_i, row_j = 3 * i + kind_p, 3 * j + kind_q
@@ -150,8 +152,9 @@ def push_apart(
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
             if carried > 0.0:
+                share = weight if carried == load else weight * carried / load
                 fx, fy, fz = resist(
-                    law, carried, weight * carried / load, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot]
+                    law, carried, share, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot]
                 )
             else:
                 lost += _forget(pairs, pair, 1 << slot)
@@ -169,13 +172,13 @@ def push_apart(
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
         # As deep as the step that begins would take it: beyond a diameter the links have passed through each other.
-        depth = diameter - (x * x + y * y + z * z) ** 0.5 + dt * closing
+        depth = diameter - distance + dt * closing
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
 
 
-@part
+@inlined
 def _forget(pairs: Pairs, pair: int, points: int) -> float:
     """Contacts at some points of a pair have ended.
 

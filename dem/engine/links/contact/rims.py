@@ -61,7 +61,7 @@ def push_rims(
     Args:
         shape: what all smarticles have in common.
         law: of contacts with fixtures.
-        bodies: the smarticles; `load`, `lever` and `deepest` are written.
+        bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         ground: the fixtures; `force` is written.
         rims: the edges; what contacts remember is brought up to date.
         hinged: None while welded.

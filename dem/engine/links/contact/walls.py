@@ -10,13 +10,13 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import CHANNEL, FLOOR, SURFACES, WALL, Array, Bodies, Ends, Ground, Law
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
 from dem.engine.links.contact.pairs import push, put_down
 from dem.engine.links.shape import Shape
 
 
-@part
+@inlined
 def rub(
     shape: Shape, law: Law, bodies: Bodies, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, part_of: int, load: float, weight: float, slip: Array,
@@ -27,7 +27,7 @@ def rub(
     Args:
         shape: what all smarticles have in common.
         law: of contacts with fixtures.
-        bodies: the smarticles; `load` and `lever` are written.
+        bodies: the smarticles; `load` or `shares` is written.
         ground: the fixtures; `force` is written.
         hinged: None while welded.
         ledger: of forces that dissipate; None where nobody asks.
@@ -70,7 +70,7 @@ def rub(
     ground.force[part_of, 2] -= fz
 
 
-@part
+@inlined
 def press(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, surface: int, part_of: int, depth: float,
@@ -111,7 +111,7 @@ def press(
         bodies.deepest[i] = max(bodies.deepest[i], 2 * depth)
 
 
-@part
+@inlined
 def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
     """Forget contacts of an end of a link that have ended.
 
@@ -146,15 +146,15 @@ def push_up(
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, radius = bodies.segments, shape.radius
-    links, lost = shape.kinds.shape[0], 0.0
+    links, lost, link = shape.kinds.shape[0], 0.0, -1
     floor, lift = ground.place[0], ground.place[1]
     walled, lifted = ground.flags[0] != 0, ground.flags[1] != 0
     tiers = ground.radii.shape[0]
     inner = ground.radii[tiers - 1] - radius
     least = inner * inner if walled else math.inf
     for p in range(segments.shape[0]):
-        kind = shape.kinds[p % links]
-        for end in range(0 if kind == 1 else 1, 2):
+        link = link + 1 if link + 1 < links else 0
+        for end in range(0 if shape.kinds[link] == 1 else 1, 2):
             x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
             if end == 1:
                 x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]
@@ -195,7 +195,7 @@ def push_up(
     return lost
 
 
-@part
+@inlined
 def _wall(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, x: float, y: float, z: float, lift: float, lifted: bool,
@@ -238,7 +238,7 @@ def _wall(
             )  # fmt: skip
 
 
-@part
+@inlined
 def _edge(
     shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
     p: int, end: int, surface: int, x: float, y: float, z: float, ex: float, ey: float, out: float, up: float,

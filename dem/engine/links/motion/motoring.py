@@ -19,8 +19,19 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
-from dem.engine.links.compiler import kernel, part
-from dem.engine.links.motion.planar import lagrange_force, lay_out, lay_out_near, mobility, momenta, rates, spin_of
+from dem.engine.links.compiler import inlined, kernel
+from dem.engine.links.motion.planar import (
+    inverses,
+    lagrange_force,
+    lay_out,
+    lay_out_at,
+    lay_out_near,
+    mobility,
+    momenta,
+    rates,
+    spin_by,
+    spin_of,
+)
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
@@ -69,7 +80,6 @@ def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
     for i in range(bodies.position.shape[0]):
         row = bodies.plane[i]
-        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], row)
         turn_axes(bodies, i)
         normal = along_normal(bodies, i)
         if motors.law >= SLIP:
@@ -95,7 +105,6 @@ def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
     total = 0.0
     for i in range(bodies.position.shape[0]):
         row = bodies.plane[i]
-        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], row)
         turn_axes(bodies, i)
         p = momenta(row, along_normal(bodies, i), bodies.rate[i, 0], bodies.rate[i, 1])
         for k in range(2):
@@ -139,7 +148,7 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interva
             motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]
 
 
-@part
+@inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
     """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
@@ -155,7 +164,7 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
     return 0.0 if halted else rate
 
 
-@part
+@inlined
 def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
     """Generalised forces of contacts on the angles [N m].
 
@@ -166,12 +175,22 @@ def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]
     fx = axes[i, 0, 0] * load[i, 0] + axes[i, 1, 0] * load[i, 1] + axes[i, 2, 0] * load[i, 2]
     fy = axes[i, 0, 1] * load[i, 0] + axes[i, 1, 1] * load[i, 1] + axes[i, 2, 1] * load[i, 2]
     return (
-        bodies.lever[i, 0] - share * (row[6] * fx + row[7] * fy),
-        bodies.lever[i, 1] - share * (row[8] * fx + row[9] * fy),
+        -_about_hinge(bodies, i, 0, -shape.half - row[0], -row[1]) - share * (row[6] * fx + row[7] * fy),
+        _about_hinge(bodies, i, 2, shape.half - row[0], -row[1]) - share * (row[8] * fx + row[9] * fy),
     )
 
 
-@part
+@inlined
+def _about_hinge(bodies: Bodies, i: int, kind: int, x: float, y: float) -> float:
+    """Torque of contacts on a barb along the normal, about the hinge at (x, y) [m] from the centre of mass [N m]."""
+    axes, row = bodies.axes, bodies.shares[3 * i + kind]
+    fx = axes[i, 0, 0] * row[0] + axes[i, 1, 0] * row[1] + axes[i, 2, 0] * row[2]
+    fy = axes[i, 0, 1] * row[0] + axes[i, 1, 1] * row[1] + axes[i, 2, 1] * row[2]
+    torque = axes[i, 0, 2] * row[3] + axes[i, 1, 2] * row[4] + axes[i, 2, 2] * row[5]
+    return float(torque - (x * fy - y * fx))
+
+
+@inlined
 def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float, dt: float) -> tuple[float, float]:
     """Torques of slipping motors [N m], with what they do to the rates in the step taken into account.
 
@@ -207,7 +226,7 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
     return t1, t2
 
 
-@part
+@inlined
 def middle_of_step(
     shape: Shape, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
 ) -> tuple[float, float, float]:
@@ -215,7 +234,7 @@ def middle_of_step(
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `alpha` is written, and `rate` of free angles.
+        bodies: the smarticles; `alpha` and `plane` are written, and `rate` of free angles.
         motors: `impulse`, or `momentum` of free angles, is written.
         i: the smarticle.
         dt: time step [s].
@@ -232,28 +251,35 @@ def middle_of_step(
     free = motors.law >= SLIP
     r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
     p1, p2 = motors.momentum[i, 0], motors.momentum[i, 1]
-    half, x, y, z, g1, g2 = 0.5 * dt, l0, l1, l2, 0.0, 0.0
-    wx, wy, wz = 0.0, 0.0, 0.0
-    for turn in range(ITERATIONS):
-        if turn == 0 or free:
-            lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
-        if free:
+    half, x, y, z = 0.5 * dt, l0, l1, l2
+    lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
+    if not free:
+        flat, normal = inverses(row)
+        internal = row[18] * r1 + row[19] * r2
+        for _ in range(ITERATIONS):
+            wx, wy, wz = spin_by(row, flat, normal, x, y, z, internal)
+            x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
+        wx, wy, wz = spin_by(row, flat, normal, x, y, z, internal)
+        motors.impulse[i, 0] += dt * lagrange_force(shape, row, 0, wx, wy, wz, r1, r2)
+        motors.impulse[i, 1] += dt * lagrange_force(shape, row, 1, wx, wy, wz, r1, r2)
+    else:
+        g1, g2 = 0.0, 0.0
+        for turn in range(ITERATIONS):
+            if turn:
+                lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
             r1, r2 = rates(row, z, p1 + half * g1, p2 + half * g2)
-        wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
-        if free:
+            wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
             g1, g2 = (
                 lagrange_force(shape, row, 0, wx, wy, wz, r1, r2),
                 lagrange_force(shape, row, 1, wx, wy, wz, r1, r2),
             )
-        x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
-    wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
-    if free:
+            x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
+        wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
         bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
         motors.momentum[i, 0] = p1 + dt * g1
         motors.momentum[i, 1] = p2 + dt * g2
-    else:
-        motors.impulse[i, 0] += dt * lagrange_force(shape, row, 0, wx, wy, wz, r1, r2)
-        motors.impulse[i, 1] += dt * lagrange_force(shape, row, 1, wx, wy, wz, r1, r2)
-    bodies.alpha[i, 0] += dt * r1
-    bodies.alpha[i, 1] += dt * r2
+    if r1 != 0.0 or r2 != 0.0:
+        bodies.alpha[i, 0] += dt * r1
+        bodies.alpha[i, 1] += dt * r2
+        lay_out_at(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
     return wx, wy, wz

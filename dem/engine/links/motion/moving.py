@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
-from dem.engine.links.compiler import part
+from dem.engine.links.compiler import inlined, part
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
@@ -21,11 +21,11 @@ from dem.engine.links.shape import Shape
 
 @part
 def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
-    """Change momenta by the forces in `load` and `lever`, by weight and by motors.
+    """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `velocity`, `momentum` and `deepest` are written.
+        bodies: the smarticles; `velocity`, `momentum`, `deepest` and, while articulated, `load` are written.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
@@ -34,6 +34,9 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
     for i in range(bodies.position.shape[0]):
+        if motors is not None:
+            for d in range(6):
+                load[i, d] = bodies.shares[3 * i, d] + bodies.shares[3 * i + 1, d] + bodies.shares[3 * i + 2, d]
         velocity[i, 0] += share * load[i, 0]
         velocity[i, 1] += share * load[i, 1]
         velocity[i, 2] += across * (share * load[i, 2] - dt * gravity)
@@ -117,7 +120,7 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
         turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3] = e * norm, f * norm, g * norm, k * norm
 
 
-@part
+@inlined
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
     """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
     axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from dem.engine.links.arrays import Bodies
-from dem.engine.links.compiler import kernel, part
-from dem.engine.links.motion.planar import lay_out, rates, spin_of
+from dem.engine.links.compiler import inlined, kernel
+from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.shape import Shape
 
 SLIP = 2  # laws of motors from here on leave the angles free
 
 
-@part
+@inlined
 def turn_axes(bodies: Bodies, i: int) -> None:
     """Write the rotation matrix of a smarticle's quaternion into `axes`."""
     a, b, c, d = bodies.turn[i, 0], bodies.turn[i, 1], bodies.turn[i, 2], bodies.turn[i, 3]
@@ -28,14 +28,14 @@ def turn_axes(bodies: Bodies, i: int) -> None:
     axes[i, 2, 2] = 1 - 2 * (b * b + c * c)
 
 
-@part
+@inlined
 def along_normal(bodies: Bodies, i: int) -> float:
     """Angular momentum of a smarticle along its normal [kg m²/s]."""
     axes, momentum = bodies.axes, bodies.momentum
     return float(axes[i, 0, 2] * momentum[i, 0] + axes[i, 1, 2] * momentum[i, 1] + axes[i, 2, 2] * momentum[i, 2])
 
 
-@part
+@inlined
 def find_spin(bodies: Bodies, i: int, hinged: Any) -> None:
     """Write ω of a smarticle into `spin`, from its angular momentum and what its barbs have of it."""
     axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]
@@ -54,7 +54,7 @@ def find_spin(bodies: Bodies, i: int, hinged: Any) -> None:
         bodies.spin[i, d] = axes[i, d, 0] * wx + axes[i, d, 1] * wy + axes[i, d, 2] * wz
 
 
-@part
+@inlined
 def find_motion(shape: Shape, bodies: Bodies, i: int, hinged: Any) -> None:
     """Write the velocities of a smarticle's rigid bodies into `motion`, as seen at the centre of mass.
 
@@ -83,7 +83,7 @@ def find_motion(shape: Shape, bodies: Bodies, i: int, hinged: Any) -> None:
             motion[3 * i + 2, d] -= rate2 * (-axes[i, d, 0] * y + axes[i, d, 1] * x2)
 
 
-@part
+@inlined
 def place_links(shape: Shape, bodies: Bodies, i: int) -> None:
     """Write the axes of a smarticle's links into `segments`, strand by strand."""
     axes, position, row, segments = bodies.axes, bodies.position, bodies.plane[i], bodies.segments
@@ -111,13 +111,11 @@ def pose(shape: Shape, bodies: Bodies, hinged: Any) -> None:
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `plane` (while articulated), `axes`, `spin`, `segments` and `motion` are written, and
+        bodies: the smarticles; `axes`, `spin`, `segments` and `motion` are written, and
             `rate` where angles are free.
-        hinged: the motors; None while welded: then the plane geometry is as it was, and no barb moves by itself.
+        hinged: the motors; None while welded: then no barb moves by itself.
     """
     for i in range(bodies.position.shape[0]):
-        if hinged is not None:
-            lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
         turn_axes(bodies, i)
         if hinged is not None and hinged.law >= SLIP:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]

@@ -1,4 +1,4 @@
-"""What is measured of each run of the study `procedures`, and the means over seeds.
+"""What is measured of a run of one activity between two rests: studies `procedures` and `engines`; means over seeds.
 
 A run is poured, rests, goes through one activity, and rests again. Both rests are averaged over their
 frames: the first one is the static state of its aspect ratio and seed, the last one what the activity left.

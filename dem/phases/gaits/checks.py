@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.particle import HINGE_CLEARANCE
-from dem.phases.drive import BARBS, actuated, drive
+from dem.phases.gaits.drive import BARBS, actuated, drive
 from dem.phases.phase import SceneView
 from dem.setting.motion import SimpleMotion, Sine, Triangle
 from dem.setting.part import HINGE_RANGE
@@ -210,7 +210,7 @@ def _check_first_spheres(scene: SceneView, index: int, angle: float) -> None:
     At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
     sphere at m, so that they are clear of each other while -cos α ≤ (s² + m² - d²) / (2 s m).
     """
-    if angle <= 90:
+    if angle <= 90 or scene.smooth:
         return
     particle, d = scene.particle, scene.sphere_diameter
     s = _first_station(scene)

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.phases.actuation_checks import actuation_warnings, check_actuated
-from dem.phases.drive import Drive, Gait, drive
+from dem.phases.gaits.checks import actuation_warnings, check_actuated
+from dem.phases.gaits.drive import Drive, Gait, drive
 from dem.phases.phase import Memory, Phase, SceneView, Stage
 from dem.setting.motor import Motor
 from dem.setting.smarticle import Smarticle
