@@ -22,11 +22,11 @@ from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
 from studies.accuracy.rung import ACTIVITIES, BASE, Rung
-from studies.base.runs import DEFINITION, duration
+from studies.base.runs import DEFINITION, ENGINE, duration
 from studies.base.variants import VARIANT, variant_of
 
 KNOB, VALUE, UNIT, REFERENCE, VERDICT = "knob", "value", "unit", "reference", "verdict"
-ACTIVITY, COUNT, ENGINE = "activity", "smarticles [-]", "engine"
+ACTIVITY, COUNT = "activity", "smarticles [-]"
 COST, WALL = "processor time per simulated time of the last activity [s/s]", "wall time [s]"
 """A run is one thread, and waits for nothing; unlike its wall time, its processor time is not what others leave."""
 

@@ -54,6 +54,7 @@ class Accuracy(Study[Advice]):
     name = "accuracy"
     text_name = "accuracy.md"
     one_fidelity = False
+    one_engine = False
 
     def __init__(self, *, rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> None:
         self.rungs = tuple(rungs)

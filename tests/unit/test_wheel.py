@@ -88,7 +88,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path, sources: list[s
         built = {name for name in archive.namelist() if ".dist-info/" not in name}
         table = archive.read("dem/plan/work_precision.csv")
     assert built == {name for name in sources if name.partition("/")[0] in PACKAGES}
-    assert table == (ROOT / "results" / "accuracy" / "work_precision.csv").read_bytes()
+    assert table == (ROOT / "results" / "accuracy-links" / "work_precision.csv").read_bytes()
 
 
 def test_plan_works_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:

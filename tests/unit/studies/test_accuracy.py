@@ -20,7 +20,6 @@ from studies.accuracy.measure import (
     COMPARED,
     COST,
     COUNT,
-    ENGINE,
     EXPECTED,
     GAP,
     RESIDUAL,
@@ -31,7 +30,7 @@ from studies.accuracy.measure import (
 )
 from studies.accuracy.rung import Rung
 from studies.accuracy.study import TABLE, Accuracy
-from studies.base.runs import DEFINITION
+from studies.base.runs import DEFINITION, ENGINE
 from studies.base.variants import VARIANT
 
 PHI_F = f"phi_f {DEFINITION} [-]"
