@@ -47,7 +47,7 @@ def scene_of(engine: str, count: int, fidelity: str, seconds: float, seed: int) 
     }
 
 
-def measured(folder: Path, engine: str, *, count: int, fidelity: str, seconds: float, seed: int) -> dict[str, Any]:
+def measured(folder: Path, engine: str, count: int, *, fidelity: str, seconds: float, seed: int) -> dict[str, Any]:
     """Run once; a row of the table."""
     name = f"{engine}-{fidelity}-{count}-{seed}"
     begun = time.monotonic()
@@ -94,7 +94,7 @@ def run_all(folder: Path, counts: Sequence[int], fidelity: str, seconds: float, 
                 if time.monotonic() - begun + guess > budget:
                     left_out.append(f"{engine}, N = {count}, seed {seed}: about {guess:.0f} s")
                     continue
-                row = measured(folder, engine, count=count, fidelity=fidelity, seconds=seconds, seed=seed)
+                row = measured(folder, engine, count, fidelity=fidelity, seconds=seconds, seed=seed)
                 table = pd.concat([table, pd.DataFrame([row])], ignore_index=True)
                 table.to_csv(path, index=False)
                 print(f"{engine:6s} N = {count:6d} seed {seed}: {row[COST]:8.2f} s/s", flush=True)
