@@ -28,6 +28,7 @@ verify: setup ## known answers against theory, and orders of convergence, on bot
 	$(BIN)/smarticles verify --engine both --out out/verify-$(STAMP)
 
 bench: setup ## measure speed, and what each effect costs (hours)
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.engines
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.effects
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins

@@ -143,6 +143,12 @@ def clump_sentences(clumps: pd.DataFrame) -> tuple[str, ...]:
     if clumps.empty:
         return ()
     few, many = (clumps.loc[index] for index in (clumps["contacts [1]"].idxmin(), clumps["contacts [1]"].idxmax()))
+    if few["contacts [1]"] == many["contacts [1]"]:
+        return (
+            f"Restitution asked for is {few['restitution asked for [1]']:g}, that of one contact. A smarticle that "
+            f"falls flat touches with the {few['contacts [1]']:.0f} ends of its links, whatever its section, and keeps "
+            f"{few['restitution measured [1]']:.2f} of its speed.",
+        )
     depth = few["depth at rest measured [m]"] / many["depth at rest measured [m]"]
     time = few["contact time measured [s]"] / many["contact time measured [s]"]
     return (

@@ -11,7 +11,7 @@ import numpy as np
 
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
-from studies.base.column import COM, CORE, REMAINING, column_history, vibration
+from studies.base.collapse.column import COM, CORE, REMAINING, column_history, vibration
 from studies.base.figures import ASPECT_LABEL, History, bin_width, draw_history, draw_means, finished, marker
 from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
 from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED

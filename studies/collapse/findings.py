@@ -11,7 +11,7 @@ from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, told
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import Difference, Slope, difference
-from studies.base.column import DEFINITIONS, REMAINING
+from studies.base.collapse.column import DEFINITIONS, REMAINING
 from studies.collapse.law import (
     ACTIVATION,
     AT_LEAST,

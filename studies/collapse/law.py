@@ -17,7 +17,7 @@ import pandas as pd
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, mean_columns, ordered
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
-from studies.base.column import DEFINITIONS
+from studies.base.collapse.column import DEFINITIONS
 from studies.collapse.measure import DEFINITION, DELTA, GAMMA, LOG, is_seen
 from studies.collapse.reference import reference_delta
 

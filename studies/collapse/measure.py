@@ -11,8 +11,8 @@ import pandas as pd
 
 from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.collapse_time import CollapseTime
-from studies.base.column import COM, DEFINITIONS, collapse_of, column_history, vibration
+from studies.base.collapse.collapse_time import CollapseTime
+from studies.base.collapse.column import COM, DEFINITIONS, collapse_of, column_history, vibration
 from studies.base.runs import duration
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"

@@ -3,7 +3,7 @@
 Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012): columns of
 u-particles collapse in τ = (1/f) exp(Δ/Γ), with Δ greatest at an intermediate l/w. A run pours, shakes with the wall,
 rests, takes the wall away, and shakes the floor. What is measured of a run is in `studies.collapse.measure`, by which
-height in `studies.base.column`, Δ in `studies.collapse.law`, what is judged in `studies.collapse.findings`.
+height in `studies.base.collapse.column`, Δ in `studies.collapse.law`, what is judged in `studies.collapse.findings`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, told_number
-from studies.base.collapse_time import LEAST_FALL, WORST_ERROR
-from studies.base.column import DEFINITIONS, REMAINING, REST
+from studies.base.collapse.collapse_time import LEAST_FALL, WORST_ERROR
+from studies.base.collapse.column import DEFINITIONS, REMAINING, REST
 from studies.base.paper import PaperStudy
 from studies.base.runs import Collected, MeasuredRun, told_bars, told_seeds
 from studies.base.study import Analysis, Tables

@@ -23,6 +23,7 @@ INTERVAL_S = 0.04  # between checkpoints
 FRAME_S = 0.02
 SCENE = f"""\
 schema_version: 1
+engine: {{engine}}
 name: restart
 seed: {{seed}}
 smarticle: {{{{aspect_ratio: 0.7}}}}
@@ -37,8 +38,8 @@ phases:
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]  # skipped where there is no YADE
 
 
-def write_scene(path: Path, seed: int) -> Path:
-    path.write_text(SCENE.format(seed=seed))
+def write_scene(path: Path, seed: int, engine: str = "yade") -> Path:
+    path.write_text(SCENE.format(seed=seed, engine=engine))
     return path
 
 
@@ -100,12 +101,12 @@ def check_loss(said: str, reached_s: float, tally: Tally) -> None:
         tally.lost_s.append(reached_s - float(found[1] or 0.0))
 
 
-def kill_often(tmp_path: Path, kills: int, seeds: Iterator[int]) -> Tally:
+def kill_often(tmp_path: Path, kills: int, seeds: Iterator[int], engine: str = "yade") -> Tally:
     rng = random.Random(20260101)
     tally = Tally()
     while tally.kills < kills:
         seed = next(seeds)
-        scene = write_scene(tmp_path / f"{seed}.yaml", seed)
+        scene = write_scene(tmp_path / f"{seed}.yaml", seed, engine)
         whole = tmp_path / f"whole-{seed}"
         if not whole.exists():
             complete(scene, whole)

@@ -84,9 +84,9 @@ def test_a_foreign_checkpoint_is_refused_in_one_line() -> None:
 
 def test_a_pile_comes_to_rest() -> None:
     made = poured(30)
-    made.advance(6000)
-    # 0.07 mm/s in the mean, still falling (4e-12 to 4e-14 J seen); a pile that chatters moves by mm/s, 1e-9 J.
-    assert made.state().kinetic_energy < 1e-11
+    # Among five seeds some still roll at 1e-11 J after half of this time; who does is a matter of last bits.
+    made.advance(12000)
+    assert made.state().kinetic_energy < 1e-12
     assert made.unbalanced_force() < 1e-3
     assert made.fixtures.container_force[2] == pytest.approx(-30 * builds.boxes().mass * 9.81, rel=1e-3)
 

@@ -7,6 +7,7 @@ import math
 import pandas as pd
 import pytest
 
+from smarticles.verification.hands.kinds import hands_on
 from smarticles.verification.hard.onset import SETTINGS, onsets
 
 STACK = "welded stack, l/w = 0.7, draft"
@@ -47,4 +48,4 @@ def test_least_and_most_over_seeds() -> None:
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_setting_is_a_valid_scene(name: str) -> None:
-    assert SETTINGS[name].data["count"] == SETTINGS[name].count
+    assert SETTINGS[name].data(hands_on("links"))["count"] == SETTINGS[name].count

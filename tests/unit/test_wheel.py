@@ -114,6 +114,7 @@ def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_
         )
         manifest = write_run(folder.run(entry), shake) / "run.json"
         content = {**json.loads(manifest.read_text()), "scene_sha256": entry.scene_sha256}
+        content["engine"] = entry.values["engine"]
         manifest.write_text(json.dumps(content))
     said = smarticles("study", "gravish", "--quick", "--analyse", "--out", out)
     assert said.startswith("not the full study: ")

@@ -251,7 +251,7 @@ def _search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: floa
     capacity, number = lower.shape[0], 0
     for m in range(count):
         p = order[m]
-        lx, ly, lz, hx, hy, hz = boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
+        ly, lz, hx, hy, hz = boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
         own, mine, skin = owner[p], keys[p] // nx, bare + marks[p, 6]
         inverse = shape.inverses[pairs.kind[p]]
         column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)

@@ -43,7 +43,7 @@ from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
 
-# Skins and the width of a strip of the search for neighbours, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
+# Skins and the width of a strip of the search, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
 NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
 NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built

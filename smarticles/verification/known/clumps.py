@@ -166,7 +166,7 @@ def flat_checks(hands: Hands, *, rows: int, pitch: float) -> list[Answer]:
 ROWS_AND_PITCHES = tuple((rows, pitch) for rows in (1, 2) for pitch in (1.3, 1.0, 0.5, 0.25))
 
 
-STRANDS = (1, 2, 3, 4)
+STRANDS = (1, 2)
 
 
 def flat_impacts(hands: Hands) -> list[FlatImpact]:

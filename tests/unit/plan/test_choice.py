@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.plan import choice
-from dem.plan.choice import Error, Expectation, Measured, choose, pick, read_table
+from dem.plan import measured
+from dem.plan.choice import Expectation, choose, pick
+from dem.plan.measured import Error, Measured, read_table
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -237,7 +238,7 @@ def test_another_table_is_refused(text: str, message: str, tmp_path: Path) -> No
 def test_without_a_table_the_way_to_one_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match=r"absent.csv: cannot be read \(No such file or directory\); make one: smart"):
         read_table(tmp_path / "absent.csv")
-    monkeypatch.setattr(choice, "SHIPPED", tmp_path / "shipped.csv")
+    monkeypatch.setattr(measured, "SHIPPED", tmp_path / "shipped.csv")
     with pytest.raises(
         InputError, match=r"no table of measured errors ships at .*; make one: smarticles accuracy SCENE"
     ):

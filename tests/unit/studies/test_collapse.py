@@ -12,7 +12,7 @@ from synthetic.columns import H0, PHASES, Column, F, write_column
 from dem.errors import InputError
 from dem.record.manifest import read_run
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from studies.base.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
+from studies.base.collapse.column import COM, CORE, DEFINITIONS, REMAINING, column_history, period_means, vibration
 from studies.collapse.findings import findings
 from studies.collapse.law import (
     ACTIVATION,

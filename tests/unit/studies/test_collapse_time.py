@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dem.errors import InputError
-from studies.base.collapse_time import collapse_time
+from studies.base.collapse.collapse_time import collapse_time
 
 START, END = 0.0072, 0.0011  # m
 

@@ -153,9 +153,7 @@ def push_apart(
             stored = pairs.slip[pair, slot, 3]
             if carried > 0.0:
                 share = weight if carried == load else weight * carried / load
-                fx, fy, fz = resist(
-                    law, carried, share, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot]
-                )
+                fx, fy, fz = resist(law, carried, share, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot])
             else:
                 lost += _forget(pairs, pair, 1 << slot)
             if ledger is not None:

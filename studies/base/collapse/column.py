@@ -21,7 +21,7 @@ from dem.record.manifest import PhaseRecord, RunManifest
 from dem.record.series import read_series
 from postprocess.geometry.links import centres_of_mass
 from postprocess.scene_file import read_phases
-from studies.base.collapse_time import CollapseTime, collapse_time
+from studies.base.collapse.collapse_time import CollapseTime, collapse_time
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

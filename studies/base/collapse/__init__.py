@@ -1,0 +1,1 @@
+"""How free-standing columns lose their height, and how long that takes."""
