@@ -52,7 +52,7 @@ def _cases() -> list[Case]:
         _case(
             "shaken at Γ = 10",
             violence.shaken,
-            {"count": 6, "seconds": 0.2, "rest": 0.4},
+            {"count": 6, "seconds": 0.2, "rest": 0.8},
             {"count": 100, "seconds": 2.0, "rest": 1.0},
         ),
         _case("thrown out of the container", violence.thrown_out, {"count": 6, "seconds": 0.5}, {"count": 60}),

@@ -59,7 +59,7 @@ def lay_out_at(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
 
 @inlined
 def direction(angle: float) -> tuple[float, float]:
-    """Cosine and sine of an angle [rad] of a few turns at most, at a fifth of the cost of the library's.
+    """Cosine and sine of an angle [rad] of a few turns at most.
 
     Source: the kernels of fdlibm (k_sin.c, k_cos.c) after a reduction to ±π/4 in two parts.
     """
