@@ -16,7 +16,7 @@ help: ## list the targets
 setup: ## install everything into the system and .venv (first time on a bare system: 5 min; then at once)
 	@setup/install.sh
 
-demo: setup ## quick comparison with Gravish et al. 2012, figures included (4 min)
+demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 min)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
 	@echo "figures:"
 	@ls -1 $(CURDIR)/out/demo-$(STAMP)/results/*.png
