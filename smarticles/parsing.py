@@ -9,10 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from dem.engine import ENGINES
 from dem.errors import InputError, nearest
-
-ENGINES = ("yade", "links")
-"""What --engine knows, as `dem.scene.scene.Scene.engine`."""
 
 Handler = Callable[[argparse.Namespace], int]
 """Does what a subcommand says; returns the exit status."""

@@ -45,7 +45,7 @@ class Demand(Protocol):
 
     @property
     def gravity_m_per_s2(self) -> float:
-        """G [m/s²]."""
+        """Gravity, g [m/s²]."""
 
     @property
     def fidelity(self) -> Fidelity:

@@ -270,7 +270,7 @@ class Engine(Protocol):
 
     @property
     def time_step(self) -> float:
-        """Dt [s]."""
+        """Time step, dt [s]."""
 
     def set_time_step(self, time_step: float) -> None:
         """Take steps of another length [s] from now on."""

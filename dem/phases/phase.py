@@ -12,17 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
-from dem.body.particle import Particle
+from dem.engine.demand import Demand
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.setting.contact import Contact
-from dem.setting.container import Container, Cylinder
-from dem.setting.fidelity import Fidelity
-from dem.setting.hooks import Hooks
-from dem.setting.motor import Motor
+from dem.setting.container import Container
 from dem.setting.plane import Plane
-from dem.setting.recording import Recording
-from dem.setting.smarticle import Smarticle
 
 CHECK_INTERVAL = 0.01  # s between looks at whether a layer has come down, a pile has settled, or a force is too much
 
@@ -124,16 +118,8 @@ class Phase:
         raise NotImplementedError
 
 
-class SceneView(Protocol):
-    """What a phase may know of its scene."""
-
-    @property
-    def smarticle(self) -> Smarticle:
-        """Geometry and material of one smarticle."""
-
-    @property
-    def count(self) -> int:
-        """N."""
+class SceneView(Demand, Protocol):
+    """What a phase may know of its scene: what an engine may, and what else there is."""
 
     @property
     def container(self) -> Container:
@@ -144,40 +130,8 @@ class SceneView(Protocol):
         """Motion in a plane."""
 
     @property
-    def hooks(self) -> Hooks | None:
-        """Hooks in the pile."""
-
-    @property
-    def contact(self) -> Contact:
-        """Friction and restitution."""
-
-    @property
-    def motor(self) -> Motor:
-        """The motors of the hinges."""
-
-    @property
-    def gravity_m_per_s2(self) -> float:
-        """G [m/s²]."""
-
-    @property
-    def fidelity(self) -> Fidelity:
-        """Accuracy against cost."""
-
-    @property
     def phases(self) -> Sequence[Phase]:
         """All phases, in order."""
-
-    @property
-    def recording(self) -> Recording:
-        """Frames and series."""
-
-    @property
-    def particle(self) -> Particle:
-        """One smarticle as the engine sees it."""
-
-    @property
-    def cylinder(self) -> Cylinder:
-        """The container as the engine builds it."""
 
     @property
     def smooth(self) -> bool:
@@ -186,10 +140,6 @@ class SceneView(Protocol):
     @property
     def sphere_diameter(self) -> float:
         """[m]."""
-
-    @property
-    def torque_limit(self) -> float:
-        """τ_max [N m]."""
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
         """Height [m] of a wall that is enough for the loosest pile."""

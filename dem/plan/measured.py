@@ -8,14 +8,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dem.engine import ENGINES
 from dem.errors import InputError
 from dem.setting.fidelity import FIDELITIES, fidelities
 
 SHIPPED = Path(__file__).with_name("work_precision.csv")
 """The table that is used unless another one is given; there only if it was measured."""
-
-ENGINES = ("yade", "links")
-"""Those that a table may tell of."""
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _ENGINE = "engine"
