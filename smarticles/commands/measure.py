@@ -21,26 +21,8 @@ if TYPE_CHECKING:
 _RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
-# What a person wants to see first: heading, column of the table, format, factor to the heading's unit.
-_SHOWN = (
-    ("phase", "phase type", "", 1.0),
-    ("t [s]", "time [s]", ".2f", 1.0),
-    ("smarticles", "smarticles [-]", ".4g", 1.0),
-    ("φ", f"phi {_COMPARED} [-]", ".4f", 1.0),
-    ("± SE", f"phi {_COMPARED} SE [-]", ".4f", 1.0),
-    ("top-percentile", "phi top-percentile [-]", ".4f", 1.0),
-    ("voxel", "phi voxel [-]", ".4f", 1.0),
-    ("voronoi", "phi voronoi [-]", ".4f", 1.0),
-    ("⟨N⟩", "crossings mean [-]", ".2f", 1.0),
-    ("z [mm]", "com height [m]", ".2f", 1e3),
-    ("peak F/nW", "hook peak force over n W_s [-]", ".3f", 1.0),
-    ("hook work [mJ]", "hook work [J]", ".3g", 1e3),
-    ("peak F [N]", "peak force [N]", ".3f", 1.0),
-    ("strain at it", "strain at the peak [-]", ".3f", 1.0),
-    ("at yield", "strain at the yield drop [-]", ".3f", 1.0),
-    ("at fracture", "strain at fracture [-]", ".3f", 1.0),
-    ("widening", "widening [-]", ".3f", 1.0),
-)
+# What every row says of itself: heading, column of the table, format, factor to the heading's unit.
+_SAID = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Of single frames only: averaged over the last ones they would say nothing.
 _SHOWN_PER_FRAME = (
     ("F [N]", "pulled string force x [N]", ".3f", 1.0),
@@ -135,7 +117,15 @@ _Shown = tuple[str, str, str, float]
 
 def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Shown]:
     """The columns worth showing: of those that a person wants to see, the ones with a value in any row."""
-    wanted = _SHOWN + (_SHOWN_PER_FRAME if per_frame else ())
+    from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
+    from postprocess.statistics.points import marked  # noqa: PLC0415
+
+    wanted = list(_SAID)
+    for quantity, shown in shown_quantities():
+        wanted.append((shown.heading, quantity.header, shown.form, shown.factor))
+        if shown.with_error:
+            wanted.append(("± SE", marked(quantity.header, "SE"), shown.form, shown.factor))
+    wanted += _SHOWN_PER_FRAME if per_frame else ()
     return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
 
 
