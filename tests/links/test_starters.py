@@ -17,7 +17,7 @@ SHORT = {
     "shaken": ["phases.2.duration_s=0.2"],
     "hook": ["phases.2.speed_m_per_s=0.1"],
     "melting": ["phases.1.duration_s=0.2", "phases.3.duration_s=0.2"],
-    "casting": ["phases.1.opening_s=0.2", "phases.1.closing_s=0.2", "phases.3.duration_s=0.2"],
+    "casting": ["phases.1.opening_s=0.3", "phases.1.closing_s=0.3", "phases.3.duration_s=0.2"],
     "collapse": ["phases.1.duration_s=0.2", "phases.4.duration_s=0.2"],
     "chain": ["phases.1.speed_m_per_s=0.2"],
 }
