@@ -45,6 +45,40 @@ def test_the_same_twice_and_however_steps_are_grouped() -> None:
     assert bits(one) == bits(other)
 
 
+@pytest.mark.parametrize("law", ["halt", "slip"])
+def test_looks_told_one_by_one_or_at_once(law: str) -> None:
+    one, other, again = (
+        builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law)), 8, settle=200)
+        for _ in range(3)
+    )
+    for made in (one, other):
+        made.motors.articulate()
+    swing(one, 40)
+    targets = np.stack([np.full((8, 2), math.pi / 2 - 0.5 * math.sin(look / 40)) for look in range(40)])
+    other.motors.actuate(targets[:30], 2e-4)
+    # Saved in the middle of a period in the middle of the block.
+    other.advance(50)
+    again.load(other.save(HERE), HERE)
+    for made in (other, again):
+        made.advance(70)
+        made.motors.actuate(targets[30:], 2e-4)
+        made.advance(40)
+        assert bits(made) == bits(one)
+        assert made.motors.work == one.motors.work
+
+
+def test_the_last_target_holds_until_another_is_told() -> None:
+    one, other = (poured(6) for _ in range(2))
+    for made in (one, other):
+        made.motors.articulate()
+    angles = np.full((1, 6, 2), 1.4)
+    one.motors.actuate(angles, 2e-4)
+    one.advance(40)
+    other.motors.actuate(np.repeat(angles, 10, axis=0), 2e-4)
+    other.advance(40)
+    assert bits(one) == bits(other)
+
+
 def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
     made = poured(12)
     made.fixtures.shake(amplitude=5e-4, frequency=30.0)

@@ -123,7 +123,7 @@ def oscillation(hands: Hands, out: Path, *, seconds: float, count: int = 3) -> l
     rows, said = [], None
     for n in range(1, round(seconds / interval) + 1):
         angle = math.radians(5) * math.sin(2 * math.pi * 8 * n * interval)
-        engine.motors.actuate(np.tile(centre + angle, (count, 1)), interval)
+        engine.motors.actuate(np.tile(centre + angle, (1, count, 1)), interval)
         engine.advance(round(interval / engine.time_step))
         if n % 20 == 0:
             state = engine.state()
