@@ -38,6 +38,10 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     if not isinstance(data, Mapping):
         msg = f"{source}: a scene is a mapping of keys to values, got {type(data).__name__}"
         raise InputError(msg)
+    if "schema_version" not in data:
+        # A scene made in Python is of this version; a file says of which it is.
+        msg = f"{source}: schema_version: missing; it has no default"
+        raise InputError(msg)
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
         msg = f"{source}: schema_version: {version} is not known here; this version reads {SCHEMA_VERSION}"
@@ -97,6 +101,8 @@ def scene_hash(scene: Scene) -> str:
 def json_schema() -> dict[str, Any]:
     """JSON schema of the scene file, for editors."""
     schema = Scene.model_json_schema()
+    schema["required"].insert(0, "schema_version")
+    del schema["properties"]["schema_version"]["default"]
     # The file may name a fidelity, or give its base and some knobs; the model that pydantic describes has them all.
     fidelity = schema["properties"]["fidelity"]
     mapping = {"$ref": fidelity.pop("$ref")}
