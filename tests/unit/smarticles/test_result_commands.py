@@ -63,6 +63,26 @@ def test_measure_does_not_overwrite_unless_told(tmp_path: Path, write_run: Write
     assert table.read_text(encoding="utf-8").startswith("run,")
 
 
+def test_measure_writes_a_profile_of_each_run_beside_the_table(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    profile = tmp_path / "profile.csv"
+    said = smarticles("measure", *runs, "--profile", profile)
+    assert said.status == 0
+    with profile.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert said.out.splitlines()[-1] == f"{profile}: φ(r, z), {len(rows)} rows"
+    assert {row["run"] for row in rows} == {str(run) for run in runs}
+    assert {row["phase type"] for row in rows} == {"deposit", "relax", "shake"}
+    assert len({row["inner radius [m]"] for row in rows}) == 6
+    assert max(float(row["phi voxel [-]"]) for row in rows) > 0.01
+    again = smarticles("measure", runs[0], "--profile", profile)
+    assert (again.status, "exists" in again.err) == (2, True)
+    both = smarticles("measure", runs[0], "--profile", tmp_path / "x.csv", "--table", tmp_path / "x.csv")
+    assert (both.status, "is the file of --table too" in both.err) == (2, True)
+
+
 def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     said = smarticles("measure", run, "--frames", "--json")
