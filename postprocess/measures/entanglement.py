@@ -46,6 +46,22 @@ class CrossingPairs(NamedTuple):
     links: NDArray[np.int64]
 
 
+class LinkPassages(NamedTuple):
+    """Links that pass through smarticles, one by one.
+
+    Attributes:
+        i: (P,) int64, the smarticle passed through.
+        j: (P,) int64, the smarticle that passes.
+        link: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2.
+        point: (P, 3) [m], where it meets the plane of i.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    link: NDArray[np.int64]
+    point: NDArray[np.float64]
+
+
 class LinkedPairs(NamedTuple):
     """Pairs of smarticles that are linked when both are closed across their mouths.
 
@@ -142,6 +158,30 @@ def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
     i, j = _close_pairs(vertices, has_plane(vertices))
     links = (_signed_crossings(vertices, i, j, closed=False) != 0).sum(axis=1)
     return CrossingPairs(*_sorted_nonzero(i, j, links))
+
+
+def link_passages(vertices: ArrayLike) -> LinkPassages:
+    """The passages that `link_crossings` counts, each with its place.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        One entry per passing link, sorted by i, then j, then link.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    vertices = checked_vertices(vertices)
+    i, j = _close_pairs(vertices, has_plane(vertices))
+    pair, link = np.nonzero(_signed_crossings(vertices, i, j, closed=False))
+    order = np.lexsort((link, j[pair], i[pair]))
+    i, j, link = i[pair][order], j[pair][order], link[order]
+    normal, centre = plane_frames(vertices)[i, 2], vertices[i].mean(axis=1)
+    start, end = vertices[j, link], vertices[j, link + 1]
+    below, above = (np.einsum("pc,pc->p", ends - centre, normal) for ends in (start, end))
+    share = below / (below - above)
+    return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
 
 
 def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
