@@ -26,7 +26,7 @@ from postprocess.pictures.surroundings import DrawnHooks, Surroundings, read_sur
 from postprocess.scene_file import read_scene
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
@@ -242,8 +242,6 @@ def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
         mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)
     return mesh.triangulate()
-
-
 
 
 def _joined(parts: Iterable[pv.PolyData]) -> pv.PolyData:

@@ -53,4 +53,4 @@ class Collection:
             tree = ET.ElementTree(root)
             ET.indent(tree)
             tree.write(self._folder / f"{kind}.pvd", encoding="utf-8", xml_declaration=True)
-        shutil.copyfile(Path(__file__).with_name("paraview") / SCRIPT, self._folder / SCRIPT)
+        shutil.copyfile(Path(__file__).with_name(SCRIPT), self._folder / SCRIPT)

@@ -86,7 +86,7 @@ def painted(palette: ColourScale, values: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """sRGB colours as shares of light, 0 to 255: what glTF wants of the colours of points.
+    """SRGB colours as shares of light, 0 to 255: what glTF wants of the colours of points.
 
     Source:
         IEC 61966-2-1; glTF 2.0, section 3.9.2.

@@ -74,9 +74,7 @@ def export_run(
     chosen = range(len(frames)) if every_frame else [len(frames) - 1 if time is None else frames.nearest(time)]
     folder = every_frame or to == "vtp"
     path = _checked_output(run.directory, output, to, folder=folder)
-    carried = [
-        field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)
-    ]
+    carried = [field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)]
     bodies = Bodies.read(run, kinds, carried)
     bodies.hold(frames[index] for index in chosen)
     with _whole(path) as made:
@@ -94,9 +92,7 @@ def export_run(
     return path
 
 
-def _write_collection(
-    folder: Path, bodies: Bodies, frames: FrameSequence, chosen: Sequence[int], tell: Tell
-) -> None:
+def _write_collection(folder: Path, bodies: Bodies, frames: FrameSequence, chosen: Sequence[int], tell: Tell) -> None:
     folder.mkdir()
     collection = Collection(folder, bodies.run)
     for done, index in enumerate(chosen):

@@ -65,9 +65,7 @@ def solids_file(solids: list[Solid], suffix: str, told: Mapping[str, Any]) -> by
 
     if suffix == "glb":
         return bytes(export_glb(scene, include_normals=False, tree_postprocessor=finish))
-    files = export_gltf(
-        scene, include_normals=False, merge_buffers=True, embed_buffers=True, tree_postprocessor=finish
-    )
+    files = export_gltf(scene, include_normals=False, merge_buffers=True, embed_buffers=True, tree_postprocessor=finish)
     return bytes(files["model.gltf"])
 
 
