@@ -19,7 +19,7 @@ from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.export.fields import Field, link_values
-from postprocess.export.strings import ChainStrings, read_strings
+from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.measures.entanglement import link_passages
 from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.surroundings import DrawnHooks, Surroundings, read_surroundings

@@ -10,8 +10,15 @@ from aiohttp import web
 HOST = "127.0.0.1"
 """The loopback interface: nobody else's machine reaches it."""
 
-_PARAMETER = "secret"  # what the page's own script looks for in its address, and proves itself with
+_PARAMETER = "token"
 _HOURS = 24
+
+# The page's script compiles its templates as it runs; it may speak to this server and to nobody else.
+_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' {own} data: blob:; "
+    "frame-ancestors 'none'; base-uri 'self'; form-action 'none'"
+)
+_HEADERS = {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff", "Cache-Control": "no-store"}
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -48,15 +55,15 @@ def protect(app: web.Application, token: str) -> None:
         response = await handler(request)
         if response.prepared:
             return response
-        own = f"{HOST}:{request.url.port}"
-        response.headers["Content-Security-Policy"] = (
-            f"default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' ws://{own} data: blob:; "
-            "frame-ancestors 'none'; base-uri 'self'; form-action 'none'"
-        )
-        response.headers["Referrer-Policy"] = "no-referrer"
-        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers.update(_HEADERS)
+        response.headers["Content-Security-Policy"] = _POLICY.format(own=f"ws://{HOST}:{request.url.port}")
         if allowed[0]:
             response.set_cookie(name, token, httponly=True, samesite="Strict", max_age=3600 * _HOURS)
         return response
 
+    async def session(request: web.Request) -> web.StreamResponse:
+        """Tells the page's script, which asks for it first, where to send messages and what proves them."""
+        return web.json_response({"sessionURL": f"ws://{HOST}:{request.url.port}/ws", "secret": token})
+
     app.middlewares.append(guard)
+    app.router.add_post("/paraview/", session)

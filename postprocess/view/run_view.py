@@ -20,6 +20,9 @@ from postprocess.view.window import BOX_FACES, Window
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+PICKED = (255, 0, 170)
+"""Colour of the smarticle that is picked, which no palette has."""
+
 _SAMPLES, _COSTLY_SAMPLES = 12, 3
 _STEPS = 7  # of a continuous scale in the legend
 
@@ -113,7 +116,7 @@ class RunView:
             colours = painted(palette, values[self._boxes(bodies["smarticles"])])
             if self.pick is not None:
                 chosen = bodies["smarticles"].cell_data["smarticle_id"][::BOX_FACES] == self.pick.smarticle_id
-                colours[chosen] = (255, 64, 0)
+                colours[chosen] = PICKED
         self.window.show(bodies, colours, self._frame.floor_z)
 
     def look(self) -> None:

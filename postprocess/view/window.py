@@ -44,8 +44,9 @@ class Window:
             look.SetColor(*to_rgb(paint.colour))
             look.SetOpacity(paint.opacity)
             look.SetInterpolationToFlat()
-            look.SetAmbient(0.25)
-            look.SetDiffuse(0.8)
+            # Light comes from the camera; a floor that it grazes would be black.
+            look.SetAmbient(0.6 if kind == "floor" else 0.25)
+            look.SetDiffuse(0.4 if kind == "floor" else 0.8)
             actor.SetVisibility(False)
             self._renderer.AddActor(actor)
             self._mappers[kind], self._actors[kind] = mapper, actor
