@@ -1,1 +1,1 @@
-"""Runs for other programs and for a browser: true bodies with their fields, as files, and as a page to look around in."""
+"""True bodies of runs with their fields, as files for other programs."""

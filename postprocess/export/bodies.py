@@ -19,9 +19,9 @@ from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.export.fields import Field, link_values
-from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.measures.entanglement import link_passages
 from postprocess.pictures.canvas import link_boxes
+from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.pictures.surroundings import DrawnHooks, Surroundings, read_surroundings
 from postprocess.scene_file import read_scene
 
@@ -168,7 +168,7 @@ class Bodies:
             return None
         outline = np.array([(radius, 0.0, floor + raised + height) for radius, height in self._corners()])
         line = pv.MultipleLines(outline)
-        turned = line.extrude_rotate(resolution=ROUND, capping=False).triangulate()
+        turned: pv.PolyData = line.extrude_rotate(resolution=ROUND, capping=False).triangulate()
         turned.clear_data()
         return turned
 
@@ -187,7 +187,8 @@ class Bodies:
         if self.run.planar:
             return None
         radius = max(self.run.container_radius, self._reach)
-        return pv.Disc(center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=ROUND).triangulate()
+        floor: pv.PolyData = pv.Disc(center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=ROUND).triangulate()
+        return floor
 
     def _hooks(self, frame: Frame) -> pv.PolyData | None:
         hooks = self._around.hooks
@@ -241,7 +242,8 @@ def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:
     if kind == "crossings":
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
         mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)
-    return mesh.triangulate()
+    triangles: pv.PolyData = mesh.triangulate()
+    return triangles
 
 
 def _joined(parts: Iterable[pv.PolyData]) -> pv.PolyData:

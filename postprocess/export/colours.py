@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_rgb
 
+from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.export.fields import Field, checked_field, link_values
@@ -50,10 +51,14 @@ def colour_field(name: str | None, run: RunManifest) -> Field:
     """The field to colour by: crossings, or of motion in a plane, which has none, the number of the smarticle.
 
     Raises:
-        InputError: It is no field.
+        InputError: It is no field, or the run has no such.
     """
     usual = "smarticle_id" if run.planar else "crossings"
-    return checked_field(usual if name is None else ALIASES.get(name, name))
+    field = checked_field(usual if name is None else ALIASES.get(name, name))
+    if not field.told_of(run):
+        msg = f"{run.directory}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
+        raise InputError(msg)
+    return field
 
 
 def scalars(field: Field, frame: Frame, run: RunManifest) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""What every exported body of a smarticle carries: one table of names, units and meanings, and the values of a frame."""
+"""What every exported body of a smarticle carries: one table of names, units and meanings; the values of a frame."""
 
 from __future__ import annotations
 
@@ -163,8 +163,8 @@ FIELDS: tuple[Field, ...] = (
     Field(
         name="local_packing_fraction",
         unit="-",
-        meaning=f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at floor, "
-        "wall and the pile's highest point; NaN without one cylindrical wall",
+        meaning=f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at "
+        "floor, wall and the pile's highest point; NaN without one cylindrical wall",
         take=_local_packing,
         told_of=lambda run: in_space(run) and run.container_tiers == 1,
         costly=True,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.export.bodies import Bodies, solid
@@ -41,10 +42,14 @@ class Painter:
         """One scale for all frames.
 
         Raises:
-            InputError: There is no field of this name.
+            InputError: There is no field of this name, or no value of it.
         """
         field = colour_field(color_by, run)
-        bounds = [span(scalars(field, frame, run)) for frame in frames]
+        values = [scalars(field, frame, run) for frame in frames]
+        if not any(np.isfinite(each).any() for each in values):
+            msg = f"--color-by {field.name}: no frame to export has it; choose another field"
+            raise InputError(msg)
+        bounds = [span(each) for each in values if np.isfinite(each).any()]
         return cls(run, field, (min(low for low, _ in bounds), max(high for _, high in bounds)))
 
     def told(self, frame: Frame) -> dict[str, Any]:

@@ -4,19 +4,20 @@
     pvpython show_in_paraview.py FOLDER --picture last.png    the last frame, without a window
     pvpython show_in_paraview.py FOLDER --film pictures       one picture per frame into a new folder
 
-As a macro (Macros, Import new macro) it shows the folder of the .pvd file that is open. It needs ParaView 5.9 or later
+As a macro (Macros, Import new macro) it shows the folder of the .pvd file that is open. It needs ParaView 5.11 or later
 and nothing of the simulator. FOLDER is what `smarticles export --to vtp` wrote; by default that of this script.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 try:
-    from paraview import simple
+    simple: Any = import_module("paraview.simple")
 except ImportError:  # looked at, not run
     simple = None
 
@@ -30,22 +31,21 @@ def rgb(colour: str) -> list[float]:
     return [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
 
 
-def folder_of_export(given: str | None) -> str:
-    """Where the .pvd files are: as given, else of what is open, else beside this script."""
-    places = [given] if given else []
+def folder_of_export(given: str | None) -> Path:
+    """Where the .pvd files are: as given, else of what is open, else beside this script, else here."""
     source = simple.GetActiveSource()
+    places = [Path(given)] if given else []
     if source is not None and hasattr(source, "FileName"):
-        places.append(os.path.dirname(str(source.FileName)))
+        places.append(Path(str(source.FileName)).parent)
     if "__file__" in globals():
-        places.append(os.path.dirname(os.path.abspath(__file__)))
-    places.append(os.getcwd())
-    for place in places:
-        if os.path.isfile(os.path.join(place, "smarticles.pvd")):
+        places.append(Path(__file__).resolve().parent)
+    for place in (*places, Path.cwd()):
+        if (place / "smarticles.pvd").is_file():
             return place
-    sys.exit(f"no smarticles.pvd in {' or '.join(places)}; give the folder that `smarticles export --to vtp` wrote")
+    sys.exit(f"no smarticles.pvd in {places[0]}; give the folder that `smarticles export --to vtp` wrote")
 
 
-def show(folder: str) -> tuple[Any, Any]:
+def show(folder: Path) -> tuple[Any, Any]:
     """Read every collection, and show each kind as it is."""
     simple._DisableFirstRenderCameraReset()
     view = simple.GetActiveViewOrCreate("RenderView")
@@ -55,9 +55,9 @@ def show(folder: str) -> tuple[Any, Any]:
     view.ViewSize = SIZE
     sources = {}
     for kind in KINDS:
-        path = os.path.join(folder, f"{kind}.pvd")
-        if os.path.isfile(path):
-            sources[kind] = simple.PVDReader(registrationName=kind, FileName=path)
+        path = folder / f"{kind}.pvd"
+        if path.is_file():
+            sources[kind] = simple.PVDReader(registrationName=kind, FileName=str(path))
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     scene.GoToLast()
@@ -146,7 +146,7 @@ def look(view: Any, source: Any) -> None:
     flat = colouring(source) != "crossings"
     direction, view.CameraViewUp = ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) if flat else ([0.0, -1.0, 0.35], [0.0, 0.0, 1.0])
     view.CameraFocalPoint = focus
-    view.CameraPosition = [f + d for f, d in zip(focus, direction)]
+    view.CameraPosition = [f + d for f, d in zip(focus, direction, strict=True)]
     view.ResetCamera(False)
 
 
@@ -162,8 +162,8 @@ def main() -> None:
     if words.picture:
         simple.SaveScreenshot(words.picture, view, ImageResolution=SIZE)
     if words.film:
-        os.mkdir(words.film)
-        simple.SaveAnimation(os.path.join(words.film, "frame.png"), view, scene=scene, ImageResolution=SIZE)
+        Path(words.film).mkdir()
+        simple.SaveAnimation(str(Path(words.film) / "frame.png"), view, scene=scene, ImageResolution=SIZE)
 
 
 if __name__ == "__main__":

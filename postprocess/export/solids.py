@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import trimesh
-from trimesh.exchange.gltf import export_glb, export_gltf
-from trimesh.exchange.obj import export_obj
-from trimesh.exchange.stl import export_stl
+from trimesh.exchange import gltf, obj, stl
 
 from postprocess.export.colours import PAINTS, linear
 
@@ -18,6 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
+
+_GLTF, _OBJ, _STL = (cast("Any", module) for module in (gltf, obj, stl))  # typed in part only
 
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # rows: x, y, z of glTF in ours
 
@@ -51,12 +51,12 @@ def solids_file(solids: list[Solid], suffix: str, told: Mapping[str, Any]) -> by
     """
     scene = trimesh.Scene()
     for solid in solids:
-        scene.add_geometry(_mesh(solid, gltf=suffix in {"gltf", "glb"}), node_name=solid.kind, geom_name=solid.kind)
+        scene.add_geometry(_mesh(solid, y_up=suffix in {"gltf", "glb"}), node_name=solid.kind, geom_name=solid.kind)
     if suffix == "stl":
-        content: bytes = export_stl(scene.to_mesh())
+        content: bytes = _STL.export_stl(scene.to_mesh())
         return content
     if suffix == "obj":
-        text: str = export_obj(scene, include_normals=False, header="metres, z upwards")
+        text: str = _OBJ.export_obj(scene, include_normals=False, header="metres, z upwards")
         return text.encode("utf-8")
 
     def finish(tree: dict[str, Any]) -> None:
@@ -64,17 +64,19 @@ def solids_file(solids: list[Solid], suffix: str, told: Mapping[str, Any]) -> by
         tree["asset"]["extras"] = dict(told)
 
     if suffix == "glb":
-        return bytes(export_glb(scene, include_normals=False, tree_postprocessor=finish))
-    files = export_gltf(scene, include_normals=False, merge_buffers=True, embed_buffers=True, tree_postprocessor=finish)
+        return bytes(_GLTF.export_glb(scene, include_normals=False, tree_postprocessor=finish))
+    files = _GLTF.export_gltf(
+        scene, include_normals=False, merge_buffers=True, embed_buffers=True, tree_postprocessor=finish
+    )
     return bytes(files["model.gltf"])
 
 
-def _mesh(solid: Solid, *, gltf: bool) -> trimesh.Trimesh:
-    points = solid.points @ _Y_UP.T if gltf else solid.points
-    colours = linear(solid.colours) if gltf else solid.colours
+def _mesh(solid: Solid, *, y_up: bool) -> trimesh.Trimesh:
+    points = solid.points @ _Y_UP.T if y_up else solid.points
+    colours = linear(solid.colours) if y_up else solid.colours
     opaque = np.full((len(colours), 1), 255, dtype=np.uint8)
     mesh = trimesh.Trimesh(points, solid.triangles, vertex_colors=np.hstack([colours, opaque]), process=False)
-    if gltf:
+    if y_up:
         # Names of own attributes begin with an underscore, and whole numbers of four bytes are not allowed.
         mesh.vertex_attributes |= {
             f"_{name.upper()}": np.asarray(values, dtype=np.float32) for name, values in solid.attributes.items()

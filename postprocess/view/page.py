@@ -120,9 +120,7 @@ class Page:
                 html.B("{{ run_name }}")
                 html.Span("{{ caption }}")
                 with html.Label("colour by "), html.Select(v_model=("field",), id="field"):
-                    html.Option(
-                        "{{ entry.title }}", v_for="entry in fields", key="entry.name", value=("entry.name",)
-                    )
+                    html.Option("{{ entry.title }}", v_for="entry in fields", key="entry.name", value=("entry.name",))
                 html.Span("{{ fault }}", v_if="fault", classes="fault", role="alert")
             with html.Main():
                 self._canvas = vtk_widgets.VtkLocalView(

@@ -48,7 +48,10 @@ class RunView:
     def __init__(self, directory: Path | str) -> None:
         self.run = read_run(directory)
         self.frames: FrameSequence = read_frames(directory)
-        self.fields = fields_of(self.run)
+        frame = self.frames[-1]
+        self.fields = tuple(
+            field for field in fields_of(self.run) if field.costly or field.take(frame, self.run) is not None
+        )
         self.field = colour_field(None, self.run)
         self.pick: Pick | None = None
         self.window = Window(self.run)
@@ -57,7 +60,7 @@ class RunView:
         self._bodies.hold(self.frames[index] for index in self._spread(_SAMPLES))
         self._bounds: dict[str, tuple[float, float]] = {}
         self._index = len(self.frames) - 1
-        self._frame = self.frames[self._index]
+        self._frame = frame
 
     @property
     def index(self) -> int:
