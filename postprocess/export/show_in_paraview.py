@@ -12,14 +12,21 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-try:
-    simple: Any = import_module("paraview.simple")
-except ImportError:  # looked at, not run
-    simple = None
+
+def paraview_here() -> Any:
+    """ParaView's module; None where this script is looked at, not run."""
+    try:
+        return import_module("paraview.simple")
+    except ImportError:
+        return None
+
+
+simple = paraview_here()
 
 COLOURS = {"wall": "#9db4c8", "floor": "#e9e9e7", "hooks": "#b3261e", "strings": "#5b4636", "crossings": "#1a1a1a"}
 SIZE = [1000, 800]  # pixels
@@ -136,7 +143,12 @@ def arrows(kind: str, source: Any, view: Any) -> None:
     plain(kind, glyph, view)
 
 
-SHOWERS = {"smarticles": boxes, "wall": wall, "strings": strings, "crossings": arrows}
+SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
+    "smarticles": boxes,
+    "wall": wall,
+    "strings": strings,
+    "crossings": arrows,
+}
 
 
 def look(view: Any, source: Any) -> None:
