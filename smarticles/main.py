@@ -17,6 +17,7 @@ from smarticles.commands import (
     accuracy,
     compare,
     doctor,
+    export,
     init,
     measure,
     plan,
@@ -28,13 +29,14 @@ from smarticles.commands import (
     study,
     sweep,
     verify,
+    view,
 )
 from smarticles.completion import add_completion
 from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
 COMMANDS = (
-    *(init, run, plan, schema, doctor, measure, compare, render),
+    *(init, run, plan, schema, doctor, measure, compare, render, view, export),
     *(sweep, status, resume, study, accuracy, verify),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""

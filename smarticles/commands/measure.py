@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.layout import Cell, columns
-from smarticles.measuring import grouped, measured
+from smarticles.measuring import grouped, measured, sources
 from smarticles.parsing import Commands, add_json, add_overwrite
 
 if TYPE_CHECKING:
