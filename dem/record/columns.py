@@ -1,4 +1,4 @@
-"""The datasets of `series.h5`: unit, label and description, set by set as effects add them."""
+"""What is recorded: datasets of `series.h5` and cell data of frames, with unit and description, as effects add them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Column(NamedTuple):
-    """One dataset.
+    """One dataset, or one field of the frames.
 
     Attributes:
         unit: SI; "1" for a pure number.
@@ -135,3 +135,26 @@ EVERY: Columns = {
     **STRAIN_COLUMNS,
 }
 """All that any scene may have."""
+
+# Cell data of the frames: one value per link, in the order barb 1, middle link, barb 2 of each smarticle.
+FIELDS: Columns = {
+    "smarticle_id": Column("1", "smarticle", "number of the smarticle, the same in all frames"),
+    "link": Column("1", "link", "0 barb 1, 1 middle link, 2 barb 2"),
+    "velocity_m_per_s": Column("m/s", "velocity", "of the link's centre (x, y, z)"),
+    "angular_velocity_rad_per_s": Column("rad/s", "angular velocity", "of the link (x, y, z)"),
+    "contacts": Column("1", "contacts", "how many other smarticles this smarticle touches, by the engine"),
+    "time_s": Column("s", "time", "simulated time, the same for all links, so that each file stands alone"),
+    "floor_z_m": Column("m", "floor z", "height of the container's floor, likewise; heights are measured from it"),
+    "phase": Column("1", "phase", "index of the phase in the scene, likewise"),
+}
+# Only in scenes that actuate.
+MOTOR_FIELDS: Columns = {
+    "angle_rad": Column("rad", "angle", "of a barb, 0 straight, pi/2 the U; NaN on middle links"),
+    "motor_torque_N_m": Column(
+        "N m", "motor torque", "of the motor at the barb's hinge; NaN on middle links and while welded"
+    ),
+    "motor_work_J": Column(
+        "J", "motor work", "of that motor since the start; NaN on middle links and while welded"
+    ),
+    "halted": Column("1", "halted", "1 where that motor is halted by its torque, else 0"),
+}

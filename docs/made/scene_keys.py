@@ -1,0 +1,133 @@
+"""The keys of a scene, from its JSON schema: type, unit, range, default and meaning of each."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from made.tables import cell, code, table
+
+Schema = Mapping[str, Any]
+
+_UNIT = re.compile(r"\s*\[([^\[\]]{1,20})\]")
+_LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+_TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "null"}
+_HEAD = ("key", "type", "unit", "range", "default", "meaning")
+
+
+def scene_keys() -> str:
+    """One table for the scene itself, and one for every mapping and kind of phase and motion in it."""
+    from dem.scene.reading import json_schema  # noqa: PLC0415
+
+    schema = json_schema()
+    parts = [_table(schema)]
+    for title, names in _groups(schema):
+        parts.append(f"## {title}\n")
+        parts += [_part(name, schema["$defs"][name]) for name in names]
+    return "\n".join(parts)
+
+
+def _groups(schema: Schema) -> Iterator[tuple[str, list[str]]]:
+    """Definitions in the order in which a reader meets them."""
+    phases = _kinds(schema["properties"]["phases"]["items"])
+    motions = _kinds(next(iter(_options(schema["$defs"]["Actuate"]["properties"]["barbs"]))))
+    told = {*phases, *motions}
+    yield "Phases", phases
+    yield "Motions of the barbs", motions
+    yield "Mappings", [name for name in schema["$defs"] if name not in told]
+
+
+def _kinds(choice: Schema) -> list[str]:
+    return [_name(target) for target in choice["discriminator"]["mapping"].values()]
+
+
+def _name(reference: str) -> str:
+    return reference.rpartition("/")[2]
+
+
+def _part(name: str, definition: Schema) -> str:
+    kind = definition["properties"].get("type", {}).get("const")
+    said = " ".join(definition.get("description", "").split())
+    return f"({anchor(name)})=\n### {kind or name}\n\n{said}\n\n{_table(definition)}"
+
+
+def anchor(name: str) -> str:
+    """Where the page tells of a definition of the schema."""
+    return f"scene-{name.lower()}"
+
+
+def _table(definition: Schema) -> str:
+    required = definition.get("required", ())
+    rows = []
+    for key, entry in definition["properties"].items():
+        if key == "type" and "const" in entry:
+            continue
+        meaning = entry.get("description", "")
+        unit = _UNIT.search(meaning)
+        meaning = _UNIT.sub("", meaning, count=1)
+        rows.append(
+            (
+                code(key),
+                _type(entry),
+                "" if unit is None or unit[1] == "1" else cell(unit[1]),
+                _range(entry),
+                "**needed**" if key in required else _default(entry),
+                cell(meaning),
+            )
+        )
+    return table(_HEAD, rows) if rows else "It has no keys besides its `type`.\n"
+
+
+def _options(entry: Schema) -> Iterator[Schema]:
+    """What may stand there, without null."""
+    for option in entry.get("anyOf", [entry]):
+        if option.get("type") != "null":
+            yield option
+
+
+def _type(entry: Schema) -> str:
+    told = [_one_type(option) for option in _options(entry)]
+    if any(option.get("type") == "null" for option in entry.get("anyOf", ())):
+        told.append("null")
+    return " or ".join(told)
+
+
+def _one_type(entry: Schema) -> str:
+    if "$ref" in entry:
+        name = _name(entry["$ref"])
+        return f"[{name}](#{anchor(name)})"
+    if "discriminator" in entry:
+        kinds = entry["discriminator"]["mapping"]
+        return "one of " + ", ".join(f"[{kind}](#{anchor(_name(target))})" for kind, target in kinds.items())
+    if "const" in entry:
+        return code(str(entry["const"]))
+    if "enum" in entry:
+        return " or ".join(code(str(value)) for value in entry["enum"])
+    if entry.get("type") == "array":
+        if "prefixItems" in entry:
+            return f"list of {len(entry['prefixItems'])} {_one_type(entry['prefixItems'][0])}s"
+        item = _type(entry["items"])
+        return f"list of {item if item.startswith(('one', '[')) else item + 's'}"
+    return _TYPES[entry["type"]]
+
+
+def _range(entry: Schema) -> str:
+    for option in _options(entry):
+        limits = [f"{sign} {_number(option[word])}" for word, sign in _LIMITS.items() if word in option]
+        if limits:
+            return ", ".join(cell(limit) for limit in limits)
+    return ""
+
+
+def _number(value: float) -> str:
+    if value == 2**63:
+        return "2⁶³"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _default(entry: Schema) -> str:
+    if "default" not in entry:
+        return "see meaning" if "default" in entry.get("description", "") else ""
+    return code(json.dumps(entry["default"], ensure_ascii=False))

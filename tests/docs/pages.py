@@ -1,0 +1,90 @@
+"""The pages that a reader follows, and what they tell to type.
+
+Every block of a page has a language. `bash` is run as it stands; `python` is run as a script; `yaml`, `toml` and `jinja` begin
+with a comment that names a file, and are written to it; `text` is what a program says. A block that a test cannot run says why
+in the line above it: `<!-- not run: REASON -->`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DOCS = REPOSITORY / "docs"
+
+RUN = frozenset({"bash", "python"})
+WRITTEN = frozenset({"yaml", "toml", "jinja"})
+SHOWN = frozenset({"text"})
+
+_REASON = re.compile(r"<!-- not run: (.+?) -->\s*$")
+_FILE = re.compile(r"^(?:#|\{#)\s*([\w.-]+\.\w+)\b")
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a page.
+
+    Args:
+        line: where it begins.
+        language: after its fence; empty for a block that is only indented.
+        text: what it holds.
+        reason: why it is not run; None: it is.
+    """
+
+    line: int
+    language: str
+    text: str
+    reason: str | None
+
+    @property
+    def file(self) -> str | None:
+        """The name that its first line gives to a file."""
+        named = _FILE.match(self.text)
+        return named[1] if named else None
+
+
+@dataclass(frozen=True)
+class Page:
+    """One page of Markdown."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """For tests: where it is, seen from the repository."""
+        return self.path.relative_to(REPOSITORY).as_posix()
+
+    @cached_property
+    def text(self) -> str:
+        """All of it."""
+        return self.path.read_text(encoding="utf-8")
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """Its blocks of code, in order; directives of Sphinx are none."""
+        found, reason = [], None
+        for token in MarkdownIt().parse(self.text):
+            if token.type == "html_block":
+                said = _REASON.search(token.content)
+                reason = said[1] if said else None
+                continue
+            if token.type in {"fence", "code_block"} and not token.info.startswith("{"):
+                assert token.map is not None
+                found.append(Block(token.map[0] + 1, token.info.strip(), token.content, reason))
+            reason = None
+        return tuple(found)
+
+    @cached_property
+    def made(self) -> tuple[Path, ...]:
+        """Committed pictures that its commands make, `docs/pictures/PAGE/NAME.png`."""
+        return tuple(sorted((DOCS / "pictures" / self.path.stem).glob("*.png")))
+
+
+def pages() -> tuple[Page, ...]:
+    """README, and all pages of the documentation."""
+    return tuple(Page(path) for path in (REPOSITORY / "README.md", *sorted(DOCS.rglob("*.md"))))

@@ -1,0 +1,118 @@
+"""What README, tutorial, how-tos and gallery tell to type works: all of it is run, page by page, in an empty folder.
+
+    RENEW_PICTURES=1 pytest tests/docs/test_commands_run.py      takes the pictures that the pages' commands made
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from pages import DOCS, REPOSITORY, RUN, SHOWN, WRITTEN, Block, Page, pages
+
+from smarticles.main import build_parser
+
+PAGES = {page.name: page for page in pages()}
+FOLLOWED = [name for name, page in PAGES.items() if any(block.language in RUN for block in page.blocks)]
+COLOURS = 128
+"""Of a committed picture: half as large as with all of them, and nobody sees it."""
+
+
+@pytest.fixture(scope="module")
+def words(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """An environment in which `smarticles` and `python` are those of this checkout."""
+    folder = tmp_path_factory.mktemp("bin")
+    for name, module in (("smarticles", "-m smarticles"), ("python", "")):
+        script = folder / name
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" {module} "$@"\n', encoding="utf-8")
+        script.chmod(0o755)
+    paths = os.pathsep.join(filter(None, (str(REPOSITORY), os.environ.get("PYTHONPATH"))))
+    path = os.pathsep.join((str(folder), os.environ["PATH"]))
+    return {**os.environ, "PATH": path, "PYTHONPATH": paths, "MPLBACKEND": "Agg"}
+
+
+def _do(page: Page, block: Block, folder: Path, words: dict[str, str]) -> None:
+    if block.language in WRITTEN:
+        assert block.file is not None
+        (folder / block.file).write_text(block.text, encoding="utf-8")
+        return
+    command = ["bash", "-euo", "pipefail", "-c", block.text]
+    if block.language == "python":
+        command = [sys.executable, "-W", "error", "-c", block.text]
+    done = subprocess.run(command, cwd=folder, env=words, capture_output=True, text=True, check=False, timeout=300)
+    said = f"{page.name}:{block.line} exit status {done.returncode}\n{block.text}\n{done.stdout[-2000:]}\n{done.stderr}"
+    assert done.returncode == 0, said
+    assert "Traceback" not in done.stderr, said
+
+
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_what_a_page_tells_to_type_works(name: str, tmp_path: Path, words: dict[str, str]) -> None:
+    page = PAGES[name]
+    for block in page.blocks:
+        if block.reason is None and block.language not in SHOWN:
+            _do(page, block, tmp_path, words)
+    for picture in page.made:
+        _compare(picture, tmp_path / picture.name)
+
+
+def _compare(picture: Path, made: Path) -> None:
+    """A committed picture is the one that the commands make, up to what another processor makes of a pile."""
+    with Image.open(made) as image:
+        new = image.convert("RGB")
+    if os.environ.get("RENEW_PICTURES"):
+        new.quantize(COLOURS).save(picture, optimize=True)
+        return
+    with Image.open(picture) as image:
+        committed = image.convert("RGB")
+    assert committed.size == new.size, picture
+    old, now = (_coarse(image) for image in (committed, new))
+    background = np.median(now, axis=(0, 1))
+    # The same up to a fifth of what tells the picture from a blank sheet.
+    assert np.abs(now - background).mean() > 1, f"{made}: nothing on it"
+    assert np.abs(old - now).mean() < 0.2 * np.abs(now - background).mean(), f"{picture}: not what the commands make"
+
+
+def _coarse(image: Image.Image) -> NDArray[np.float64]:
+    return np.asarray(image.resize((64, 64), Image.Resampling.BOX), dtype=np.float64)
+
+
+def test_every_block_is_run_or_says_why_not(record_property: pytest.RecordProperty) -> None:  # type: ignore[name-defined]
+    """Nothing slips by: an unknown language, a block without one, a file without a name."""
+    left = []
+    for page in PAGES.values():
+        for block in page.blocks:
+            where = f"{page.name}:{block.line}"
+            assert block.language in RUN | WRITTEN | SHOWN, f"{where}: language {block.language!r}"
+            if block.reason is None:
+                assert block.language not in WRITTEN or block.file, f"{where}: begin with '# NAME.{block.language}'"
+            else:
+                assert block.language not in SHOWN, f"{where}: is not run anyway"
+                left.append(f"{where}: {block.reason}")
+    print("\n".join(["not run:", *left]))  # what `pytest -rP` lists
+    assert len(left) < 0.3 * sum(len(page.blocks) for page in PAGES.values()), "too much is left out"
+
+
+def test_commands_named_in_the_text_exist() -> None:
+    _, commands = build_parser()
+    for page in PAGES.values():
+        for named in re.findall(r"`smarticles ([a-z]+)", page.text):
+            assert named in commands.parsers, f"{page.name}: `smarticles {named}`"
+
+
+def test_every_committed_picture_is_made_by_its_page_and_shown() -> None:
+    made = {picture: page for page in PAGES.values() for picture in page.made}
+    for picture in DOCS.glob("pictures/**/*.png"):
+        assert picture in made, f"{picture}: no page makes it"
+        assert picture.name in "".join(block.text for block in made[picture].blocks)
+        shown = f"{picture.parent.name}/{picture.name}"
+        assert any(shown in page.text for page in PAGES.values()), f"{picture}: no page shows it"
+        assert picture.stat().st_size < 100_000, f"{picture}: {picture.stat().st_size} bytes"
+    assert shutil.which("bash")
