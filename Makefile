@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validate verify bench stability test lint types unit engine format lock clean
+.PHONY: help setup demo validate verify bench stability test lint types unit engine docs format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -53,6 +53,10 @@ unit: setup ## tests that need no YADE (minutes)
 
 engine: setup ## tests that run YADE (minutes)
 	$(PYTEST) tests/engine -m "not validation"
+
+docs: setup ## the documentation as pages, out/docs/index.html; warnings are errors (seconds)
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs out/docs
+	@echo "out/docs/index.html"
 
 format: setup ## rewrite the sources in the project's style
 	$(BIN)/ruff check --fix .

@@ -1,4 +1,4 @@
-"""Settings of the documentation, for Sphinx. Everything that a page loads lies beside it: nothing is asked of a network."""
+"""Settings of the documentation, for Sphinx. All that a page loads lies beside it: nothing is asked of a network."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_attr_annotations = False  # docstrings say types, with shapes
 napoleon_custom_sections = [("Source", "notes_style"), ("Sources", "notes_style")]
 
 html_theme = "furo"

@@ -153,8 +153,6 @@ MOTOR_FIELDS: Columns = {
     "motor_torque_N_m": Column(
         "N m", "motor torque", "of the motor at the barb's hinge; NaN on middle links and while welded"
     ),
-    "motor_work_J": Column(
-        "J", "motor work", "of that motor since the start; NaN on middle links and while welded"
-    ),
+    "motor_work_J": Column("J", "motor work", "of that motor since the start; NaN on middle links and while welded"),
     "halted": Column("1", "halted", "1 where that motor is halted by its torque, else 0"),
 }

@@ -41,7 +41,9 @@ class Scene(Part):
     """One run: everything that decides its result."""
 
     schema_version: Literal[1] = Field(1, description="version of this format [1]")
-    engine: Literal["yade", "links"] = Field("yade", description="what computes it: yade, chains of spheres on YADE, or links, swept segments")
+    engine: Literal["yade", "links"] = Field(
+        "yade", description="what computes it: yade, chains of spheres on YADE, or links, swept segments"
+    )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")
     smarticle: Smarticle = Field(default_factory=Smarticle, description="geometry and material of one smarticle")

@@ -14,9 +14,12 @@ def command_list() -> str:
     """Every command in a line, linked to its help."""
     from smarticles.main import build_parser  # noqa: PLC0415
 
-    parser, _ = build_parser()
-    told = {action.dest: action.help for action in parser._subparsers._group_actions[0]._choices_actions}
-    return table(("command", "what it does"), [(f"[{code(name)}](#command-{name})", cell(text)) for name, text in told.items()])
+    _, commands = build_parser()
+    rows = []
+    for name, parser in commands.parsers.items():
+        summary = (parser.description or "").partition("\n")[0].rstrip(".")
+        rows.append((f"[{code(name)}](#command-{name})", cell(summary)))
+    return table(("command", "what it does"), rows)
 
 
 def command_help() -> str:

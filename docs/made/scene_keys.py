@@ -101,16 +101,16 @@ def _one_type(entry: Schema) -> str:
     if "discriminator" in entry:
         kinds = entry["discriminator"]["mapping"]
         return "one of " + ", ".join(f"[{kind}](#{anchor(_name(target))})" for kind, target in kinds.items())
-    if "const" in entry:
-        return code(str(entry["const"]))
-    if "enum" in entry:
-        return " or ".join(code(str(value)) for value in entry["enum"])
-    if entry.get("type") == "array":
-        if "prefixItems" in entry:
-            return f"list of {len(entry['prefixItems'])} {_one_type(entry['prefixItems'][0])}s"
-        item = _type(entry["items"])
-        return f"list of {item if item.startswith(('one', '[')) else item + 's'}"
-    return _TYPES[entry["type"]]
+    if "const" in entry or "enum" in entry:
+        return " or ".join(code(str(value)) for value in entry.get("enum", [entry.get("const")]))
+    return _list(entry) if entry.get("type") == "array" else _TYPES[entry["type"]]
+
+
+def _list(entry: Schema) -> str:
+    if "prefixItems" in entry:
+        return f"list of {len(entry['prefixItems'])} {_one_type(entry['prefixItems'][0])}s"
+    item = _type(entry["items"])
+    return f"list of {item if item.startswith(('one', '[')) else item + 's'}"
 
 
 def _range(entry: Schema) -> str:

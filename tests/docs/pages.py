@@ -1,8 +1,8 @@
 """The pages that a reader follows, and what they tell to type.
 
-Every block of a page has a language. `bash` is run as it stands; `python` is run as a script; `yaml`, `toml` and `jinja` begin
-with a comment that names a file, and are written to it; `text` is what a program says. A block that a test cannot run says why
-in the line above it: `<!-- not run: REASON -->`.
+Every block of a page has a language. `bash` is run as it stands; `python` is run as a script; `yaml`, `toml` and
+`jinja` begin with a comment that names a file, and are written to it; `text` is what a program says. A block that a
+test cannot run says why in the line above it: `<!-- not run: REASON -->`.
 """
 
 from __future__ import annotations

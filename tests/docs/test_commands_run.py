@@ -1,6 +1,6 @@
 """What README, tutorial, how-tos and gallery tell to type works: all of it is run, page by page, in an empty folder.
 
-    RENEW_PICTURES=1 pytest tests/docs/test_commands_run.py      takes the pictures that the pages' commands made
+RENEW_PICTURES=1 pytest tests/docs/test_commands_run.py      takes the pictures that the pages' commands made
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 from pages import DOCS, REPOSITORY, RUN, SHOWN, WRITTEN, Block, Page, pages
+from PIL import Image
 
 from smarticles.main import build_parser
 
