@@ -45,6 +45,9 @@ def write_report(arguments: argparse.Namespace) -> int:
         raise InputError(msg)
     # Before a minute of measuring, not after it.
     refuse_to_overwrite(output, overwrite=arguments.overwrite)
+    if arguments.output is not None and not output.parent.is_dir():
+        msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
+        raise InputError(msg)
     from smarticles.reporting.kinds import page_of  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.page import to_html  # noqa: PLC0415
 

@@ -144,7 +144,7 @@ def address(content: bytes, mime: str) -> str:
 
 def _both(draw: Callable[[Axes], None]) -> tuple[str, str]:
     with style(), rc_context(_INK):
-        figure, axes = new_figure(width=5.2, height=2.4)
+        figure, axes = new_figure(width=4.2, height=2.2)
         figure.set_layout_engine("constrained")
         figure.patch.set_alpha(0)
         axes.patch.set_alpha(0)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 
 import jinja2
@@ -61,12 +62,14 @@ class Figure:
         alt: what it shows, for who cannot see it.
         light: data address of the picture.
         dark: the same for a dark page; None: the one is shown on a light card.
+        wide: whether it stands alone, and not beside its neighbours.
     """
 
     caption: str
     alt: str
     light: str
     dark: str | None = None
+    wide: bool = False
     kind: str = field(default="figure", init=False)
 
 
@@ -100,6 +103,11 @@ class Section:
     def anchor(self) -> str:
         """Where links within the page lead."""
         return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+
+    @property
+    def parts(self) -> list[list[Block]]:
+        """The blocks, figures that follow each other together: they stand side by side where there is room."""
+        return [list(part) for _, part in groupby(self.blocks, key=lambda block: block.kind == "figure")]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -77,6 +77,7 @@ class Results:
                 caption=f"{file.name}",
                 alt=f"Figure “{file.stem.replace('_', ' ')}” of the study {study}; its numbers are in the tables below",
                 light=embedded(file),
+                wide=True,
             )
             for file in files
         ]

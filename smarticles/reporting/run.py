@@ -51,6 +51,7 @@ def run_page(directory: Path, table: Path | None, made: str) -> Page:
     Raises:
         InputError: it is no run directory, or a file of it is damaged.
     """
+    directory = directory.resolve()
     run = read_run(directory)
     scene, why_not = _scene(directory)
     return Page(
@@ -224,7 +225,6 @@ def warning_blocks(directories: dict[str, Path]) -> list[Block]:
 
 
 def _repeat(run: RunManifest, directory: Path) -> list[Block]:
-    where = shlex.quote(str(directory / SCENE))
     rows = [
         ["scene hash (SHA-256)", run.scene_sha256],
         ["seed", str(run.seed)],
@@ -232,12 +232,13 @@ def _repeat(run: RunManifest, directory: Path) -> list[Block]:
         ["threads", word(run.threads)],
         *([f"version of {name}", version] for name, version in run.versions.items()),
     ]
-    once_more = f"smarticles run {where} --out {shlex.quote(directory.name + '-again')}"
+    # From the folder that the directory is in: where that lies on this machine is nobody else's.
+    here, there = shlex.quote(directory.name), shlex.quote(f"{directory.name}-again")
+    again = f"smarticles run {here}/{SCENE} --out {there}\nsmarticles compare {here} {there}"
     told = "One thread gives the same bits with the same versions; smarticles compare tells whether it did."
     return [
         Listing(caption="The command of this run", text=run.command),
-        Listing(caption="The same once more", text=f"{once_more}\nsmarticles compare {shlex.quote(str(directory))} "
-                f"{shlex.quote(directory.name + '-again')}"),
+        Listing(caption="The same once more", text=again),
         Words(lines=[told] if run.threads == 1 else ["Several threads: the same numbers only within rounding."]),
-        Table(caption="What made it", header=["", ""], rows=rows),
+        Table(caption="What made it", header=["what", "value"], rows=rows),
     ]  # fmt: skip

@@ -106,6 +106,22 @@ def _varied(folder: Folder) -> dict[str, list[Any]]:
     return found
 
 
+def _independent(folder: Folder, varied: Mapping[str, Sequence[Any]]) -> list[str]:
+    """Variables that vary and do not follow from one before, as a count does from l/w; without the seed."""
+    kept: list[str] = []
+    for name in (name for name, values in varied.items() if name != SEED and len(values) > 1):
+        if not any(_follows(folder, name, other) for other in kept):
+            kept.append(name)
+    return kept
+
+
+def _follows(folder: Folder, name: str, other: str) -> bool:
+    """Whether runs that are alike in one variable are alike in another."""
+    seen: dict[str, str] = {}
+    pairs = ((str(entry.values.get(other)), str(entry.values.get(name))) for entry in folder.entries)
+    return all(seen.setdefault(there, here) == here for there, here in pairs)
+
+
 def _missing(states: Sequence[RunStatus]) -> list[Block]:
     rows = [
         [one.name, one.state, word(one.phase), word(one.time_s), word(one.cause)]
@@ -122,7 +138,7 @@ def _not_analysed(study: str, folder: Folder, *, analysed: bool) -> list[Block]:
     if analysed or study not in STUDIES:
         return []
     quick = " --quick" if folder.name.endswith("-quick") else ""
-    command = f"smarticles study {study}{quick} --out {shlex.quote(str(folder.path))} --analyse"
+    command = f"smarticles study {study}{quick} --out {shlex.quote(folder.path.resolve().name)} --analyse"
     return [Words(lines=[f"The study has not been analysed; its findings come with: {command}"], tone="note")]
 
 
@@ -131,7 +147,7 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
     if not any((folder.run(entry) / collection(FRAME)).is_file() for entry in folder.entries):
         return [Section(title="Result", blocks=[Words(lines=["No run has frames yet."], tone="note")])]
     table = measured([folder.path], costly="never", jobs=jobs)
-    by = [name for name, values in varied.items() if name != SEED and len(values) > 1 and name in table.columns]
+    by = [name for name in _independent(folder, varied) if name in table.columns]
     means = grouped(table, by)
     final = means[means["phase"] == means["phase"].max()]
     kind = final["phase type"].iloc[0]
@@ -173,8 +189,8 @@ def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequen
         heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"
         light, dark = against_variable(Points(variable=across, label=heading, groups=groups))
         alt = f"{quantity.label} against {across}, from {_range(final[quantity.header] * shown.factor)}"
-        caption = f"{quantity.label} against {across}, means over runs ± standard error, phase {kind}."
-        blocks.append(Figure(caption=caption[0].upper() + caption[1:], alt=alt, light=light, dark=dark))
+        caption = f"{heading}: {quantity.label} against {across}, means over runs ± standard error, phase {kind}."
+        blocks.append(Figure(caption=caption, alt=alt, light=light, dark=dark))
     return blocks
 
 
@@ -243,11 +259,11 @@ def _repeat(folder: Folder, results: Path | None) -> list[Block]:
     rows += [[f"made {count} of {len(folder.entries)} runs", told] for told, count in used.items() if told]
     header = ["run", *folder.entries[0].values, "scene hash (SHA-256)"]
     points = [[one.name, *map(word, one.values.values()), one.scene_sha256] for one in folder.entries]
-    again = f"smarticles resume {shlex.quote(str(folder.path))}"
+    again = f"smarticles resume {shlex.quote(folder.path.resolve().name)}"
     return [
         Listing(caption="The command that made it", text=folder.command),
         Listing(caption="What computes the runs that are missing", text=again),
-        Table(caption="What made it", header=["", ""], rows=rows),
+        Table(caption="What made it", header=["what", "value"], rows=rows),
         Table(caption="All runs, what varies, and the hashes of their scenes", header=header, rows=points, folded=True),
         *(read_results(results).origin_blocks() if results is not None else ()),
     ]
