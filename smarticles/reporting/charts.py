@@ -90,10 +90,14 @@ def against_variable(points: Points) -> tuple[str, str]:
         markers = "osD^v"
         numeric = all(isinstance(x, int | float) for xs, _, _ in points.groups.values() for x in xs)
         names = list(dict.fromkeys(str(x) for xs, _, _ in points.groups.values() for x in xs))
+        every = np.array([_place(x, names, numeric) for xs, _, _ in points.groups.values() for x in xs])
+        apart = np.diff(np.unique(every)).min() if len(np.unique(every)) > 1 else 1.0
         for number, (name, (xs, means, errors)) in enumerate(points.groups.items()):
-            places = [float(x) for x in xs] if numeric else [float(names.index(str(x))) for x in xs]  # type: ignore[arg-type]
+            # A little beside each other, so that error bars do not hide each other.
+            aside = 0.06 * apart * (number - (len(points.groups) - 1) / 2)
+            places = [_place(x, names, numeric) + aside for x in xs]
             axes.errorbar(
-                places, means, np.nan_to_num(errors), color=colours[number % len(colours)], label=name,
+                places, means, np.asarray(errors, dtype=float), color=colours[number % len(colours)], label=name,
                 marker=markers[number % len(markers)], linestyle="-" if numeric else "none", linewidth=0.9,
             )  # fmt: skip
         if not numeric:
@@ -101,11 +105,17 @@ def against_variable(points: Points) -> tuple[str, str]:
         axes.set_xlabel(points.variable, parse_math=False)
         axes.set_ylabel(points.label, parse_math=False)
         if len(points.groups) > 1:
-            legend = axes.legend(loc="best")
+            # Above, where it hides nothing.
+            legend = axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
             for text in legend.get_texts():
                 text.set_parse_math(False)
 
     return _both(draw)
+
+
+def _place(x: object, names: Sequence[str], numeric: bool) -> float:
+    """Where on the axis a value stands: names in their order."""
+    return float(str(x)) if numeric else float(names.index(str(x)))
 
 
 def thinned(times: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,6 +1,7 @@
 """The notebook runs from top to bottom in a fresh process, and its numbers are those of its runs.
 
-Its cells are plain Python and are run as such: a Jupyter kernel would bring another IPython than the one that YADE imports.
+Its cells are plain Python and are run as such: a Jupyter kernel would bring another IPython than the one that YADE
+imports.
 """
 
 from __future__ import annotations

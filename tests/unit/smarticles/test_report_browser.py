@@ -1,4 +1,4 @@
-"""The page in a real browser: no word on its console, no request, nothing cut off on a phone, dark where that is wanted."""
+"""The page in a real browser: nothing on its console, no request, nothing cut off on a phone, dark where that is wanted."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_cases import Smarticles, WriteRun
+from command_cases import WriteRun
 from hostile import NAMES, of_entry, spoil
 from PIL import Image
+from playwright.sync_api import sync_playwright
 
+from smarticles.main import main
 from smarticles.sweeps import make_folder
 
 CHROMIUM = shutil.which("chromium")
@@ -24,8 +26,6 @@ DESK = {"viewport": {"width": 1200, "height": 900}}
 def browser() -> Iterator[Any]:
     if CHROMIUM is None:
         pytest.skip("no browser here: apt-get install chromium, see setup/debian-packages-dev.txt")
-    from playwright.sync_api import sync_playwright
-
     with sync_playwright() as playwright:
         # In containers Chromium's own sandbox has no rights to make one; the pages are ours.
         yield playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
@@ -62,8 +62,6 @@ class Seen:
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory, write_run: WriteRun) -> dict[str, Path]:
     """Pages of a run for each hostile name, and of a sweep."""
-    from smarticles.main import main
-
     folder = tmp_path_factory.mktemp("pages")
     found = {}
     for number, name in enumerate(NAMES):
@@ -142,8 +140,10 @@ def luminance(colour: str) -> float:
 def test_charts_are_legible_on_either_ground(pages: dict[str, Path], browser: Any) -> None:
     """Each chart's second picture has none of the first one's ink."""
     seen = Seen(browser, pages["sweep"], **DESK)
-    both = seen.ask("[...document.querySelectorAll('picture')].filter(p => p.querySelector('source')).map(p => "
-                    "[p.querySelector('img').src, p.querySelector('source').srcset].map(u => atob(u.split(',')[1])))")  # fmt: skip
+    both = seen.ask(
+        "[...document.querySelectorAll('picture')].filter(one => one.querySelector('source')).map(one => "
+        "[one.querySelector('img').src, one.querySelector('source').srcset].map(url => atob(url.split(',')[1])))"
+    )
     assert both
     for light, dark in both:
         assert "#1a1a1a" in light

@@ -13,9 +13,9 @@ import pytest
 import yaml
 from command_cases import Smarticles, WriteRun
 from hostile import NAMES, of_entry, spoil
+from scenes import small
 
 from dem.scene.reading import dump_scene, scene_hash
-from scenes import small
 from smarticles.reporting.charts import thinned
 from smarticles.reporting.page import Table
 from smarticles.sweeps import make_folder
