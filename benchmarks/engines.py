@@ -3,7 +3,8 @@
 The same scene at every N, in a cylinder that is widened so that the pile is as high as the paper's of 270; every run is
 a process of its own on one thread, the engines turn about. Processor time of the activity alone is compared, shaking or
 the paper's internal oscillation, with everything that a run records; pouring and loading are left out. The table goes
-to stdout and, run by run, to `engines.csv`, where a later call with the same `--out` goes on. A run that would go beyond
+to stdout and, run by run, to `engines.csv`, where a later call with the same `--out` goes on. A run that would go
+beyond
 the time allowed, by what the one before it took, is left out and said so.
 """
 
