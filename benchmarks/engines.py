@@ -4,8 +4,7 @@ The same scene at every N, in a cylinder that is widened so that the pile is as 
 a process of its own on one thread, the engines turn about. Processor time of the activity alone is compared, shaking or
 the paper's internal oscillation, with everything that a run records; pouring and loading are left out. The table goes
 to stdout and, run by run, to `engines.csv`, where a later call with the same `--out` goes on. A run that would go
-beyond
-the time allowed, by what the one before it took, is left out and said so.
+beyond the time allowed, by what the one before it took, is left out and said so.
 """
 
 from __future__ import annotations
