@@ -1,4 +1,4 @@
-"""The page in a real browser: nothing on its console, no request, nothing cut off on a phone, dark where that is wanted."""
+"""The page in a browser: nothing on its console, no request, nothing cut off on a phone, dark where that is wanted."""
 
 from __future__ import annotations
 
