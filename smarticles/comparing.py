@@ -109,14 +109,13 @@ def _kind(path: Path) -> str:
 
 def _runs(one: Path, other: Path) -> Comparison:
     first, second = read_run(one), read_run(other)
-    tables = [_begun(path) for path in (one, other)]
     return Comparison(
         kind="run",
         scene=differences(read_scene(one).values, read_scene(other).values),
         versions=differences(_made_by(first), _made_by(second)),
         only={},
         bits={first.name: same_bits(one, other)},
-        measures=_beside(*tables, list(PHASE)),
+        measures=_beside(_begun(one), _begun(other), list(PHASE)),
     )
 
 
@@ -139,7 +138,7 @@ def _sweeps(one: Folder, other: Folder) -> Comparison:
     ]
     variables = [_varied(folder) for folder in (one, other)]
     by = [name for name in variables[0] if name != SEED and name in variables[1]]
-    tables = [grouped(measured([folder.path]), [*by, *PHASE]) for folder in (one, other)]
+    keys = [*by, *PHASE]
     return Comparison(
         kind="sweep",
         scene=differences(*({name: _told(v) for name, v in varied.items()} for varied in variables)),
@@ -149,7 +148,7 @@ def _sweeps(one: Folder, other: Folder) -> Comparison:
             B: tuple(name for name in names[1] if name not in names[0]),
         },
         bits={name: same_bits(one.run(names[0][name]), other.run(names[1][name])) for name in begun},
-        measures=_beside(*tables, [*by, *PHASE]),
+        measures=_beside(grouped(measured([one.path]), keys), grouped(measured([other.path]), keys), keys),
     )
 
 

@@ -22,6 +22,7 @@ from smarticles.commands import (
     measure,
     plan,
     render,
+    report,
     resume,
     run,
     schema,
@@ -36,7 +37,7 @@ from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
 COMMANDS = (
-    *(init, run, plan, schema, doctor, measure, compare, render, view, export),
+    *(init, run, plan, schema, doctor, measure, compare, render, view, export, report),
     *(sweep, status, resume, study, accuracy, verify),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""

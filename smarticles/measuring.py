@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +14,11 @@ from dem.errors import InputError, nearest
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from postprocess.measures.table import Costly
+
+_WORTH_PROCESSES = 6
+"""Runs from which on starting processes saves time: each loads its libraries anew."""
 
 PHASE = ("phase", "phase type")
 """Columns that tell the phases of a run apart."""
@@ -43,12 +51,17 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
     return found
 
 
-def measured(directories: Sequence[Path], *, frames: bool = False) -> pd.DataFrame:
+def measured(
+    directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
+) -> pd.DataFrame:
     """Measures of runs and sweeps, one row per run and phase; what a sweep varied stands beside the run.
 
     Args:
         directories: of runs and sweeps.
         frames: one row per frame instead.
+        costly: when to take the costly packing fractions, see `postprocess.measure_run`.
+        jobs: runs that are measured at once, each in a process of its own; only for programs that processes may be
+            started from, which a script without a guarded main is not.
 
     Returns:
         A table with units in its columns. A variable of a sweep that has the name of another column and not its
@@ -59,19 +72,33 @@ def measured(directories: Sequence[Path], *, frames: bool = False) -> pd.DataFra
     """
     import pandas as pd  # noqa: PLC0415
 
-    from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
-
-    measure = measure_run if frames else summarise_run
+    found = sources(directories)
     tables = []
-    for directory, values in sources(directories).items():
-        table = measure(directory)
+    for (_, values), table in zip(found.items(), _tables(list(found), frames, costly, jobs), strict=True):
         swept = {_column(name, value, table): value for name, value in values.items()}
         for place, (name, value) in enumerate(swept.items(), start=1):
             if name in table.columns:
-                table = table.drop(columns=name)
+                table = table.drop(columns=name)  # noqa: PLW2901  (the same, put at another place)
             table.insert(place, name, [_cell(value)] * len(table))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def _tables(directories: Sequence[Path], frames: bool, costly: Costly, jobs: int) -> Iterator[pd.DataFrame]:
+    """The table of each run, in order."""
+    take = partial(_one, frames=frames, costly=costly)
+    if jobs == 1 or len(directories) < _WORTH_PROCESSES:
+        yield from map(take, directories)
+        return
+    # Anew, not forked: VTK and matplotlib may have threads here.
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(take, directories)
+
+
+def _one(directory: Path, *, frames: bool, costly: Costly) -> pd.DataFrame:
+    from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
+
+    return (measure_run if frames else summarise_run)(directory, costly=costly)
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:

@@ -52,7 +52,7 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
         text = text.replace(f"'{{{{ {name} }}}}'", f"{{{{ {name} }}}}")
     (folder / "scene.yaml.j2").write_text(text, encoding="utf-8")
     grid = {name: list(vary[key]) for key, name in names.items() if name != SEED}
-    content = {
+    content: dict[str, Any] = {
         "schema_version": 1,
         "name": str(data.get("name", "sweep")),
         "template": "scene.yaml.j2",

@@ -19,7 +19,7 @@ from smarticles.stopping import orderly_stop
 
 COMMANDS = {
     "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
-    "verify", "init", "compare",
+    "verify", "init", "compare", "report",
 }  # fmt: skip
 
 
