@@ -113,7 +113,7 @@ class ColourScale:
         Args:
             figure: Where to.
             label: What the colours mean.
-            unit: A hundredth of the picture's shorter side [pixel].
+            unit: What text is measured by [pixel].
             right: What to leave free at the edge [pixel].
         """
         if self._mappable is None:

@@ -100,6 +100,5 @@ def _pictures(rows: Sequence[Row]) -> list[list[Image.Image]]:
             pixel = canvas.pixel
     # The corner of a picture from the front is empty: the floor is round.
     width, height = pictures[-1][0].size
-    unit = min(_SIZE) / 100
-    draw_scale_bar(pictures[-1][0], (2 * unit, height - 3 * unit), pixel, room=width, unit=1.6 * unit)
+    draw_scale_bar(pictures[-1][0], (2 * look.unit, height - 3 * look.unit), pixel, room=width, unit=1.4 * look.unit)
     return pictures
