@@ -149,7 +149,7 @@ def test_each_step_of_the_bar_has_a_colour_of_its_own_in_a_gif(tmp_path):
 
 @pytest.mark.parametrize(("suffix", "unit"), [(".gif", 10), (".webp", 1)])
 def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, unit):
-    path = render_film(run, tmp_path / f"film{suffix}", size=SIZE, color_by="height", frames_per_second=15.0)
+    path = render_film(run, tmp_path / f"film{suffix}", size=SIZE, color_by="id", frames_per_second=15.0)
     pictures, times = shown(path)
     assert len(pictures) == 9
     for before, after in itertools.pairwise(map(panel, pictures[::3])):

@@ -132,15 +132,15 @@ def test_runs_beside_each_other_have_one_scale_one_time_and_one_bar(tmp_path):
     """Two and one flat smarticles: the same smarticle is as large in both, its colour that of the common scale."""
     flat = u_shape(0.7 * W)[None]
     low, high = np.array([-0.012, 0, 0.001]), np.array([0.006, 0, 0.001])
-    first = one(tmp_path / "a", np.concatenate([flat + low, flat + high]), contacts=[1, 5])
-    second = one(tmp_path / "b", flat + low, contacts=[1])
+    first = one(tmp_path / "a", np.concatenate([flat + low, flat + high]), contacts=[2, 5])
+    second = one(tmp_path / "b", flat + low, contacts=[2])
     look = {"size": (400, 400), "view": "top", "color_by": "contacts"}
     image = pixels(render_run(first, compare=[second], output=tmp_path / "c.png", **look))
     across = 400 - round(13 * 4.4)
     assert image.shape == (400, across + 400, 3)
     left, right = image[60:370, : across // 2], image[60:370, across : across + across // 2]
     assert (np.ptp(left, axis=2) > 40).sum() > 100
-    assert (np.abs(left - right).max(axis=2) > 20).mean() < 0.002
+    assert (np.abs(left - right).max(axis=2) > 40).sum() < 0.02 * (np.ptp(left, axis=2) > 40).sum()
     # Alone the second would have its own scale of colours.
     alone = pixels(render_run(second, output=tmp_path / "d.png", **look))
     assert (np.abs(alone[60:370, : across // 2] - right).max(axis=2) > 30).sum() > 100
@@ -192,7 +192,8 @@ def test_one_smarticle_is_drawn_with_what_passes_through_it(tmp_path):
     # Drawn alone it has its plane and no blue.
     alone = pixels(render_run(run, output=tmp_path / "b.png", smarticle=0, size=(300, 300)))[40:280]
     assert not ((alone[..., 2] - alone[..., 0]) > 60).any()
-    assert (alone[..., 0] - alone[..., 2] > 15).mean() > 0.1
+    plane = (alone[..., 0] > 225) & (np.abs(alone[..., 0] - alone[..., 2] - 45) < 35)
+    assert plane.mean() > 0.15
     with pytest.raises(InputError, match=r"smarticle 3: there are 0 to 2 at 0\.5 s; choose one of these"):
         render_run(run, output=tmp_path / "c.png", smarticle=3)
     with pytest.raises(InputError, match="smarticle 1: is drawn alone, in colours and from a side of its own"):
@@ -237,7 +238,7 @@ def test_strings_and_walls_of_a_channel_are_drawn(tmp_path):
     run = chain(tmp_path / "a")
     size = {"size": (400, 400)}
     image = pixels(render_run(run, output=tmp_path / "a.png", **size))[55:375]
-    red = (image[..., 0] - image[..., 1] > 100) & (image[..., 0] - image[..., 2] > 100)
+    red = (image[..., 0] - image[..., 1] > 125) & (image[..., 1] < 70)
     rows, columns = np.nonzero(red)
     assert np.ptp(rows) < 20  # along the axis
     assert columns.min() < 20
@@ -246,6 +247,7 @@ def test_strings_and_walls_of_a_channel_are_drawn(tmp_path):
     assert np.diff(middle).max() > 50  # the chain itself is not red there
     grey = (np.abs(image - [0x7D, 0x8F, 0x9F]).max(axis=2) < 40).sum(axis=1)
     walls = np.flatnonzero(grey > 300)
-    assert 150 < np.ptp(walls) < 220  # 30 mm of some 80 mm
+    # 30 mm apart, where chain, strings and the way pulled are some 102 mm.
+    assert np.ptp(walls) == pytest.approx(0.030 / (2 * W - T1 - GAP + 2 * CORD + 0.04) * np.ptp(columns), rel=0.05)
     before = pixels(render_run(run, output=tmp_path / "b.png", time=1.0, **size))[55:375]
-    assert not ((before[..., 0] - before[..., 1] > 100) & (before[..., 0] - before[..., 2] > 100)).any()
+    assert not ((before[..., 0] - before[..., 1] > 125) & (before[..., 1] < 70)).any()
