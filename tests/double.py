@@ -116,6 +116,8 @@ class MotorsDouble:
     readings: MotorReadings | None = None
     work: float = 0.0
     angles: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    looks_at_once: int = 1
+    targets: list[Array] = field(default_factory=list)
 
     def articulate(self) -> None:
         assert self.present
@@ -131,8 +133,10 @@ class MotorsDouble:
 
     def actuate(self, targets: Array, interval: float) -> None:
         assert self.articulated
+        assert len(targets) <= self.looks_at_once
         self.told.append(("actuate", interval))
-        self._hold(targets)
+        self.targets += list(targets)
+        self._hold(targets[-1])
 
     def _hold(self, angles: Array) -> None:
         none = np.zeros_like(angles)
