@@ -103,6 +103,19 @@ def test_nothing_is_written_over_an_edge(size):
     assert dark[: size[1] - look.foot - height, :width].any()
 
 
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.0, 0.00025), (0.0, 1e-9), (-1234.5, 99999.0), (0.0314, 0.0339), (2.0, 3.0)]
+)
+def test_a_bar_of_long_numbers_keeps_to_the_picture(low, high):
+    look = Look.checked(color_by="speed", size=(220, 300), view="front")
+    width, height = look.panel
+    page = Page(look, ColourScale.of(COLOURINGS["speed"], low, high), None)
+    panel = np.full((height, width, 3), 255, dtype=np.uint8)
+    dark = np.asarray(page.picture([panel], [Caption("", ())])).min(axis=2) < 200
+    assert not dark[:, -8:].any()
+    assert dark[:, width:].any()
+
+
 # Scale
 
 
