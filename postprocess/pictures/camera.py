@@ -67,10 +67,13 @@ class Look:
 
     @property
     def panel(self) -> tuple[int, int]:
-        """Width and height of the three-dimensional part [pixel]: without caption, scale bar and colour bar, if any."""
+        """Width and height of the three-dimensional part [pixel]: without caption, scale bar and colour bar, if any.
+
+        The width is even, so that films of several runs are as wide as `.mp4` wants them.
+        """
         width, height = self.size
         bar = 0.0 if self.colouring.kind == "name" else _BAR
-        return round(width - bar * self.unit), round(height - _CAPTION * self.unit) - self.foot
+        return 2 * int((width - bar * self.unit) / 2), round(height - _CAPTION * self.unit) - self.foot
 
     @property
     def foot(self) -> int:

@@ -116,6 +116,14 @@ def test_a_bar_of_long_numbers_keeps_to_the_picture(low, high):
     assert dark[:, width:].any()
 
 
+@pytest.mark.parametrize("columns", [1, 2, 3])
+@pytest.mark.parametrize("side", [240, 360, 420, 606])
+def test_an_even_size_stays_even_with_several_runs(columns, side):
+    """As H.264 wants it."""
+    look = Look.checked(color_by="crossings", size=(side, 240), view="front")
+    assert page_size(look, columns)[0] % 2 == 0
+
+
 # Scale
 
 
@@ -149,14 +157,15 @@ def test_runs_beside_each_other_have_one_scale_one_time_and_one_bar(tmp_path):
     second = one(tmp_path / "b", flat + low, contacts=[2])
     look = {"size": (400, 400), "view": "top", "color_by": "contacts"}
     image = pixels(render_run(first, compare=[second], output=tmp_path / "c.png", **look))
-    across = 400 - round(13 * 4.4)
+    across = 2 * int((400 - 13 * 4.4) / 2)
     assert image.shape == (400, across + 400, 3)
-    left, right = image[60:370, : across // 2], image[60:370, across : across + across // 2]
+    part = 2 * across // 5  # without the other one
+    left, right = image[60:370, :part], image[60:370, across : across + part]
     assert (np.ptp(left, axis=2) > 40).sum() > 100
     assert (np.abs(left - right).max(axis=2) > 40).sum() < 0.02 * (np.ptp(left, axis=2) > 40).sum()
     # Alone the second would have its own scale of colours.
     alone = pixels(render_run(second, output=tmp_path / "d.png", **look))
-    assert (np.abs(alone[60:370, : across // 2] - right).max(axis=2) > 30).sum() > 100
+    assert (np.abs(alone[60:370, :part] - right).max(axis=2) > 30).sum() > 100
 
 
 def test_runs_are_compared_at_the_last_time_that_all_have(tmp_path):
