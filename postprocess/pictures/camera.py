@@ -32,8 +32,9 @@ FIELD_OF_VIEW = 22.0
 
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000
 _FILL = 0.97  # share of the panel that the pile and its container may take
-_BAR = 0.13  # of the width, for the colour bar
-_CAPTION, _FOOT = 0.115, 0.045  # of the height, for the caption above and the scale bar below
+# In units, see `Look.unit`: width of the colour bar with its labels, height of caption and of the scale bar's strip.
+_BAR, _CAPTION, _FOOT = 13.0, 11.5, 4.5
+_LEAST_UNIT = 4.4  # pixel: smaller text cannot be read
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +67,23 @@ class Look:
 
     @property
     def panel(self) -> tuple[int, int]:
-        """Width and height of the three-dimensional part [pixel]: without caption, scale bar and colour bar, if any."""
+        """Width and height of the three-dimensional part [pixel]: without caption, scale bar and colour bar, if any.
+
+        The width is even, so that films of several runs are as wide as `.mp4` wants them.
+        """
         width, height = self.size
         bar = 0.0 if self.colouring.kind == "name" else _BAR
-        return round(width * (1 - bar)), round(height * (1 - _CAPTION - _FOOT))
+        return 2 * int((width - bar * self.unit) / 2), round(height - _CAPTION * self.unit) - self.foot
 
     @property
     def foot(self) -> int:
         """Height of the strip below it [pixel]."""
-        return round(self.size[1] * _FOOT)
+        return round(_FOOT * self.unit)
+
+    @property
+    def unit(self) -> float:
+        """What text is measured by: a hundredth of the picture's shorter side, or what can just be read [pixel]."""
+        return max(min(self.size) / 100, _LEAST_UNIT)
 
     @property
     def axes(self) -> NDArray[np.float64]:

@@ -264,7 +264,8 @@ class Canvas:
         self._plotter.remove_actor("strings", render=False)
         if not len(strings):
             return
-        thick = 0.06 * self._run.thickness_in_plane * MILLIMETRE
+        # A string has no thickness in the simulation: here one that is seen.
+        thick = max(0.06 * self._run.thickness_in_plane * MILLIMETRE, self._pixel)
         lifted = strings + np.array([0.0, 0.0, self._run.thickness_normal * MILLIMETRE])
         tubes = [pv.Line(*ends).tube(radius=thick) for ends in lifted]
         knots = [pv.Sphere(radius=3 * thick, center=end) for ends in lifted for end in ends]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
+from matplotlib.ticker import FuncFormatter
 
 from dem.record.frame import Frame
 from postprocess.geometry.links import centres_of_mass, link_lengths
@@ -21,6 +22,9 @@ from postprocess.report import figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +117,7 @@ class ColourScale:
         Args:
             figure: Where to.
             label: What the colours mean.
-            unit: A hundredth of the picture's shorter side [pixel].
+            unit: What text is measured by [pixel].
             right: What to leave free at the edge [pixel].
         """
         if self._mappable is None:
@@ -125,12 +129,23 @@ class ColourScale:
         bar.minorticks_off()
         bar.outline.set_linewidth(0.08 * unit)
         axes.tick_params(labelsize=1.8 * unit, length=0.7 * unit, width=0.12 * unit)
+        if not self._ticks:
+            power = _power(self._mappable.get_clim())
+            bar.formatter = FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}")
+            label = label.replace("[", f"[10{str(power).translate(_RAISED)} ") if power else label
         # Broken where it is longer than the picture is high.
         lines = wrap(label, max(12, int(0.8 * whole / (0.62 * 1.9 * unit))))
         bar.set_label("\n".join(lines), fontsize=1.9 * unit, labelpad=0.9 * unit, parse_math=False)
         if self._ticks:
             bar.set_ticks(list(self._ticks), labels=list(self._labels))
             axes.tick_params(length=0)
+
+
+def _power(ends: tuple[float | None, float | None]) -> int:
+    """The power of ten by which the numbers of a bar are divided, so that they are short; 0 for handy ones."""
+    largest = max(abs(end or 0.0) for end in ends)
+    power = math.floor(math.log10(largest)) if largest > 0 else 0
+    return 0 if -1 <= power <= 3 else power
 
 
 def _identity_colours(identifiers: NDArray[Any]) -> NDArray[np.uint8]:

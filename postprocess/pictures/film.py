@@ -5,10 +5,11 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from postprocess.pictures.moments import durations
@@ -76,8 +77,7 @@ def write_film(
         return
     frames = iter(images)
     if path.suffix == ".gif":
-        palette = palette_of(samples, keys)
-        frames = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in frames)
+        frames = map(Palette.of(samples, keys).indexed, frames)
     tick = _TICKS[path.suffix]
     shown = [round(1000 * tick) * ticks for ticks in durations(count, rate, tick)]
     first = next(frames)
@@ -85,26 +85,50 @@ def write_film(
     first.save(path, save_all=True, append_images=frames, duration=shown, loop=0, **options)
 
 
-def palette_of(samples: Sequence[Image.Image], keys: NDArray[np.uint8]) -> Image.Image:
-    """An image with 256 colours: the keys, and what suits all samples best besides.
-
-    Median cut alone gives colours by the area they cover: two steps of a colour bar that few smarticles have would
-    share one.
+class Palette:
+    """The 256 colours of a film.
 
     Args:
-        samples: Pictures.
-        keys: (n, 3) colours, 0 to 255; up to 128 of them are kept.
+        colours: (256, 3), 0 to 255.
     """
-    kept = np.unique(np.asarray(keys, dtype=np.uint8).reshape(-1, 3), axis=0)[:128]
-    pixels = np.concatenate([np.asarray(image.convert("RGB")).reshape(-1, 3) for image in samples])
-    # White is most of a picture: every colour counts once for each of its shades.
-    shades = np.unique(pixels // 4 * 4 + 2, axis=0)
-    found = Image.fromarray(shades[None]).quantize(_COLOURS - len(kept) - 2, kmeans=2)
-    extra = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
-    colours = np.concatenate([[[255, 255, 255], [0, 0, 0]], kept, extra])[:_COLOURS]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(colours.astype(np.uint8).ravel().tolist())
-    return palette
+
+    def __init__(self, colours: NDArray[np.uint8]) -> None:
+        self._bytes = colours.ravel().tolist()
+        # Pillow looks for the nearest colour once per cube of 4 x 4 x 4 colours, and so misses exact ones.
+        self._tree = cKDTree(colours.astype(np.float64))
+
+    @classmethod
+    def of(cls, samples: Sequence[Image.Image], keys: NDArray[np.uint8]) -> Self:
+        """The keys, and what suits all samples best besides.
+
+        Median cut alone gives colours by the area they cover: two steps of a colour bar that few smarticles have would
+        share one.
+
+        Args:
+            samples: Pictures.
+            keys: (n, 3) colours, 0 to 255; up to 128 of them are kept.
+        """
+        kept = np.unique(np.asarray(keys, dtype=np.uint8).reshape(-1, 3), axis=0)[:128]
+        pixels = np.concatenate([np.asarray(image.convert("RGB")).reshape(-1, 3) for image in samples])
+        # White is most of a picture: every colour counts once for each of its shades.
+        shades = np.unique(pixels // 4 * 4 + 2, axis=0)
+        found = Image.fromarray(shades[None]).quantize(_COLOURS - len(kept) - 2, kmeans=2)
+        extra = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
+        colours = np.zeros((_COLOURS, 3), dtype=np.uint8)
+        listed = np.concatenate([[[255, 255, 255], [0, 0, 0]], kept, extra])[:_COLOURS]
+        colours[: len(listed)] = listed
+        return cls(colours)
+
+    def indexed(self, image: Image.Image) -> Image.Image:
+        """A picture in these colours, the nearest of each pixel."""
+        pixels = np.asarray(image.convert("RGB")).astype(np.int64)
+        packed = (pixels[..., 0] << 16) | (pixels[..., 1] << 8) | pixels[..., 2]
+        different, which = np.unique(packed, return_inverse=True)
+        channels = np.stack([different >> 16, different >> 8 & 255, different & 255], axis=1)
+        _, nearest = self._tree.query(channels.astype(np.float64))
+        result = Image.fromarray(nearest.astype(np.uint8)[which.reshape(packed.shape)])
+        result.putpalette(self._bytes)
+        return result
 
 
 def _write_mp4(path: Path, images: Iterable[Image.Image], rate: float) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _MARGIN = 2.6  # all in hundredths of the picture's shorter side
 _TITLE, _TEXT, _SMALL = 2.5, 1.9, 1.7
 _LINE = 1.4  # of a line's own height
-_SMALLEST = 0.6  # of its size: longer captions are cut
+_SMALLEST, _STEPS = 0.6, 8  # how small longer captions become, of their size and in how many steps, before they are cut
 _SCALE_BAR = 0.2  # of a panel's width, at most
 
 
@@ -42,7 +42,7 @@ class Page:
     def __init__(self, look: Look, scale: ColourScale | None, pixel: float | None, *, columns: int = 1) -> None:
         self._look = look
         self._columns = columns
-        self._unit = min(look.size) / 100
+        self._unit = look.unit
         self.size = page_size(look, columns)
         self._background = self._drawn(scale, pixel)
 
@@ -136,13 +136,10 @@ def fitted(text: str, size: float, room: float, *, bold: bool = False) -> tuple[
         The text and its font.
     """
     text = "".join(character if character.isprintable() else "?" for character in text)
-    font = _font(size, bold)
-    length = font.getlength(text)
-    if length <= room:
-        return text, font
-    font = _font(max(size * room / length, size * _SMALLEST), bold)
-    if font.getlength(text) <= room:
-        return text, font
+    for step in range(_STEPS + 1):
+        font = _font(size * (1 - (1 - _SMALLEST) * step / _STEPS), bold)
+        if font.getlength(text) <= room:
+            return text, font
     kept = next((k for k in range(len(text), 0, -1) if font.getlength(text[:k] + "…") <= room), 0)
     return text[:kept] + "…", font
 

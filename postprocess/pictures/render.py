@@ -163,13 +163,13 @@ def render_film(
             return scenery.picture([frames[number] for frames in indices], pace=moments.pace)
 
         last = numbers[-1]
-        samples = [picture(number) for number in sorted({0, last // 3, 2 * last // 3, last})]
+        sampled = sorted({0, last // 3, 2 * last // 3, last}) if output.suffix == ".gif" else []
         film.write_film(
             temporary,
             map(picture, numbers if track is None else track(numbers, len(numbers))),
             count=len(numbers),
             rate=moments.rate,
-            samples=samples if output.suffix == ".gif" else [],
+            samples=[picture(number) for number in sampled],
             keys=scenery.scale.keys,
         )
     return output

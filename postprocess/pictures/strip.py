@@ -17,6 +17,7 @@ from postprocess.report import figures
 
 _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
 _GAP = 6  # pixel
+_FOOT = 28  # height of the scale bar's strip [pixel]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +54,15 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
         InputError: A run has no frames.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    pictures = _pictures(rows)
+    pictures, pixel = _pictures(rows)
     width, height = pictures[0][0].size
-    across, down = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
+    across, below = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
+    down = below + _FOOT
     canvas = Image.new("RGB", (across, down), "white")
     for i, line in enumerate(pictures):
         for k, picture in enumerate(line):
             canvas.paste(picture, (k * (width + _GAP), i * (height + _GAP)))
+    draw_scale_bar(canvas, (_GAP, below + _FOOT / 2), pixel, room=width, unit=_FOOT / 4)
     with figures.style():
         scale = 2 * figures.COLUMN_WIDTH / across
         figure = figures.blank_figure(2 * figures.COLUMN_WIDTH + 0.3, down * scale)
@@ -78,7 +81,8 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
     return output
 
 
-def _pictures(rows: Sequence[Row]) -> list[list[Image.Image]]:
+def _pictures(rows: Sequence[Row]) -> tuple[list[list[Image.Image]], float]:
+    """Pictures of each run, all of one size without empty rows, and how long a pixel is at mid-depth [mm]."""
     from postprocess.pictures.canvas import Canvas  # noqa: PLC0415  (imports PyVista)
 
     look = Look.checked(color_by="id", size=_SIZE, view="front")
@@ -88,7 +92,7 @@ def _pictures(rows: Sequence[Row]) -> list[list[Image.Image]]:
         for shot, row in zip(shots, rows, strict=True)
     ]
     extents = [shot.extent(indices, look) for shot, indices in zip(shots, shown, strict=True)]
-    scale, pictures = ColourScale.of(look.colouring, 0.0, 1.0), []
+    scale, pictures, pixel = ColourScale.of(look.colouring, 0.0, 1.0), [], 1.0
     for shot, indices in zip(shots, shown, strict=True):
         with Canvas(shot.run, look, shot.around, np.concatenate(extents)) as canvas:
             values = shot.values(indices, look)
@@ -96,10 +100,8 @@ def _pictures(rows: Sequence[Row]) -> list[list[Image.Image]]:
                 canvas.panel(shot.frames[index], scale.colours(of_frame))
                 for index, of_frame in zip(indices, values, strict=True)
             ]
-            pictures.append([Image.fromarray(panel) for panel in panels])
+            pictures.append(panels)
             pixel = canvas.pixel
-    # The corner of a picture from the front is empty: the floor is round.
-    width, height = pictures[-1][0].size
-    unit = min(_SIZE) / 100
-    draw_scale_bar(pictures[-1][0], (2 * unit, height - 3 * unit), pixel, room=width, unit=1.6 * unit)
-    return pictures
+    drawn = np.flatnonzero((np.array(pictures) < 255).any(axis=(0, 1, 3, 4)))
+    part = slice(max(drawn[0] - _GAP, 0), drawn[-1] + _GAP)
+    return [[Image.fromarray(panel[part]) for panel in panels] for panels in pictures], pixel
