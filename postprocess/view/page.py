@@ -45,8 +45,8 @@ html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #
 """
 
 
-class Page:
-    """One run in one page.
+class Viewer:
+    """One run in one page, and the server of that page.
 
     Args:
         view: The run.
@@ -243,4 +243,4 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
     """
     # Says that there is no display, which nothing here needs.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    Page(RunView(directory), port=port, opened=opened).serve()
+    Viewer(RunView(directory), port=port, opened=opened).serve()

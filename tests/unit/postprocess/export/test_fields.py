@@ -1,6 +1,7 @@
 """What bodies carry: names, units and values."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,3 +113,10 @@ def test_colours_have_grey_for_no_value_and_for_no_crossing():
 def test_linear_colours_are_darker_in_the_middle_alone():
     """Half the light is 188 of 255 in sRGB."""
     assert linear(np.array([[0, 188, 255]], dtype=np.uint8)).tolist() == [[0, 128, 255]]
+
+
+def test_the_table_in_the_documentation_is_this_one():
+    text = (Path(__file__).resolve().parents[4] / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    table = text.partition("Cell data of smarticles")[2].partition("Point data of crossings")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| `")]
+    assert rows == [f"| `{field.name}` | {field.unit} | {field.of} | {field.meaning} |" for field in FIELDS]

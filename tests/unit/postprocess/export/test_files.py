@@ -19,7 +19,15 @@ from postprocess.export.export import FORMATS, export_run
 from postprocess.export.fields import FIELDS
 from postprocess.export.solids import SUFFIXES
 
-HOSTILE = ["<script>alert(1)</script>", '"/><x y="', "a\nv 1 2 3\r\nb", "{{ constructor }}", "../../up", "é∀\u202e", "%s %n"]
+HOSTILE = [
+    "<script>alert(1)</script>",
+    '"/><x y="',
+    "a\nv 1 2 3\r\nb",
+    "{{ constructor }}",
+    "../../up",
+    "é∀\u202e",
+    "%s %n",
+]
 
 
 @pytest.fixture

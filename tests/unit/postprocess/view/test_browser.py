@@ -16,7 +16,9 @@ playwright = pytest.importorskip("playwright.sync_api", reason="playwright, of r
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
 
-HOSTILE = "{{ document.title='owned' }}<img src=x onerror=\"document.title='owned'\"><script>document.title='owned'</script>"
+HOSTILE = (
+    "{{ document.title='owned' }}<img src=x onerror=\"document.title='owned'\"><script>document.title='owned'</script>"
+)
 GRAPHICS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -34,7 +36,9 @@ class Window:
     def __init__(self, browser, address):
         self.faults, self.hosts = [], set()
         self.page = browser.new_context(viewport={"width": 900, "height": 700}).new_page()
-        self.page.on("console", lambda said: self.faults.append(said.text) if said.type in {"error", "warning"} else None)
+        self.page.on(
+            "console", lambda said: self.faults.append(said.text) if said.type in {"error", "warning"} else None
+        )
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", lambda request: self.hosts.add(request.url.split("/")[2]))
         self.page.goto(address)

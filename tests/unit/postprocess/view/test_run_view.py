@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from synthetic import SyntheticRun, T1, W, mesh_of, u_shape, write_frame, write_run
+from synthetic import T1, SyntheticRun, W, mesh_of, u_shape, write_frame, write_run
 
 from dem.errors import InputError
 from dem.record.frames import FrameWriter, read_frames

@@ -84,7 +84,7 @@ def test_the_token_opens_the_page_and_then_a_cookie_does(page):
     jar = http.cookiejar.CookieJar()
     status, headers, text = asked(page[1], cookies=jar)
     assert status == 200
-    assert "<div id=\"app\">" in text
+    assert '<div id="app">' in text
     cookie = headers["Set-Cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
