@@ -76,7 +76,8 @@ class Viewer:
         try:
             asyncio.run(self._run())
         except OSError as error:
-            msg = f"--port {self._port}: cannot listen there ({os.strerror(error.errno or 0)}); leave it out, or choose another"
+            cause = os.strerror(error.errno or 0)
+            msg = f"--port {self._port}: cannot listen there ({cause}); leave it out, or choose another"
             raise InputError(msg) from None
 
     async def _run(self) -> None:

@@ -55,14 +55,14 @@ def hooked(tmp_path):
 
 def test_boxes_of_one_smarticle_have_its_volume_and_place(tmp_path):
     directory = write_run(tmp_path, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
-    vertices = u_shape(0.7 * W) + [0.001, 0.002, 0.003]
+    vertices = u_shape(0.7 * W) + np.array([0.001, 0.002, 0.003])
     write_frame(directory / "frames/frame_000000.vtu", vertices[None], time=0.5, phase=0)
     mesh = bodies_at(directory)["smarticles"]
     # Boxes end at the hinges' axes, where they overlap: together t1 t2 (w + 2l), which is what a smarticle weighs.
     assert mesh.triangulate().volume * 1e9 == pytest.approx(1e9 * T1 * T2 * W * 2.4, rel=1e-6)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     assert mesh.bounds[::2] == pytest.approx(low - [T2 / 2, T2 / 2, T1 / 2], abs=1e-8)
-    assert mesh.bounds[1::2] == pytest.approx(high + [T2 / 2, 0.0, T1 / 2], abs=1e-8)
+    assert mesh.bounds[1::2] == pytest.approx(high + np.array([T2 / 2, 0.0, T1 / 2]), abs=1e-8)
 
 
 def test_wall_and_floor_are_the_container(pile):
@@ -100,7 +100,7 @@ def test_tiers_are_steps_with_ceilings(pile):
 
 def test_a_wall_that_is_taken_away_is_gone_and_the_floor_holds_the_pile(pile):
     removing(changed(pile, phases=[{"type": "relax"}] * 3 + [{"type": "remove-container", "speed_m_per_s": None}]))
-    far = read_frames(pile)[-1].vertices + [0.05, 0.0, 0.0]
+    far = read_frames(pile)[-1].vertices + np.array([0.05, 0.0, 0.0])
     write_frame(pile / "frames/frame_000003.vtu", far, time=22.0, phase=3, floor_z=FLOOR)
     assert "wall" in bodies_at(pile, 2)
     found = bodies_at(pile, 3)

@@ -40,7 +40,7 @@ def single(tmp_path):
     """One U, flat: its middle link along x, its mouth towards y, its plane at z = 3 mm; nothing passes through it."""
     directory = tmp_path / "single"
     write_run(directory, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
-    vertices = u_shape(0.7 * W) + [0.001, 0.002, 0.003]
+    vertices = u_shape(0.7 * W) + np.array([0.001, 0.002, 0.003])
     write_frame(directory / "frames/frame_000000.vtu", vertices[None], time=0.5, phase=0)
     return directory
 
@@ -121,7 +121,8 @@ def test_gltf_in_one_text_file_holds_its_bytes(single, tmp_path):
     tree = json.loads(export_run(single, to="gltf", output=tmp_path / "one.gltf").read_text())
     (buffer,) = tree["buffers"]
     head, _, data = buffer["uri"].partition(",")
-    assert head.startswith("data:") and head.endswith("base64")
+    assert head.startswith("data:")
+    assert head.endswith("base64")
     assert len(base64.b64decode(data)) == buffer["byteLength"]
 
 
