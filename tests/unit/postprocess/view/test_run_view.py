@@ -112,3 +112,11 @@ def test_a_damaged_frame_leaves_what_is_shown(pile):
     assert view.index == 7
     view.colour_by("speed")
     view.draw()
+
+
+def test_a_run_that_is_gone_stays_in_view(pile):
+    view = RunView(pile)
+    pile.rename(pile.with_name("moved"))
+    assert view.ended
+    view.colour_by("height_m")
+    view.draw()
