@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkStringArray
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
@@ -38,8 +39,8 @@ class Collection:
             # The name by which VTK's readers know the time.
             mesh.field_data["TimeValue"] = np.array([frame.time])
             mesh.field_data["phase"] = np.array([frame.phase])
-            mesh.field_data["run_name"] = [self._run.name]
-            mesh.field_data["scene_sha256"] = [self._run.scene_sha256]
+            mesh.GetFieldData().AddArray(_text("run_name", self._run.name))
+            mesh.GetFieldData().AddArray(_text("scene_sha256", self._run.scene_sha256))
             mesh.save(self._folder / name)
             self._listed.setdefault(kind, []).append((frame.time, name))
 
@@ -54,3 +55,11 @@ class Collection:
             ET.indent(tree)
             tree.write(self._folder / f"{kind}.pvd", encoding="utf-8", xml_declaration=True)
         shutil.copyfile(Path(__file__).with_name(SCRIPT), self._folder / SCRIPT)
+
+
+def _text(name: str, value: str) -> vtkStringArray:
+    """A text of any alphabet; PyVista takes none but the Latin one without accents."""
+    array = vtkStringArray()
+    array.SetName(name)
+    array.InsertNextValue(value)
+    return array

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -43,8 +45,8 @@ html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #
 """
 
 
-class Page:
-    """One run in one page.
+class Viewer:
+    """One run in one page, and the server of that page.
 
     Args:
         view: The run.
@@ -61,6 +63,7 @@ class Page:
         self._server: Any = get_server(f"smarticles-{id(self)}", client_type="vue3")
         self._state = self._server.state
         self._canvas: Any = None
+        self._stopping: asyncio.Future[None] | None = None
         self._fill_state()
         self._connect()
         self._lay_out()
@@ -70,9 +73,19 @@ class Page:
         # The library reads the arguments of the process unless it is given some.
         os.environ["TRAME_ARGS"] = f"--server --host {HOST} --authKey={self._token} --nosignalhandlers"
         os.environ["WSLINK_READY_MSG"] = ""
-        asyncio.run(self._run())
+        try:
+            asyncio.run(self._run())
+        except OSError as error:
+            cause = os.strerror(error.errno or 0)
+            msg = f"--port {self._port}: cannot listen there ({cause}); leave it out, or choose another"
+            raise InputError(msg) from None
 
     async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        # A signal that interrupts VTK anywhere would end in a crash; this waits for it, and closes the windows.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if threading.current_thread() is threading.main_thread():
+                loop.add_signal_handler(number, self._stop)
         watch = asyncio.create_task(self._watch())
         try:
             await self._server.start(
@@ -83,6 +96,10 @@ class Page:
             watch.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await watch
+
+    def _stop(self) -> None:
+        if self._stopping is None and self._web is not None:
+            self._stopping = asyncio.ensure_future(self._server.stop())
 
     def _fill_state(self) -> None:
         view, state = self._view, self._state
@@ -223,8 +240,8 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
         opened: Called with the address once the server listens.
 
     Raises:
-        InputError: There is no frame, or it is damaged.
+        InputError: There is no frame, or it is damaged; or the port is taken.
     """
     # Says that there is no display, which nothing here needs.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    Page(RunView(directory), port=port, opened=opened).serve()
+    Viewer(RunView(directory), port=port, opened=opened).serve()

@@ -80,8 +80,11 @@ class RunView:
 
     @property
     def ended(self) -> bool:
-        """Whether no more frames will come, as the run directory tells it now."""
-        return read_run(self.run.directory).status != "unfinished"
+        """Whether no more frames will come, as the run directory tells it now; so also where it is gone."""
+        try:
+            return read_run(self.run.directory).status != "unfinished"
+        except InputError:
+            return True
 
     def grow(self) -> bool:
         """Look for new frames; whether there are any."""

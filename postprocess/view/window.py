@@ -76,6 +76,11 @@ class Window:
             self._mappers[kind].SetScalarModeToUsePointFieldData()
             self._mappers[kind].SelectColorArray("colour")
 
+    def mesh(self, kind: str) -> pv.PolyData:
+        """What is drawn of a kind of body [mm]."""
+        mesh: pv.PolyData = pv.wrap(self._mappers[kind].GetInput())
+        return mesh
+
     def look_from(self, direction: tuple[float, float, float], up: tuple[float, float, float]) -> None:
         """Turn the camera to everything there is."""
         camera = self._renderer.GetActiveCamera()
@@ -87,8 +92,7 @@ class Window:
 
     def picked(self, ray: NDArray[np.float64]) -> int | None:
         """Number of the box that a ray (2, 3) [mm] meets first; None if it meets none."""
-        shape = self._mappers["smarticles"].GetInput()
-        mesh = pv.wrap(shape)
+        mesh = self.mesh("smarticles")
         if not mesh.n_points:
             return None
         _, faces = mesh.ray_trace(ray[0], ray[1], first_point=True)
