@@ -282,3 +282,20 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
         np.testing.assert_array_equal(motors.halted, plain.halted)
         speeds |= set(np.round(made._world.bodies.rate[0], 9))
     assert speeds == {0.0, law.speed_limit / 2, law.speed_limit}
+
+
+@pytest.mark.parametrize("walls", [True, False])
+def test_the_floor_is_shaken_with_its_wall_or_alone(walls: bool) -> None:
+    made = poured(6)
+    amplitude, frequency = 5e-4, 30.0
+    made.fixtures.shake(amplitude=amplitude, frequency=frequency, walls=walls)
+    begun, floors, wall = made.time, [], []
+    for _ in range(400):
+        made.advance(4)
+        floors.append(made.fixtures.floor)
+        wall.append(made.fixtures.wall_bottom)
+    times = begun + 2e-4 * np.arange(1, 401)
+    np.testing.assert_allclose(floors, amplitude * np.sin(2 * math.pi * frequency * (times - begun)), atol=1e-12)
+    assert np.ptp(wall) == pytest.approx(np.ptp(floors) if walls else 0.0, abs=1e-15)
+    # What the floor alone gives is all that the account has.
+    assert made.account.container_work > 0.0
