@@ -54,7 +54,9 @@ def _refuse_what_is_held(out: Path, *, resume: bool) -> None:
         raise InputError(msg) from None
     if MANIFEST in held:
         if not resume:
-            msg = f"--out {out}: holds a run and is left as it is; go on with it by --resume, or choose another directory"
+            msg = (
+                f"--out {out}: holds a run and is left as it is; go on with it by --resume, or choose another directory"
+            )
             raise InputError(msg)
     elif held:
         what = f"no run to resume but files ({held[0]}, …)" if resume else f"files ({held[0]}, …)"

@@ -19,6 +19,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
+from dem.errors import nearest
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import check
@@ -70,7 +71,7 @@ class Scene(Part):
             return value
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
-            msg = f"unknown fidelity {base!r}; known: {', '.join(FIDELITIES)}"
+            msg = f"unknown fidelity {base!r}; {nearest(str(base), FIDELITIES)}"
             raise ValueError(msg)
         return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
 

@@ -90,8 +90,11 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        msg = f"{source}{where}: not valid YAML: {error.problem or error.context}; correct this line"
-        raise InputError(msg) from error
+        problem = str(error.problem or error.context)
+        if "'\\t'" in problem:
+            problem = "a tab; YAML is indented and spaced by blanks"
+        msg = f"{source}{where}: not valid YAML: {problem}" + ("" if ";" in problem else "; correct this line")
+        raise InputError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
-        raise InputError(msg) from error
+        raise InputError(msg) from None

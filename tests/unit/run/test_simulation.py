@@ -141,7 +141,10 @@ def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
     ("changes", "told"),
     [
         ({"seed": 2}, "seed 1 there, 2 here; resume with"),
-        ({"seed": 2, "count": 12, "engine": "links", "gravity_m_per_s2": 5}, "count 10 there, 12 here; gravity),
+        (
+            {"seed": 2, "count": 12, "engine": "links", "gravity_m_per_s2": 5},
+            "engine yade there, links here; seed 1 there",
+        ),
     ],
 )
 def test_a_finished_run_of_another_scene_is_not_called_done(

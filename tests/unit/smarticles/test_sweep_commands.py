@@ -80,7 +80,7 @@ def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> No
     sweep_file.write_text(SWEEP.replace("grid", "gird"))
     said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out")
     assert said.status == 2
-    assert said.err == (f"smarticles: error: {sweep_file}: points.gird: unknown key; did you mean 'grid'?\n")
+    assert said.err == (f"smarticles: error: {sweep_file}: points: unknown key 'gird'; did you mean 'grid'?\n")
     assert not (sweep_file.parent / "out").exists()
 
 
