@@ -129,10 +129,14 @@ class MotorsDouble:
             self.told.append(("weld",))
             self.articulated = False
 
+    @property
+    def looks_at_once(self) -> int:
+        return 1
+
     def actuate(self, targets: Array, interval: float) -> None:
         assert self.articulated
         self.told.append(("actuate", interval))
-        self._hold(targets)
+        self._hold(targets[0])
 
     def _hold(self, angles: Array) -> None:
         none = np.zeros_like(angles)

@@ -77,7 +77,7 @@ class Recorder:
                 halted=None if motors is None else motors.halted,
             )
             self.frames.write(mesh, engine.time)
-            self.series.write()
+            self.series.keep_up()
         if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last picture of a run that fails is worth having.

@@ -30,7 +30,7 @@ def poured(count: int = 20, **more: object) -> LinksEngine:
 
 def swing(made: LinksEngine, looks: int, begin: int = 0) -> None:
     for look in range(begin, begin + looks):
-        made.motors.actuate(np.full((made.count, 2), math.pi / 2 - 0.5 * math.sin(look / 40)), 2e-4)
+        made.motors.actuate(np.full((1, made.count, 2), math.pi / 2 - 0.5 * math.sin(look / 40)), 2e-4)
         made.advance(4)
 
 
@@ -126,16 +126,16 @@ def test_a_motor_that_halts_holds_and_may_give_way() -> None:
     pile.motors.articulate()
     bodies = pile._world.bodies
     # A load above the limit, as if a heavy thing leant on barb 1 against its way.
-    pile.motors.actuate(bodies.alpha + 1e-3, 2e-4)
+    pile.motors.actuate(bodies.alpha[None] + 1e-3, 2e-4)
     pile.advance(4)
     pile._world.motors.impulse[:] -= 2e-5 * 2e-4
-    pile.motors.actuate(bodies.alpha + 1e-3, 2e-4)
+    pile.motors.actuate(bodies.alpha[None] + 1e-3, 2e-4)
     readings = pile.motors.readings
     assert readings.halted.all()
     assert (bodies.rate == 0.0).all()
     pile.advance(4)
     pile._world.motors.impulse[:] -= 2e-5 * 2e-4
-    pile.motors.actuate(bodies.alpha - 1e-3, 2e-4)
+    pile.motors.actuate(bodies.alpha[None] - 1e-3, 2e-4)
     assert not pile.motors.readings.halted.any()
     assert (bodies.rate < 0.0).all()
 
@@ -145,10 +145,10 @@ def test_a_motor_that_stalls_does_not_move_either_way() -> None:
     made.add(builds.at([0, 0, 5.0]))
     made.motors.articulate()
     for sign in (1, -1):
-        made.motors.actuate(made._world.bodies.alpha + 1e-3, 2e-4)
+        made.motors.actuate(made._world.bodies.alpha[None] + 1e-3, 2e-4)
         made.advance(4)
         made._world.motors.impulse[:] -= 2e-5 * 2e-4
-        made.motors.actuate(made._world.bodies.alpha + sign * 1e-3, 2e-4)
+        made.motors.actuate(made._world.bodies.alpha[None] + sign * 1e-3, 2e-4)
         assert made.motors.readings.halted.all()
         assert (made._world.bodies.rate == 0.0).all()
         made.advance(4)
@@ -161,7 +161,7 @@ def test_a_slipping_motor_never_exceeds_its_torque(law: str) -> None:
     made.motors.articulate()
     torques = []
     for look in range(300):
-        made.motors.actuate(np.full((1, 2), math.pi / 2 + 0.5 * math.sin(look / 20)), 2e-4)
+        made.motors.actuate(np.full((1, 1, 2), math.pi / 2 + 0.5 * math.sin(look / 20)), 2e-4)
         made.advance(4)
         torques.append(made.motors.readings.torques.copy())
     assert np.abs(torques).max() <= builds.TORQUE * (1 + 1e-12)
@@ -175,7 +175,7 @@ def test_speed_and_acceleration_of_a_prescribed_angle_are_limited() -> None:
     made.motors.articulate()
     rates = [0.0]
     for look in range(400):
-        made.motors.actuate(np.full((1, 2), 0.5 if look < 200 else 1.2), 2e-4)
+        made.motors.actuate(np.full((1, 1, 2), 0.5 if look < 200 else 1.2), 2e-4)
         rates.append(float(made._world.bodies.rate[0, 0]))
         made.advance(4)
     most = made._world.motors.acceleration[0, 0] * 2e-4
@@ -188,7 +188,7 @@ def test_an_angle_arrives_and_stays() -> None:
     made.add(builds.at([0, 0, 5.0]))
     made.motors.articulate()
     for _ in range(1500):
-        made.motors.actuate(np.full((1, 2), 0.5), 2e-4)
+        made.motors.actuate(np.full((1, 1, 2), 0.5), 2e-4)
         made.advance(4)
     assert np.allclose(made.state().angles, 0.5, atol=1e-12)
     assert np.abs(made._world.bodies.rate).max() < 1e-9

@@ -261,6 +261,10 @@ class Motoring(NamedTuple):
         momentum: (N, 2) p after the last look; for slip and servo p now [kg m²/s].
         impulse: (N, 2) ∫ of all torques but the motors' since the last look; for slip and servo of the motors' [N m s].
         elapsed: (1,) time since the last look [s].
+        interval: time between two looks [s].
+        period: the same in steps.
+        targets: (looks, N, 2) angles at the ends of the periods to come according to the schedule [rad].
+        due: (2,) the row of `targets` that the next look goes by, and the steps until then; -1: no look is due.
     """
 
     law: int
@@ -278,6 +282,10 @@ class Motoring(NamedTuple):
     momentum: Array
     impulse: Array
     elapsed: Array
+    interval: float
+    period: int
+    targets: Array
+    due: NDArray[np.int64]
 
 
 def no_bodies(links: int) -> Bodies:

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 # Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
-FORMAT = "links-2"
+FORMAT = "links-3"
 
 
 class LinksEngine:
@@ -128,7 +128,7 @@ class LinksEngine:
     def advance(self, steps: int) -> None:
         """See the interface."""
         if steps > 0:
-            self.motors.advance(steps)
+            self._world.advance(steps)
             self._smarticle_seconds += steps * self.time_step * self.count
 
     # -- smarticles --------------------------------------------------------------------------------------------

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.gaits.checks import actuation_warnings, check_actuated
@@ -61,7 +63,9 @@ class Actuating:
         if look == 0:
             engine.motors.articulate()
         # The last look only takes note of the work since the one before.
-        time = min((look + 1) * self._interval, self._drive.duration)
-        engine.motors.actuate(self._drive.targets(time), self._interval)
-        self.memory["look"] = look + 1
-        return self._interval if look < self._looks else 0.0
+        looks = range(look, max(look + 1, min(look + engine.motors.looks_at_once, self._looks)))
+        targets = [self._drive.targets(min((k + 1) * self._interval, self._drive.duration)) for k in looks]
+        engine.motors.actuate(np.stack(targets), self._interval)
+        self.memory["look"] = looks.stop
+        period = max(1, round(self._interval / engine.time_step)) * engine.time_step
+        return len(looks) * period if look < self._looks else 0.0

@@ -116,22 +116,24 @@ def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 
 
 @kernel
-def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interval: float) -> None:
-    """What the motors do in the control period that begins now.
+def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+    """What the motors do in the control period that begins now, by the row of `targets` that is due.
+
+    Where nobody has told what comes after the last row they go on by it.
 
     Args:
         shape: what all smarticles have in common.
         bodies: the smarticles; `rate` is written.
         motors: written.
-        targets: (N, 2) or (1, 2) angles at the end of the period according to the schedule [rad].
-        interval: length of the period [s].
     """
+    interval, last = motors.interval, motors.targets.shape[0] - 1
+    now = min(motors.due[0], last)
+    motors.due[0], motors.due[1] = now + 1, motors.period
     note(shape, bodies, motors)
-    shared = targets.shape[0] == 1
     for i in range(bodies.position.shape[0]):
         r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
         for k in range(2):
-            target = targets[0 if shared else i, k]
+            target = motors.targets[now, i, k]
             if motors.law >= SLIP:
                 most = motors.speed * interval
                 motors.command[i, k] += min(most, max(-most, target - motors.command[i, k]))
