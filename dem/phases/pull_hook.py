@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
-from dem.setting.hooks import TOLERANCE, with_defaults
+from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
 from dem.setting.part import Duration, Length, Part, refuse_wrong_unit
 from dem.setting.smarticle import Smarticle
 
@@ -60,9 +60,21 @@ class PullHook(Part, Phase):
             raise ValueError(msg)
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`: hooks that one smarticle can hold both of, where one is pulled with any force."""
+        """See `Phase.warnings`: a hook over the pile, and hooks that one smarticle can hold both of."""
         hooks = scene.hooks
-        if hooks is None or self.force_limit_N is not None:
+        return () if hooks is None else (*self._over_the_pile(scene, hooks), *self._held_by_one(scene, hooks))
+
+    def _over_the_pile(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
+        if scene.container.tiers is not None or hooks.upper_height_m - hooks.side_m / 2 < scene.loose_height:
+            return ()
+        return (
+            f"hooks.upper_height_m: {hooks.upper_height_m:g} m is about as high as {scene.count} smarticles pile up, "
+            f"{scene.loose_height:.2g} m, so that few or none will lie on the hook that is pulled; lower it or raise "
+            "count",
+        )
+
+    def _held_by_one(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
+        if self.force_limit_N is not None:
             return ()
         across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
         inside = scene.smarticle.middle_length_m - scene.sphere_diameter

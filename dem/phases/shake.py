@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -30,6 +30,15 @@ class Shake(Part, Phase):
     def amplitude(self, gravity: float) -> float:
         """A = Γ g / (2πf)² [m], gravity in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        """See `Phase.warnings`: shaking that never lets go of the pile."""
+        if not 0 < self.peak_acceleration_g < 1:
+            return ()
+        return (
+            f"phases.{index}.peak_acceleration_g: Γ = {self.peak_acceleration_g:g} is below 1, so that the floor never "
+            "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
+        )
 
     @property
     def known_duration(self) -> float:

@@ -12,6 +12,7 @@ import yaml
 from pydantic import ValidationError
 
 from dem.errors import InputError
+from dem.record.names import SCENE
 from dem.refusal import refusals
 from dem.scene.overrides import apply_override
 from dem.scene.scene import Scene
@@ -38,6 +39,9 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     if not isinstance(data, Mapping):
         msg = f"{source}: a scene is a mapping of keys to values, got {data!r:.60}"
         raise InputError(msg)
+    if "template" in data and "points" in data:
+        msg = f"{source}: is a sweep file, which makes many scenes; give it to `smarticles sweep`"
+        raise InputError(msg)
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
         msg = f"{source}: schema_version: {version} is not known here; this version reads {SCHEMA_VERSION}"
@@ -59,6 +63,13 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
+    if path.is_dir():
+        inside = path / SCENE
+        msg = f"{path}: is a directory; give " + (str(inside) if inside.is_file() else "the path of a scene file")
+        raise InputError(msg)
+    if path.suffix == ".j2" and path.is_file():
+        msg = f"{path}: is a template of scenes; give the sweep file that names it to `smarticles sweep`"
+        raise InputError(msg)
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

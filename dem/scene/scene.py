@@ -118,11 +118,24 @@ class Scene(Part):
         Args:
             hooks_top: height of the hooks' top [m]; 0 without hooks.
         """
-        boxes = self.smarticle.boxes
-        loosest = 1.2 * self.sphere_diameter / float(boxes.lengths.sum())
-        pile = self.count * boxes.volume / (math.pi * self.container.radius_m**2 * loosest)
         # What is poured may come to lie on a hook.
-        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * boxes.middle_length
+        pile = self._height_at(1.2)
+        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * self.smarticle.middle_length_m
+
+    @property
+    def loose_height(self) -> float:
+        """About the height [m] of the poured pile, by the packing that `ample_height` tells.
+
+        Of 9 piles of 100 to 160, l/w 0.4 and 0.7, half of the smarticles end below 0.6 to 0.7 of it, and the highest at
+        1.2 to 1.7 of it.
+        """
+        return self._height_at(2.4)
+
+    def _height_at(self, factor: float) -> float:
+        """Height [m] of a pile of φ = `factor` d/L in the container."""
+        boxes = self.smarticle.boxes
+        filling = factor * self.sphere_diameter / float(boxes.lengths.sum())
+        return self.count * boxes.volume / (math.pi * self.container.radius_m**2 * filling)
 
     @property
     def smooth(self) -> bool:

@@ -199,7 +199,10 @@ def load_sweep(path: Path) -> Sweep:
     text = read_text(path, "sweep file")
     data = parse_yaml(text, str(path))
     if not isinstance(data, dict):
-        msg = f"{path}: a sweep file holds keys such as template and points: got {data!r}"
+        msg = f"{path}: a sweep file holds keys such as template and points: got {data!r:.60}"
+        raise InputError(msg)
+    if "phases" in data and "points" not in data:
+        msg = f"{path}: is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"
         raise InputError(msg)
     try:
         content = SweepFile.model_validate(data)

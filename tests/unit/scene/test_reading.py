@@ -117,7 +117,7 @@ def test_key_given_twice(tmp_path: Path) -> None:
 
 def test_file_that_is_no_yaml(tmp_path: Path) -> None:
     message = refused(tmp_path, "a: [1\nb")
-    assert message.startswith("bad.yaml, line 2, column 1: not valid YAML: expected ',' or ']'")
+    assert message.startswith("bad.yaml, line 2, column 2: not valid YAML: expected ',' or ']'")
     assert message.endswith("; correct this line")
     for tabbed in (GOOD + "\tname: x\n", GOOD + "name:\tx\n", GOOD + "motor:\n\tlaw: slip\n"):
         line = tabbed[: tabbed.index("\t")].count("\n") + 1
@@ -166,11 +166,14 @@ def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
 
 
 def test_nested_too_deeply(tmp_path: Path) -> None:
-    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read"
+    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read; correct the file"
 
 
 def test_impossible_date(tmp_path: Path) -> None:
-    assert refused(tmp_path, GOOD + "name: 2020-99-99\n") == "bad.yaml: not valid YAML: month must be in 1..12"
+    assert (
+        refused(tmp_path, GOOD + "name: 2020-99-99\n")
+        == "bad.yaml: not valid YAML: month must be in 1..12; correct the file"
+    )
     assert refused(tmp_path, GOOD, ["name=2020-99-99"]) == "--set name=2020-99-99: the value is not valid YAML"
 
 

@@ -181,7 +181,7 @@ def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep
             "repeats.seeds: got the text '1', expected a number; leave out the quo",
         ),
         (SWEEP.replace("[1, 2]}", "3}"), r"repeats.seeds: 3 is not a list; write its items in brackets"),
-        (SWEEP + "derived: {half: [1]}\n", r"derived.half: \[1\] is neither an expression nor a number; write e.g."),
+        (SWEEP + "derived: {half: [1]}\n", r"derived.half: \[1\] is neither an expression nor a number; write it"),
         (SWEEP + "derived: {5: '1'}\n", "derived.5: 5 is not text; write it in quotes"),
         (SWEEP.replace("{count: [10, 20]}", "3"), "points.grid: 3 is not keys and values; write them as {key: value}"),
         (SWEEP.replace("[1, 2]}", "[]}").replace("name: test", "name: ''"), "name: '' is too short.*; also repeats.s"),
