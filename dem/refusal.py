@@ -9,6 +9,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dem.errors import shown
+
 # Words that may end a key, and how the unit that they spell is written.
 _UNITS = {
     **{word: word for word in ("m", "s", "g", "w", "N", "kg", "rad", "deg")},
@@ -18,7 +20,7 @@ _OF_A_KEY = "[key]"  # how pydantic ends the place of a key that is wrong itself
 _QUOTED = re.compile(r"'([^']*)'")
 # A message that begins with a key is about that key, below the place that pydantic tells.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
-_MOST = 60  # characters of a value that are shown
+_LONGEST_KEY = 60  # characters of a key that are shown
 _MOST_ERRORS = 3  # that are told at once; who made more reads the file again anyway
 
 
@@ -62,19 +64,12 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
     """What is wrong with a value and what to do about it; `kind`, `message` and `context` are pydantic's."""
     if kind in _BOUNDS:
         name, words = _BOUNDS[kind]
-        return f"{_shown(value)} {unit}".rstrip() + f" is out of range; use {words} {context[name]:g} {unit}".rstrip()
+        return f"{shown(value)} {unit}".rstrip() + f" is out of range; use {words} {context[name]:g} {unit}".rstrip()
     if kind in _TOLD:
-        return _TOLD[kind](_shown(value), value, context, unit)
+        return _TOLD[kind](shown(value), value, context, unit)
     if kind == "value_error":
         return message.removeprefix("Value error, ")
-    return f"{message[0].lower()}{message[1:]}, got {_shown(value)}"
-
-
-def _shown(value: Any) -> str:
-    """A value as YAML would have it."""
-    named = {None: "null", True: "true", False: "false"}
-    text = named[value] if value is None or isinstance(value, bool) else repr(value)
-    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
+    return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
 
 
 def _chosen(value: Any, choices: str) -> str:
@@ -132,7 +127,7 @@ _TOLD: Mapping[str, Callable[[str, Any, Mapping[str, Any], str], str]] = {
         f"type: missing in {shown}; write which one it is, see `smarticles schema`"
     ),
     "union_tag_invalid": lambda _s, _v, context, _u: (
-        f"type: {context['tag']!r} is not known; {_chosen(context['tag'], context['expected_tags'])}"
+        f"type: {shown(context['tag'])} is not known; {_chosen(context['tag'], context['expected_tags'])}"
     ),
 }
 
@@ -148,7 +143,7 @@ def _key(steps: Sequence[int | str], data: Any) -> str:
             continue
         if step == _OF_A_KEY:
             continue
-        keys.append(str(step))
+        keys.append(str(step) if len(str(step)) <= _LONGEST_KEY else f"{str(step)[:_LONGEST_KEY]}…")
         if isinstance(here, Mapping):
             here = here.get(step)
         elif isinstance(here, list) and isinstance(step, int):

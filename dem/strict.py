@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, model_validator
 from pydantic.fields import FieldInfo
 
-from dem.errors import nearest
+from dem.errors import nearest, shown
 
 _WITH_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d]\S*\s*")
 _WITH_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
@@ -36,7 +36,7 @@ class Strict(BaseModel):
         if isinstance(data, Mapping):
             for key in data:
                 if key not in cls.known_keys():
-                    msg = f"unknown key {key!r}; {cls.nearest_key(str(key))}"
+                    msg = f"unknown key {shown(key)}; {cls.nearest_key(str(key))}"
                     raise ValueError(msg)
         return data
 
@@ -54,7 +54,7 @@ class Strict(BaseModel):
                         msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(field.annotation)}"
                         raise ValueError(msg)
                     if isinstance(item, str) and _kind(field.annotation) == "a number":
-                        msg = f"{key}: got the text {item!r}, expected a number; {_as_a_number(item)}"
+                        msg = f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}"
                         raise ValueError(msg)
         return data
 
@@ -74,8 +74,9 @@ def _as_a_number(text: str) -> str:
 
 def _kind(annotation: Any) -> str:
     """What a key takes, in words; `annotation` is the type of its field."""
-    parts = {annotation} if get_origin(annotation) is None else {*get_args(annotation)}
-    if parts & {int, float} and parts <= {int, float, type(None), ...}:
+    parts = [annotation] if get_origin(annotation) is None else [*get_args(annotation)]
+    parts = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
+    if any(part in (int, float) for part in parts) and all(part in (int, float, type(None), ...) for part in parts):
         return "a number"
     if get_origin(annotation) is Literal:
         return " or ".join(map(repr, get_args(annotation)))

@@ -24,7 +24,7 @@ class Shake(Part, Phase):
 
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]")
-    frequency_hz: float = Field(30.0, gt=0, le=2000, description="f, frequency [Hz]")
+    frequency_hz: float = Field(30.0, ge=0.01, le=2000, description="f, frequency [Hz]")
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
 
     def amplitude(self, gravity: float) -> float:

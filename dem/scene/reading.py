@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
 from dem.record.names import SCENE
 from dem.refusal import refusals
 from dem.scene.overrides import apply_override
@@ -37,14 +37,14 @@ def parse_scene(data: Any, *, source: str) -> Scene:
         msg = f"{source}: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
         raise InputError(msg)
     if not isinstance(data, Mapping):
-        msg = f"{source}: a scene is a mapping of keys to values, got {data!r:.60}"
+        msg = f"{source}: a scene is a mapping of keys to values, got {shown(data)}"
         raise InputError(msg)
     if "template" in data and "points" in data:
         msg = f"{source}: is a sweep file, which makes many scenes; give it to `smarticles sweep`"
         raise InputError(msg)
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
-        msg = f"{source}: schema_version: {version} is not known here; this version reads {SCHEMA_VERSION}"
+        msg = f"{source}: schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
         raise InputError(msg)
     try:
         return Scene.model_validate(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from typing import Any
 
 import yaml
@@ -68,7 +69,11 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
         # A SafeLoader underneath: no Python objects can be made.
         return yaml.load(text, Loader=loader)
     except ValueError as error:
-        raise yaml.YAMLError(str(error)) from error  # a date that does not exist
+        digits = sys.get_int_max_str_digits()
+        lengthy = f"Exceeds the limit ({digits} digits)" in str(error)
+        # Else a date that does not exist.
+        problem = f"a whole number of more than {digits} digits" if lengthy else str(error)
+        raise yaml.YAMLError(problem) from error
     except RecursionError as error:
         msg = "nested too deeply to read"
         raise yaml.YAMLError(msg) from error

@@ -49,9 +49,9 @@ def in_hinge_range(angle: float) -> float:
     return angle
 
 
-def refuse_wrong_unit(value: float | None) -> float | None:
+def refuse_wrong_unit(value: float) -> float:
     """The length [m], refused where it can only be millimetres."""
-    if value is not None and value > LONGEST_LENGTH:
+    if value > LONGEST_LENGTH:
         msg = (
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
             f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
@@ -60,6 +60,18 @@ def refuse_wrong_unit(value: float | None) -> float | None:
     return value
 
 
-Length = Annotated[float, Field(gt=0)]
-Duration = Annotated[float, Field(gt=0)]
-HingeAngle = Annotated[float, AfterValidator(in_hinge_range)]
+# Limits of what is physical, wide: beyond them stands a slip of the keyboard, and numbers that no sum survives.
+Length = Annotated[
+    float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(refuse_wrong_unit)
+]
+Duration = Annotated[float, Field(ge=1e-6, le=1e6)]
+Speed = Annotated[float, Field(ge=1e-9, le=1e3)]  # m/s
+Turning = Annotated[float, Field(ge=1e-6, le=1e4)]  # rad/s
+Frequency = Annotated[float, Field(ge=1e-3, le=1e4)]  # Hz
+Stiffness = Annotated[float, Field(ge=1e-3, le=1e9)]  # N/m
+Force = Annotated[float, Field(ge=1e-12, le=1e6)]  # N
+HingeAngle = Annotated[
+    float,
+    Field(json_schema_extra={"minimum": HINGE_RANGE[0], "maximum": HINGE_RANGE[1]}),
+    AfterValidator(in_hinge_range),
+]

@@ -26,7 +26,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from dem.errors import InputError, nearest
+from dem.errors import InputError, nearest, shown
 from dem.refusal import refusals
 from dem.scene.yaml_text import parse_yaml
 from dem.strict import Strict
@@ -199,7 +199,7 @@ def load_sweep(path: Path) -> Sweep:
     text = read_text(path, "sweep file")
     data = parse_yaml(text, str(path))
     if not isinstance(data, dict):
-        msg = f"{path}: a sweep file holds keys such as template and points: got {data!r:.60}"
+        msg = f"{path}: a sweep file holds keys such as template and points: got {shown(data)}"
         raise InputError(msg)
     if "phases" in data and "points" not in data:
         msg = f"{path}: is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"

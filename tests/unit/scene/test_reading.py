@@ -140,7 +140,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError) as caught:
         load_scene(tmp_path)
-    assert str(caught.value) == f"{tmp_path}: cannot be read (Is a directory); give the path of a scene file"
+    assert str(caught.value) == f"{tmp_path}: is a directory; give the path of a scene file"
 
 
 @pytest.mark.parametrize(
