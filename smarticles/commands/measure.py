@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -73,6 +74,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
     import pandas as pd  # noqa: PLC0415
 
+    from dem.record.manifest import read_run  # noqa: PLC0415
+    from dem.record.series import lost_series  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -87,6 +90,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
     by = _groups(arguments)
+    directories = list(sources(arguments.directories))
+    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:
         try:
@@ -97,7 +103,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
-        rings = pd.concat([profile_table(directory) for directory in sources(arguments.directories)], ignore_index=True)
+        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
         write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
