@@ -50,9 +50,15 @@ def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:
     source[0] = filled(source[0])
 
 
+def _plain(_app: Sphinx, _what: str, _name: str, _of: object, _options: object, lines: list[str]) -> None:
+    """Docstrings are plain text with |x| in it, which would be a substitution of reStructuredText."""
+    lines[:] = [line if line.lstrip().startswith((">>>", "...")) else line.replace("|", "\\|") for line in lines]
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Make this an extension of Sphinx."""
     app.connect("source-read", _fill)
+    app.connect("autodoc-process-docstring", _plain)
     app.add_html_math_renderer("mathml", inline_renderers=(show_inline, None), block_renderers=(show_block, None))
     # What is made depends on the code, which Sphinx does not watch: `make docs` builds every page anew.
     return {"parallel_read_safe": True, "parallel_write_safe": True}
