@@ -46,7 +46,7 @@ def _do(page: Page, block: Block, folder: Path, words: dict[str, str]) -> None:
     command = ["bash", "-euo", "pipefail", "-c", block.text]
     if block.language == "python":
         command = [sys.executable, "-W", "error", "-c", block.text]
-    done = subprocess.run(command, cwd=folder, env=words, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, cwd=folder, env=words, capture_output=True, text=True, check=False, timeout=900)
     said = f"{page.name}:{block.line} exit status {done.returncode}\n{block.text}\n{done.stdout[-2000:]}\n{done.stderr}"
     assert done.returncode == 0, said
     assert "Traceback" not in done.stderr, said
