@@ -123,7 +123,8 @@ def test_gltf_has_no_field_with_holes(pile, tmp_path):
         content = json.loads((pile / name).read_text())
         content["phases"][3]["type"] = "remove-container"
         (pile / name).write_text(json.dumps(content))
-    (pile / "scene.yaml").write_text("phases: [{type: deposit}, {type: relax}, {type: shake}, {type: remove-container}]")
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    (pile / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in kinds]}))
     tree = glb_tree(export_run(pile, to="glb", output=tmp_path / "a.glb"))
     shape = next(mesh for mesh in tree["meshes"] if mesh["name"] == "smarticles")
     attributes = shape["primitives"][0]["attributes"]
