@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +19,9 @@ from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
+from dem.record.manifest import RunManifest
 
+PERIOD = 1.0  # s of wall time between two writings of a series that grows
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
@@ -35,6 +39,7 @@ class SeriesWriter:
     described: Columns
     attributes: Mapping[str, Any]
     _rows: dict[str, list[Any]] = field(default_factory=dict)
+    _written: float = -math.inf
 
     def __post_init__(self) -> None:
         self._rows = {name: [] for name in self.described}
@@ -56,6 +61,15 @@ class SeriesWriter:
         """Go on from where `columns` were taken."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
+    def keep_up(self) -> None:
+        """Rewrite the file, but for a moment after it was written: whole, it costs more than the rows that are new.
+
+        Raises:
+            RunError: it cannot be written.
+        """
+        if time.monotonic() - self._written >= PERIOD:
+            self.write()
+
     def write(self) -> None:
         """Rewrite the file with all rows.
 
@@ -63,6 +77,7 @@ class SeriesWriter:
             RunError: it cannot be written.
         """
         write_whole(self.folder / names.SERIES, self._write)
+        self._written = time.monotonic()
 
     def _write(self, path: Path) -> None:
         # Made in memory: on a full disk HDF5's own library does not fail cleanly but takes the process with it.
@@ -131,6 +146,17 @@ class Series:
             Index into every array.
         """
         return int(np.argmin(np.abs(self.time - time)))
+
+
+def lost_series(run: RunManifest) -> str | None:
+    """What is to be told of a run that is done and whose series is not there; None: there is nothing to tell."""
+    path = run.directory / names.SERIES
+    if run.status != "done" or path.exists():
+        return None
+    return (
+        f"{path}: is gone, although the run is done, so that all that was recorded in it is missing from tables; put "
+        f"it back, or run {run.directory / names.SCENE} anew elsewhere"
+    )
 
 
 def read_series(directory: Path | str) -> Series:
