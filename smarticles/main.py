@@ -16,6 +16,7 @@ from dem.errors import InputError, RunError
 from smarticles.commands import (
     accuracy,
     doctor,
+    export,
     measure,
     plan,
     render,
@@ -26,11 +27,12 @@ from smarticles.commands import (
     study,
     sweep,
     verify,
+    view,
 )
 from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
-COMMANDS = (run, plan, schema, doctor, measure, render, sweep, status, resume, study, accuracy, verify)
+COMMANDS = (run, plan, schema, doctor, measure, render, view, export, sweep, status, resume, study, accuracy, verify)
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
 
 FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
