@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.layout import Cell, columns
-from smarticles.measuring import grouped, measured
+from smarticles.measuring import grouped, measured, sources
 from smarticles.parsing import Commands, add_json, add_overwrite
 
 if TYPE_CHECKING:
@@ -64,6 +65,8 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
 
 def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
+    from dem.record.manifest import read_run  # noqa: PLC0415
+    from dem.record.series import lost_series  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
@@ -72,6 +75,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         msg = f"--table {output}: exists; choose another name or give --overwrite"
         raise InputError(msg)
     by = _groups(arguments)
+    for warning in filter(None, (lost_series(read_run(directory)) for directory in sources(arguments.directories))):
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:
         try:
