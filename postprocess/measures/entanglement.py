@@ -18,7 +18,7 @@ import numpy as np
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -318,7 +318,10 @@ MEASURES = (
     FrameMeasure(
         name="entanglement",
         place=40,
-        quantities=(Quantity("crossings mean", "-"), Quantity("planes", "-")),
+        quantities=(
+            Quantity("crossings mean", "-", Shown(heading="⟨N⟩", place=20, form=".2f")),
+            Quantity("planes", "-"),
+        ),
         take=_entanglement_of,
         told_of=in_space,
     ),

@@ -111,6 +111,39 @@ def test_measure_takes_the_runs_of_a_sweep(
     assert {row["run"] for row in rows} == {str(out / "runs" / "n6")}
 
 
+def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out, table = tmp_path / "out", tmp_path / "table.csv"
+    sweep_file.write_text(sweep_file.read_text().replace("grid: {count: [5, 6]}", "grid: {count: [5, 6], kind: [a]}"))
+    smarticles("sweep", sweep_file, "--out", out)
+    for name, count, last in (("n5", 5, 0.12), ("n6", 6, 0.14)):
+        write_run(out / "runs" / name, count=count, packing=(0.1, 0.1, last, last))
+    smarticles("measure", out, "--table", table)
+    with table.open(encoding="utf-8") as file:
+        assert [(row["kind"], row["count"]) for row in csv.DictReader(file)] == [("a", "5")] * 4 + [("a", "6")] * 4
+    said = smarticles("measure", out, "--by", "kind")
+    lines = said.out.splitlines()
+    assert lines[0].split()[:3] == ["kind", "runs", "phase"]
+    assert [line.split()[:3] for line in lines[1:5]] == [
+        ["a", "2", kind] for kind in ("deposit", "relax", "shake", "relax")
+    ]
+    # Of 0.12 and 0.14: their mean, and half their difference.
+    assert lines[3].split()[5:7] == ["0.1300", "0.0100"]
+    assert "standard error over runs" in said.out
+
+
+def test_measure_refuses_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    said = smarticles("measure", run, "--by", "seeed")
+    assert (said.status, said.err) == (
+        2,
+        "smarticles: error: --by seeed: 'seeed' is no column of these runs; did you mean 'seed'?\n",
+    )
+    assert "leave --frames out" in smarticles("measure", run, "--by", "seed", "--frames").err
+    assert "names no column" in smarticles("measure", run, "--by", ",").err
+
+
 def test_measure_of_nothing_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("measure", tmp_path / "absent")
     assert said.status == 2
