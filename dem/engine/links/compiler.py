@@ -54,6 +54,13 @@ def kernel(function: F) -> F:
     return compiled  # type: ignore[no-any-return]
 
 
+def released(function: F) -> F:
+    """The same for a kernel that several threads run at once: the interpreter is free meanwhile."""
+    compiled = numba.njit(nogil=True, **OPTIONS)(function)
+    compiled._cache = _Cache(compiled.py_func)
+    return compiled  # type: ignore[no-any-return]
+
+
 @cache
 def stamp() -> str:
     """Hash of everything that compiled code depends on: these sources, the options, Numba, NumPy."""

@@ -90,14 +90,29 @@ def push_apart(
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    segments, position, motion = bodies.segments, bodies.position, bodies.motion
-    owner, kind = pairs.owner, pairs.kind
-    diameter, inverses = 2 * shape.radius, shape.inverses
-    reach = diameter * diameter
-    lost = 0.0
     # First who touches, without a branch that would be mispredicted, then what they do.
-    count = 0
-    for k in range(pairs.counts[1]):
+    count = find_touching(shape, bodies, pairs, 0, pairs.counts[1])
+    return push_touching(shape, law, bodies, pairs, hinged, ledger, dt, out, 0, count)
+
+
+@inlined
+def find_touching(shape: Shape, bodies: Bodies, pairs: Pairs, begin: int, stop: int) -> int:
+    """Write those that touch, or did so in the last step, among some of the near pairs.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles.
+        pairs: `touching` and `nearest` are written, from `begin` on.
+        begin: place of the first pair in `near`.
+        stop: the one after the last.
+
+    Returns:
+        Their number.
+    """
+    segments, kind, inverses, diameter = bodies.segments, pairs.kind, shape.inverses, 2 * shape.radius
+    reach = diameter * diameter
+    count = begin
+    for k in range(begin, stop):
         pair = pairs.near[k]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
@@ -109,7 +124,25 @@ def push_apart(
         x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
         pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
         count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
-    for k in range(count):
+    return count - begin
+
+
+@part
+def push_touching(
+    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array,
+    begin: int, stop: int,
+) -> float:  # fmt: skip
+    """Add the forces of some of the pairs that touch, from place `begin` in `touching` up to `stop`; see `push_apart`.
+
+    Returns:
+        Energy of tangential springs whose contacts have ended [J].
+    """
+    segments, position, motion = bodies.segments, bodies.position, bodies.motion
+    owner, kind = pairs.owner, pairs.kind
+    diameter, inverses = 2 * shape.radius, shape.inverses
+    reach = diameter * diameter
+    lost = 0.0
+    for k in range(begin, stop):
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]

@@ -1,0 +1,116 @@
+"""Where threads wait for each other inside a kernel: a fraction of a microsecond where each has a core.
+
+A thread that waits looks again and again, as the others are done soon; after a while it lets other processes have its
+core, since it may be the one that they need.
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+from numpy.typing import NDArray
+
+from dem.engine.links.compiler import part
+
+Gate = NDArray[np.int64]
+
+ARRIVED, TURN, OVER = 0, 16, 32  # places in a gate, each in a line of memory of its own
+PLACES = 48
+LOOKS = 2000  # before a core is let go of; about 30 us
+
+X86, UNIX = platform.machine() in ("x86_64", "AMD64", "i386", "i686"), sys.platform != "win32"
+_sched_yield = types.ExternalFunction("sched_yield", types.intc()) if UNIX else None  # type: ignore[no-untyped-call]
+
+
+def gate() -> Gate:
+    """A new barrier."""
+    return np.zeros(PLACES, np.int64)
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    return builder.gep(make_array(kind)(context, builder, array).data, [index])  # type: ignore[no-untyped-call]
+
+
+@intrinsic  # type: ignore[misc]
+def _count(typing: Any, gate: Any, place: Any) -> Any:
+    """Add one, and tell what was there before."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = _place(context, builder, signature.args[0], *arguments)
+        return builder.atomic_rmw("add", pointer, ir.Constant(ir.IntType(64), 1), "seq_cst")  # type: ignore[no-untyped-call]
+
+    return types.int64(gate, types.intp), generate
+
+
+@intrinsic  # type: ignore[misc]
+def _read(typing: Any, gate: Any, place: Any) -> Any:
+    """What is there; whatever the thread that wrote it had written before can be read from here on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load_atomic(_place(context, builder, signature.args[0], *arguments), "seq_cst", 8)
+
+    return types.int64(gate, types.intp), generate
+
+
+@intrinsic  # type: ignore[misc]
+def _write(typing: Any, gate: Any, place: Any, value: Any) -> Any:
+    """Write what others will `_read`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, place, value = arguments
+        builder.store_atomic(value, _place(context, builder, signature.args[0], array, place), "seq_cst", 8)
+        return context.get_dummy_value()
+
+    return types.void(gate, types.intp, types.int64), generate
+
+
+@intrinsic  # type: ignore[misc]
+def _rest(typing: Any) -> Any:
+    """Tell the processor that this thread waits, where it knows the word."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if X86:
+            kind = ir.FunctionType(ir.VoidType(), [])  # type: ignore[no-untyped-call]
+            builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.sse2.pause"), [])  # type: ignore[no-untyped-call]
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+@part
+def wait(gate: Gate, threads: int) -> None:
+    """Go on when all threads have come here, or when it is over.
+
+    Args:
+        gate: the barrier.
+        threads: how many there are.
+    """
+    turn = _read(gate, TURN)
+    if _count(gate, ARRIVED) == threads - 1:
+        _write(gate, ARRIVED, 0)
+        _write(gate, TURN, turn + 1)
+        return
+    looks = 0
+    while _read(gate, TURN) == turn:
+        looks += 1
+        if looks < LOOKS:
+            _rest()
+        else:
+            if UNIX:
+                _sched_yield()
+            if _read(gate, OVER) != 0:
+                return
+
+
+@part
+def over(gate: Gate) -> bool:
+    """Whether a thread has failed: nobody is to wait for it any longer."""
+    return bool(_read(gate, OVER) != 0)
