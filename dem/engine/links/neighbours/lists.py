@@ -134,8 +134,8 @@ def put_back(pairs: Pairs, cells: Cells, begin: int, stop: int) -> None:
     """Give back what was taken out at places from `begin` up to `stop`."""
     rows, slip, used = cells.rows, cells.slip, cells.used
     for k in range(begin, stop):
-        p, q = cells.lower[k], cells.upper[k]
-        for m in range(rows[p], rows[p + 1]):
+        row, q = cells.places[cells.lower[k]], cells.upper[k]
+        for m in range(rows[row], rows[row + 1]):
             if pairs.second[m] == q:
                 pairs.used[m] = used[k]
                 for slot in range(3):

@@ -2,7 +2,10 @@
 
 Every link has a box about itself, its skin and half of what a pair needs besides. Boxes are sorted into strips along y
 and, within a strip, into short bins along x, by their lower corners: all that can overlap a box are in a few runs of
-neighbours in memory, from its own bin up to that of its upper corner.
+neighbours in memory, from its own bin up to that of its upper corner. What is asked of links is copied in that order.
+
+The list is in the order of the links' numbers; that of many links in the order of the bins, so that a step meets links
+that are near each other one after the other, since all of them do not fit into a processor's cache.
 """
 
 from __future__ import annotations
@@ -14,6 +17,9 @@ from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
+
+FEW = 3000  # links; up to so many the list is in the order of their numbers
+SKIN, INVERSE = 6, 7  # places in a row of `Cells.lines`
 
 
 class Grid(NamedTuple):
@@ -90,14 +96,14 @@ def search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float
     grid = grid_over(x0, x1, y0, y1, tallest, bare, piece, cells.starts.shape[0] - 2)
     find_bins(cells, grid, 0, count)
     sort_bins(cells, grid)
-    draw_boxes(cells, grid, 0, count)
-    number = find_pairs(shape, bodies, pairs, cells, grid, 0, count, 0, cells.lower.shape[0])
+    draw_boxes(shape, bodies, pairs, cells, grid, 0, count)
+    number = find_pairs(pairs, cells, grid, 0, count, 0, cells.lower.shape[0])
     if number < 0:
         return -1
     for p in range(count + 2):
         cells.rows[p] = 0
     for k in range(number):
-        cells.rows[cells.lower[k] + 2] += 1
+        cells.rows[cells.places[cells.lower[k]] + 2] += 1
     begin_rows(cells)
     for k in range(number):
         put_in_row(cells, k)
@@ -170,26 +176,30 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 
 @inlined
-def draw_boxes(cells: Cells, grid: Grid, begin: int, stop: int) -> None:
-    """Write the boxes of the links at places from `begin` up to `stop` of `order`."""
+def draw_boxes(
+    shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int
+) -> None:
+    """Write what is asked of the links at places from `begin` up to `stop` of `order`, and which rows they get."""
+    few = cells.keys.shape[0] <= FEW
     for m in range(begin, stop):
         p = cells.order[m]
+        cells.places[p] = p if few else m
+        for d in range(6):
+            cells.lines[m, d] = bodies.segments[p, d]
+        cells.lines[m, SKIN], cells.lines[m, INVERSE] = cells.marks[p, 6], shape.inverses[pairs.kind[p]]
         for d in range(3):
             cells.boxes[m, d], cells.boxes[m, 3 + d] = _box(cells.marks, p, d, 0.5 * grid.bare)
 
 
 @part
 def find_pairs(
-    shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, number: int,
-    capacity: int,
-) -> int:  # fmt: skip
+    pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, number: int, capacity: int
+) -> int:
     """Write the pairs that links at places from `begin` up to `stop` of `order` find into `lower` and `upper`.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
-        pairs: tells owners and kinds.
-        cells: sorted.
+        pairs: tells owners.
+        cells: sorted, and boxes drawn.
         grid: the bins.
         begin: the first place.
         stop: the one after the last.
@@ -199,14 +209,13 @@ def find_pairs(
     Returns:
         The place after the last pair, or -1 where there is no room.
     """
-    marks, starts, keys, order, boxes = cells.marks, cells.starts, cells.keys, cells.order, cells.boxes
+    lines, starts, keys, order, boxes = cells.lines, cells.starts, cells.keys, cells.order, cells.boxes
     owner, close, lower, upper = pairs.owner, cells.close, cells.lower, cells.upper
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(begin, stop):
         p = order[m]
         ly, lz, hx, hy, hz = boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
-        own, mine, skin = owner[p], keys[p] // nx, grid.bare + marks[p, 6]
-        inverse = shape.inverses[pairs.kind[p]]
+        own, mine, skin = owner[p], keys[p] // nx, grid.bare + lines[m, SKIN]
         column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
@@ -216,7 +225,7 @@ def find_pairs(
             # Written down and overwritten without a branch, as in `tighten`.
             hits = 0
             for n in range(start, starts[strip * nx + last + 2]):
-                close[hits] = order[n]
+                close[hits] = n
                 hits += not (
                     (boxes[n, 1] > hy)
                     | (boxes[n, 4] < ly)
@@ -225,32 +234,34 @@ def find_pairs(
                     | (boxes[n, 0] > hx)
                 )
             boxed, hits = hits, 0
-            for n in range(boxed):
-                q = close[n]
-                close[hits] = q
-                hits += not (off_lines(bodies.segments, p, q, skin + marks[q, 6]) | (owner[q] == own))
+            for k in range(boxed):
+                n = close[k]
+                close[hits] = n
+                hits += not (off_lines(lines, m, n, skin + lines[n, SKIN]) | (owner[order[n]] == own))
             if number + hits > capacity:
                 return -1
-            for n in range(hits):
-                q = close[n]
+            for k in range(hits):
+                n = close[k]
+                q = order[n]
                 lower[number], upper[number] = min(p, q), max(p, q)
                 number += near_each_other(
-                    bodies.segments, p, q, skin + marks[q, 6], inverse, shape.inverses[pairs.kind[q]]
+                    lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE]
                 )
     return number
 
 
 @inlined
 def begin_rows(cells: Cells) -> None:
-    """Turn lengths of rows, of each link's at its number + 2, into where rows begin, one place further down."""
-    for p in range(cells.keys.shape[0]):
-        cells.rows[p + 2] += cells.rows[p + 1]
+    """Turn lengths of rows, each at its number + 2, into where rows begin, one place further down."""
+    for row in range(cells.keys.shape[0]):
+        cells.rows[row + 2] += cells.rows[row + 1]
 
 
 @inlined
 def put_in_row(cells: Cells, k: int) -> None:
     """Write a pair that was found where it belongs in the list; a row's end moves to where it belongs, as rows fill."""
     p = cells.lower[k]
-    place = cells.rows[p + 1]
-    cells.rows[p + 1] = place + 1
+    row = cells.places[p]
+    place = cells.rows[row + 1]
+    cells.rows[row + 1] = place + 1
     cells.first[place], cells.second[place] = p, cells.upper[k]

@@ -120,12 +120,10 @@ def _build(
     if mine == 0:
         sort_bins(cells, grid)
     wait(shared.gate, threads)
-    draw_boxes(cells, grid, each * begin, each * stop)
+    draw_boxes(shape, bodies, pairs, cells, grid, each * begin, each * stop)
     wait(shared.gate, threads)
     room, limit = share(cells.lower.shape[0], mine, threads)
-    shared.tally[mine, NEAR] = find_pairs(
-        shape, bodies, pairs, cells, grid, each * begin, each * stop, room, limit
-    )
+    shared.tally[mine, NEAR] = find_pairs(pairs, cells, grid, each * begin, each * stop, room, limit)
     wait(shared.gate, threads)
     found = 0
     for t in range(threads):
@@ -168,17 +166,18 @@ def _grid(
 
 @part
 def _sort_rows(mine: int, threads: int, cells: Cells, begin: int, stop: int, shared: Shared) -> None:
-    """Put all pairs that were found into rows; each thread sees to the rows of links from `begin` up to `stop`."""
+    """Put all pairs that were found into rows; each thread sees to those from `begin` up to `stop`."""
     rows, lower, capacity = cells.rows, cells.lower, cells.lower.shape[0]
     if mine == 0:
         rows[0] = rows[1] = 0
-    for p in range(begin, stop):
-        rows[p + 2] = 0
+    for row in range(begin, stop):
+        rows[row + 2] = 0
     for t in range(threads):
         room, _ = share(capacity, t, threads)
         for k in range(room, shared.tally[t, NEAR]):
-            if begin <= lower[k] < stop:
-                rows[lower[k] + 2] += 1
+            row = cells.places[lower[k]]
+            if begin <= row < stop:
+                rows[row + 2] += 1
     wait(shared.gate, threads)
     if mine == 0:
         begin_rows(cells)
@@ -186,6 +185,6 @@ def _sort_rows(mine: int, threads: int, cells: Cells, begin: int, stop: int, sha
     for t in range(threads):
         room, _ = share(capacity, t, threads)
         for k in range(room, shared.tally[t, NEAR]):
-            if begin <= lower[k] < stop:
+            if begin <= cells.places[lower[k]] < stop:
                 put_in_row(cells, k)
     wait(shared.gate, threads)
