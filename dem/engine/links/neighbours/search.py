@@ -136,9 +136,7 @@ def corners(marks: Array, bare: float, begin: int, stop: int) -> tuple[float, fl
 
 
 @inlined
-def grid_over(
-    x0: float, x1: float, y0: float, y1: float, tallest: float, bare: float, piece: float, room: int
-) -> Grid:
+def grid_over(x0: float, x1: float, y0: float, y1: float, tallest: float, bare: float, piece: float, room: int) -> Grid:
     """Bins for what `corners` found; there is room for so many."""
     ny = 1 + _bin(y1 - y0, piece, int(math.sqrt(room)) - 1)
     nx = 1 + _bin(x1 - x0, 0.25 * piece, room // ny - 1)
@@ -176,9 +174,7 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 
 @inlined
-def draw_boxes(
-    shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int
-) -> None:
+def draw_boxes(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int) -> None:
     """Write what is asked of the links at places from `begin` up to `stop` of `order`, and which rows they get."""
     few = cells.keys.shape[0] <= FEW
     for m in range(begin, stop):
@@ -192,9 +188,7 @@ def draw_boxes(
 
 
 @part
-def find_pairs(
-    pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, number: int, capacity: int
-) -> int:
+def find_pairs(pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, number: int, capacity: int) -> int:
     """Write the pairs that links at places from `begin` up to `stop` of `order` find into `lower` and `upper`.
 
     Args:
@@ -244,9 +238,7 @@ def find_pairs(
                 n = close[k]
                 q = order[n]
                 lower[number], upper[number] = min(p, q), max(p, q)
-                number += near_each_other(
-                    lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE]
-                )
+                number += near_each_other(lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE])
     return number
 
 

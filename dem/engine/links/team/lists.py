@@ -45,9 +45,7 @@ def look_together(
 
 
 @part
-def _moved(
-    mine: int, threads: int, shape: Shape, bodies: Bodies, marks: Array, centres: Array, shared: Shared
-) -> bool:
+def _moved(mine: int, threads: int, shape: Shape, bodies: Bodies, marks: Array, centres: Array, shared: Shared) -> bool:
     """See `dem.engine.links.neighbours.skins.moved`."""
     n, each = bodies.position.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
     begin, stop = share(n, mine, threads)
@@ -62,9 +60,7 @@ def _moved(
 
 
 @part
-def _mean(
-    mine: int, threads: int, shared: Shared, x: float, y: float, z: float, n: int
-) -> tuple[float, float, float]:
+def _mean(mine: int, threads: int, shared: Shared, x: float, y: float, z: float, n: int) -> tuple[float, float, float]:
     """The sums of all threads over n; a barrier."""
     sums = shared.sums
     sums[mine, 0], sums[mine, 1], sums[mine, 2] = x, y, z

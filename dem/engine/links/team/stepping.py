@@ -94,19 +94,36 @@ def advance_together(
 ) -> int:  # fmt: skip
     """Make steps, as one of some threads that all call this at once.
 
-    Arguments are those of `dem.engine.links.stepping.advance`, but for these.
-
     Args:
         mine: the thread's number, from 0.
         threads: how many there are.
         shared: what they can all see.
         own: the smarticles, with `load`, `shares` and `deepest` of this thread; of the first one they are those
             of `bodies`.
-        ground: the fixtures, with `force` of this thread; of the first one it is the real one.
-        cells: scratch, with `close` of this thread.
+        steps: from here on as in `dem.engine.links.stepping.advance`, but where said.
+        made: the same.
+        begin: the same [s].
+        dt: the same [s].
+        gravity: the same [m/s²].
+        planar: the same.
+        skins: the same.
+        shape: the same.
+        law: the same.
+        wall_law: the same.
+        bodies: the same.
+        pairs: the same.
+        cells: the same, with `close` of this thread.
+        ends: the same.
+        ground: the same, with `force` of this thread; of the first one it is the real one.
+        motors: the same.
+        hooks: the same.
+        rims: the same.
+        channel: the same.
+        cords: the same.
         ledger: of this thread.
         out: of this thread.
         row: of this thread.
+        totals: as in `advance`; written by the first thread.
 
     Returns:
         Steps that were made; fewer where a list is full, or where a thread has failed.
@@ -129,7 +146,7 @@ def advance_together(
         lost += push_from_fixtures(
             mine, threads, shape, wall_law, own, ends, ground, motors, hooks, rims, channel, ledger, dt, out
         )
-        if cords is not None:
+        if cords is not None:  # alone in its line: then what is not called for is not compiled
             if mine == 0:
                 totals[WORK] += pull(shape, bodies, cords, motors, dt)
         wait(shared.gate, threads)
