@@ -98,12 +98,13 @@ class Fixtures(Protocol):
 
     # -- how they move -----------------------------------------------------------------------------------------
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         """Move what is there as z = A sin(2πf t), t from now; it starts where it is.
 
         Args:
             amplitude: A [m].
             frequency: f [Hz].
+            walls: whether wall and hooks move with the floor.
 
         Raises:
             RunError: the engine was built without a shaker.
@@ -152,12 +153,17 @@ class Motors(Protocol):
     def weld(self) -> None:
         """Make each smarticle rigid in the shape that it has; nothing while welded already."""
 
+    @property
+    def looks_at_once(self) -> int:
+        """How many looks the motors can be told of at once, one or more."""
+
     def actuate(self, targets: Array, interval: float) -> None:
-        """Let the motors look at their barbs and act for one control period.
+        """Let the motors look at their barbs and act for a control period; and so for the periods that follow.
 
         Args:
-            targets: (N, 2) angles at the end of the period according to the schedule [rad].
-            interval: length of the period [s].
+            targets: (looks, N, 2) angles at the end of each period according to the schedule [rad]; `looks_at_once`
+                of them at most.
+            interval: length of a period [s].
         """
 
     @property

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +20,7 @@ from dem.record import names
 from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
 
+PERIOD = 1.0  # s of wall time between two writings of a series that grows
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
@@ -35,6 +38,7 @@ class SeriesWriter:
     described: Columns
     attributes: Mapping[str, Any]
     _rows: dict[str, list[Any]] = field(default_factory=dict)
+    _written: float = -math.inf
 
     def __post_init__(self) -> None:
         self._rows = {name: [] for name in self.described}
@@ -56,6 +60,15 @@ class SeriesWriter:
         """Go on from where `columns` were taken."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
+    def keep_up(self) -> None:
+        """Rewrite the file, but for a moment after it was written: whole, it costs more than the rows that are new.
+
+        Raises:
+            RunError: it cannot be written.
+        """
+        if time.monotonic() - self._written >= PERIOD:
+            self.write()
+
     def write(self) -> None:
         """Rewrite the file with all rows.
 
@@ -63,6 +76,7 @@ class SeriesWriter:
             RunError: it cannot be written.
         """
         write_whole(self.folder / names.SERIES, self._write)
+        self._written = time.monotonic()
 
     def _write(self, path: Path) -> None:
         # Made in memory: on a full disk HDF5's own library does not fail cleanly but takes the process with it.

@@ -7,6 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.state import State
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
@@ -48,12 +52,21 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
         series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
         frames=FrameWriter(out),
         watchdog=build_watchdog(scene),
+        points=watched_points(scene),
         progress=progress,
         interval=recording.series_interval_s,
         frame_every=recording.samples_in(recording.frame_interval_s),
         spheres=FrameWriter(out, SPHERE) if called_for(scene, EffectName.SPHERE_GLYPHS) else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
+
+
+def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
+    """What the watchdog looks at of a state, (N, P, 3) [m]: all spheres, or ends and middles of links without any."""
+    if scene.smooth:
+        return lambda state: np.concatenate([state.vertices, state.link_positions], axis=1)
+    particle = scene.particle
+    return lambda state: state.spheres(particle)
 
 
 def build_watchdog(scene: Scene) -> Watchdog:

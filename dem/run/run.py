@@ -133,6 +133,7 @@ def _run(
         _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
     except StopRequestedError as error:
+        _keep_series(simulation)
         _mark_ended(simulation, out, log, status="interrupted", cause=str(error))
         raise
     except KeyboardInterrupt:
@@ -142,6 +143,7 @@ def _run(
     except Exception as error:
         # A defect of ours: the run directory must still say that the run has ended.
         log.exception("unexpected error")
+        _keep_series(simulation)
         _mark_ended(simulation, out, log, status="failed", cause=f"unexpected {type(error).__name__}: {error}")
         raise
     finally:

@@ -235,5 +235,5 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     saved = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.load(engine.save(Path(folder)), Path(folder))
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
-    engine.motors.actuate(np.full((1, 2), angle), scene.fidelity.control_interval_s)
+    engine.motors.actuate(np.full((1, 1, 2), angle), scene.fidelity.control_interval_s)
     return {"saved": saved, "loaded": loaded, "looked": engine.motors._hinges.torques(), "state": engine.state().angles}

@@ -37,7 +37,7 @@ def hold(engine: YadeEngine, scene: Scene, seconds: float) -> None:
     """Let motors hold their commands for a time; one look per step, as the phases do."""
     interval = scene.fidelity.control_interval_s
     for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.readings.commands, interval)
+        engine.motors.actuate(engine.motors.readings.commands[None], interval)
         engine.advance(1)
 
 
@@ -75,7 +75,7 @@ def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any
     stiffness, hinges = scene.motor.stiffness_N_m_per_rad, engine._assembly.hinges
     energies, interval = [], scene.fidelity.control_interval_s
     for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.readings.commands, interval)
+        engine.motors.actuate(engine.motors.readings.commands[None], interval)
         engine.advance(1)
         # Velocities are half a step behind the angles: with those at the step's beginning the springs are as much late.
         twisted = engine.motors.readings.commands - hinges.angles()

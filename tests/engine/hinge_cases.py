@@ -245,7 +245,7 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
     interval = scene.fidelity.control_interval_s
     for step in range(round(angle / speed / engine.time_step)):
         if step % round(interval / engine.time_step) == 0:
-            engine.motors.actuate(begun, interval)
+            engine.motors.actuate(begun[None], interval)
         barb.vel = engine._yade.vector(*np.cross(spin, vec(barb.pos) - hinge))
         engine.advance(1)
         torques.append(engine.motors._hinges.torques()[0, 0])

@@ -89,7 +89,7 @@ def test_a_free_gait_keeps_momentum_and_angular_momentum(law: str) -> None:
     spread = np.abs(np.cross(before.link_positions, before.link_velocities)).sum(axis=1) * before.boxes.mass
     for look in range(1000):
         phase = 2 * math.pi * look / 500
-        made.motors.actuate(math.pi / 2 + np.array([[0.3 * math.sin(phase), 0.4 * math.cos(phase) - 0.4]] * 2), 2e-4)
+        made.motors.actuate(math.pi / 2 + np.array([[[0.3 * math.sin(phase), 0.4 * math.cos(phase) - 0.4]] * 2]), 2e-4)
         made.advance(2)
     after = made.state()
     assert np.abs(after.angles - math.pi / 2).max() > 0.05
@@ -109,7 +109,7 @@ def test_motors_work_equals_the_gain_of_energy_of_a_free_pair(law: str) -> None:
     made.motors.articulate()
     start, gains, works = made.state().kinetic_energy, [], []
     for look in range(400):
-        made.motors.actuate(np.full((2, 2), math.pi / 2 + 0.4 * math.sin(2 * math.pi * look / 90)), 2e-4)
+        made.motors.actuate(np.full((1, 2, 2), math.pi / 2 + 0.4 * math.sin(2 * math.pi * look / 90)), 2e-4)
         made.advance(4)
         gains.append(made.state().kinetic_energy - start)
         works.append(made.motors.work)

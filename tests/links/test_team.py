@@ -42,7 +42,7 @@ def shaken(pile: Saved, threads: int) -> LinksEngine:
 
 def swing(made: LinksEngine, looks: int) -> None:
     for look in range(looks):
-        made.motors.actuate(np.full((made.count, 2), math.pi / 2 - 0.5 * math.sin(look / 40)), 2e-4)
+        made.motors.actuate(np.full((1, made.count, 2), math.pi / 2 - 0.5 * math.sin(look / 40)), 2e-4)
         made.advance(4)
 
 

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 # Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
-FORMAT = "links-2"
+FORMAT = "links-3"
 
 
 class LinksEngine:
@@ -131,7 +131,7 @@ class LinksEngine:
     def advance(self, steps: int) -> None:
         """See the interface."""
         if steps > 0:
-            self.motors.advance(steps)
+            self._world.advance(steps)
             self._smarticle_seconds += steps * self.time_step * self.count
 
     # -- smarticles --------------------------------------------------------------------------------------------
@@ -165,8 +165,10 @@ class LinksEngine:
 
     def neighbours(self) -> NDArray[np.int64]:
         """See the interface."""
-        pairs = np.unique(self._world.look().pairs, axis=0)
-        return np.bincount(pairs.ravel(), minlength=self.count).astype(np.int64)
+        pairs = self._world.look().pairs
+        # Two numbers as one: rows are sorted twenty times slower.
+        both = np.unique(pairs[:, 0] * self.count + pairs[:, 1])
+        return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
         """See the interface."""

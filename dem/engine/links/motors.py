@@ -16,7 +16,8 @@ from dem.physics.motor import MotorLaw
 
 Array = NDArray[np.float64]
 
-LAWS = ("halt", "stall", "slip", "servo")
+LAWS = ("halt", "stall", "ease", "slip", "servo")
+LOOKS = 64  # that may be told at once: so many that a call of the kernel costs nothing beside them
 
 
 class LinksMotors:
@@ -35,8 +36,6 @@ class LinksMotors:
         self._world = world
         self._law = law
         self._strengths = strengths
-        self._targets: Array | None = None
-        self._interval, self._left = 0.0, 0
         if law is not None and law.law not in LAWS:
             msg = f"motor.law: {law.law!r} is not known to the links engine; use {', '.join(LAWS)}, or engine: yade"
             raise InputError(msg)
@@ -45,6 +44,11 @@ class LinksMotors:
     def present(self) -> bool:
         """See the interface."""
         return self._law is not None
+
+    @property
+    def looks_at_once(self) -> int:
+        """See the interface."""
+        return LOOKS
 
     @property
     def articulated(self) -> bool:
@@ -61,7 +65,7 @@ class LinksMotors:
             world.motors = self._made(self._law)
         world.set_articulated(True)
         engage(world.shape, world.bodies, world.motors)
-        self._left = 0
+        world.motors.due[1] = -1
 
     def weld(self) -> None:
         """See the interface."""
@@ -70,29 +74,18 @@ class LinksMotors:
             assert world.motors is not None
             world.totals[0] += release(world.shape, world.bodies, world.motors)
             world.set_articulated(False)
-            self._left = 0
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """See the interface."""
+        """See the interface; the first look is now, the others follow as time is advanced, between two steps."""
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
-        self._targets = np.ascontiguousarray(targets, dtype=np.float64)
-        self._interval = interval
-        look(world.shape, world.bodies, world.motors, self._targets, interval)
-        self._left = max(1, round(interval / world.time_step))
-
-    def advance(self, steps: int) -> None:
-        """Make steps; where nobody asks motors to look when their period is over, they look at the old targets."""
-        while steps > 0:
-            if not self._world.articulated or self._targets is None:
-                self._world.advance(steps)
-                return
-            if not self._left:
-                self.actuate(self._targets, self._interval)
-            now = min(steps, self._left)
-            self._world.advance(now)
-            self._left -= now
-            steps -= now
+        world.motors = world.motors._replace(
+            interval=float(interval),
+            period=max(1, round(interval / world.time_step)),
+            targets=np.ascontiguousarray(targets, dtype=np.float64),
+        )
+        world.motors.due[:] = 0
+        look(world.shape, world.bodies, world.motors)
 
     @property
     def readings(self) -> MotorReadings | None:
@@ -143,6 +136,11 @@ class LinksMotors:
             momentum=np.zeros((n, 2)),
             impulse=np.zeros((n, 2)),
             elapsed=np.zeros(1),
+            interval=0.0,
+            period=0,
+            targets=np.zeros((1, n, 2)),
+            due=np.array([0, -1]),
+            over=np.zeros(n, dtype=np.int64),
         )
 
     # -- checkpoints -------------------------------------------------------------------------------------------
@@ -153,18 +151,15 @@ class LinksMotors:
         motors, found = self._world.motors, {}
         if motors is not None:
             found = {name: value for name, value in motors._asdict().items() if isinstance(value, np.ndarray)}
-        if self._targets is not None:
-            found["targets"] = self._targets
-        found["period"] = np.array([self._interval, self._left])
+            found["period"] = np.array([motors.interval, motors.period])
         return found
 
     def restore(self, arrays: dict[str, Array]) -> None:
         """Go on from where `arrays` were taken; the smarticles are there already."""
         world = self._world
-        world.motors, self._targets = None, arrays.get("targets")
-        self._interval, self._left = float(arrays["period"][0]), int(arrays["period"][1])
+        world.motors = None
         if "command" in arrays:
             assert self._law is not None  # a checkpoint belongs to its scene
-            made = self._made(self._law)
+            made, (interval, period) = self._made(self._law), arrays["period"]
             kept: dict[str, Any] = {name: arrays[name] for name in arrays if name in made._fields}
-            world.motors = made._replace(**kept)
+            world.motors = made._replace(**{**kept, "interval": float(interval), "period": int(period)})

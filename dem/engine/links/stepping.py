@@ -12,6 +12,7 @@ from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import push_apart
 from dem.engine.links.contact.rims import push_rims
 from dem.engine.links.contact.walls import push_sideways, push_up
+from dem.engine.links.motion.motoring import look
 from dem.engine.links.motion.moving import drift, kick
 from dem.engine.links.motion.poses import find_motion, find_spin, pose
 from dem.engine.links.neighbours.lists import FULL, GOOD, build, tighten
@@ -141,6 +142,8 @@ def advance(
     n = bodies.position.shape[0]
     for step in range(steps):
         shaken_to(ground, begin + (made + step) * dt)
+        if motors is not None and motors.due[1] == 0:
+            look(shape, bodies, motors)
         pose(shape, bodies, motors)
         if look_for_neighbours(shape, bodies, pairs, cells, skins) == FULL:
             return step
@@ -170,6 +173,8 @@ def advance(
         if ledger is not None:
             totals[LOST] += lost + settle(shape, bodies, motors, ledger, dt)
         drift(shape, bodies, motors, dt, row, 0, n)
+        if motors is not None:
+            motors.due[1] -= 1
         for k in range(4):
             if not ground.shaken[k]:
                 ground.place[k] += ground.speed[k] * dt

@@ -35,7 +35,7 @@ from dem.engine.links.arrays import (
 from dem.engine.links.contact.meeting import COLUMNS, ROWS
 from dem.engine.links.contact.queries import look_at_fixtures, look_at_pairs
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.motion.poses import pose
+from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
 from dem.engine.links.stepping import advance
 from dem.engine.links.team.team import Team
@@ -265,22 +265,10 @@ class World:
             "positions or velocities are no numbers, the simulation has blown up",
             "lower fidelity.time_step_fraction",
         )
-        plane, axes = bodies.plane, bodies.axes
-        # Centres and directions of the links in the middle link's frame, about the centre of mass.
-        centres = np.stack([plane[:, 2:4], -plane[:, 0:2], plane[:, 4:6]], axis=1)
-        middle = np.tile([1.0, 0.0], (n, 1))
-        along = np.stack([plane[:, 10:12], middle, plane[:, 12:14]], axis=1)
-        across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
-        arms = np.einsum("nij,nkj->nki", axes[:, :, :2], centres)
+        places, velocities, spins = (np.empty((n, 3, 3)) for _ in range(3))
         frames = np.empty((n, 3, 3, 3))
-        frames[..., 0] = np.einsum("nij,nkj->nki", axes[:, :, :2], along)
-        frames[..., 1] = np.einsum("nij,nkj->nki", axes[:, :, :2], across)
-        frames[..., 2] = axes[:, None, :, 2]
-        motion = (
-            np.repeat(bodies.motion[:, None], 3, axis=1) if not self.articulated else bodies.motion.reshape(n, 3, 6)
-        )
-        velocities = motion[..., :3] + np.cross(motion[..., 3:], arms)
-        return State(boxes, bodies.position[:, None] + arms, frames, velocities, motion[..., 3:].copy())
+        find_links(bodies, self.articulated, places, frames, velocities, spins)
+        return State(boxes, places, frames, velocities, spins)
 
     def look(self) -> Contacts:
         """All contacts at this instant; nothing of the simulation is changed.

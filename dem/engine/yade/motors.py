@@ -74,12 +74,17 @@ class YadeMotors:
         """See the interface: motors that hold, at a third of the cost."""
         self._account.dissipated += self._assembly.weld()
 
+    @property
+    def looks_at_once(self) -> int:
+        """See the interface: between two looks YADE comes back to Python anyhow."""
+        return 1
+
     def actuate(self, targets: Array, interval: float) -> None:
         """See the interface."""
         assert self.deciding is not None  # only articulated smarticles are actuated
         time_step = float(self._yade.omega.dt)
         rates = self._hinges.rates() if self.deciding.law.damping else None
-        torques = self.deciding.look(self._hinges.angles(), targets, interval, time_step, rates)
+        torques = self.deciding.look(self._hinges.angles(), targets[0], interval, time_step, rates)
         self._hinges.set_torques(torques, time_step)
 
     @property

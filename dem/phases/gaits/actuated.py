@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.gaits.checks import actuation_warnings, check_actuated
@@ -47,12 +49,19 @@ class ActuatedPhase(Phase):
 
 
 class Actuating:
-    """The motors follow their schedule, one look per control period; smarticles are articulated meanwhile."""
+    """The motors follow their schedule, one look per control period; smarticles are articulated meanwhile.
 
-    def __init__(self, schedule: Drive, interval: float) -> None:
+    Args:
+        schedule: the target angles.
+        interval: a control period [s].
+        halt_every: looks after which time is to stop, so that somebody can look at the pile; None: never.
+    """
+
+    def __init__(self, schedule: Drive, interval: float, *, halt_every: int | None = None) -> None:
         self._drive = schedule
         self._interval = interval
         self._looks = math.ceil(schedule.duration / interval - 1e-9)
+        self._halt_every = halt_every or self._looks
         self.memory: Memory = {"look": 0}
 
     def proceed(self, engine: Engine) -> float:
@@ -61,7 +70,10 @@ class Actuating:
         if look == 0:
             engine.motors.articulate()
         # The last look only takes note of the work since the one before.
-        time = min((look + 1) * self._interval, self._drive.duration)
-        engine.motors.actuate(self._drive.targets(time), self._interval)
-        self.memory["look"] = look + 1
-        return self._interval if look < self._looks else 0.0
+        stop = min(look + engine.motors.looks_at_once, (look // self._halt_every + 1) * self._halt_every, self._looks)
+        looks = range(look, max(look + 1, stop))
+        targets = [self._drive.targets(min((k + 1) * self._interval, self._drive.duration)) for k in looks]
+        engine.motors.actuate(np.stack(targets), self._interval)
+        self.memory["look"] = looks.stop
+        period = max(1, round(self._interval / engine.time_step)) * engine.time_step
+        return len(looks) * period if look < self._looks else 0.0

@@ -151,7 +151,7 @@ def test_motors_tell_what_they_hold_while_at_work_and_nothing_while_welded() -> 
     assert (row["angle_rad"], row["commanded_angle_rad"]) == (own, own)
     assert math.isnan(row["tracking_error_rad"])
     engine.motors.articulate()
-    engine.motors.actuate(np.array([[1.0, 1.5], [1.2, 1.5]]), 2e-4)
+    engine.motors.actuate(np.array([[[1.0, 1.5], [1.2, 1.5]]]), 2e-4)
     told = engine.motors.readings
     assert told is not None
     halted = np.array([[True, False], [False, False]])

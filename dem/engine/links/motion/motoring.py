@@ -1,6 +1,6 @@
 """Motors in the kernels: what they measure, what they prescribe, and what they exert.
 
-Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
+Halt, stall and ease are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
 mean torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle:
 τ = dp/dt - ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look
 the rate jumps at once, by no more than what τ_max alone would give to a free barb in the period (`acceleration`): a
@@ -35,8 +35,9 @@ from dem.engine.links.motion.planar import (
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
-HALT, STALL = range(2)
+HALT, STALL, EASE = range(3)
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
+EASED, PATIENCE = 0.5, 20  # of the speed at τ_max; findings in a row, of both barbs, after which a motor stops
 ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the turn in a step
 
 
@@ -78,7 +79,14 @@ def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 @kernel
 def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
-    for i in range(bodies.position.shape[0]):
+    _note_some(bodies, motors, motors.elapsed[0], 0, bodies.position.shape[0])
+    motors.elapsed[0] = 0.0
+
+
+@inlined
+def _note_some(bodies: Bodies, motors: Motoring, elapsed: float, begin: int, stop: int) -> None:
+    """The same for smarticles from `begin` up to `stop`, a time [s] after the last look."""
+    for i in range(begin, stop):
         row = bodies.plane[i]
         turn_axes(bodies, i)
         normal = along_normal(bodies, i)
@@ -86,17 +94,16 @@ def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
             bodies.rate[i, 0], bodies.rate[i, 1] = rates(row, normal, motors.momentum[i, 0], motors.momentum[i, 1])
         p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
         for k in range(2):
-            if motors.elapsed[0] > 0.0:
+            if elapsed > 0.0:
                 impulse = motors.impulse[i, k]
                 if motors.law < SLIP:
                     impulse = p[k] - motors.momentum[i, k] - impulse
-                    motors.work[i, k] += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / motors.elapsed[0]
-                motors.torque[i, k] = impulse / motors.elapsed[0]
+                    motors.work[i, k] += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / elapsed
+                motors.torque[i, k] = impulse / elapsed
             motors.impulse[i, k] = 0.0
             motors.begun[i, k] = bodies.alpha[i, k]
             if motors.law < SLIP:
                 motors.momentum[i, k] = p[k]
-    motors.elapsed[0] = 0.0
 
 
 @kernel
@@ -116,22 +123,31 @@ def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 
 
 @kernel
-def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interval: float) -> None:
-    """What the motors do in the control period that begins now.
+def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+    """What the motors do in the control period that begins now, by the row of `targets` that is due.
+
+    Where nobody has told what comes after the last row they go on by it.
 
     Args:
         shape: what all smarticles have in common.
         bodies: the smarticles; `rate` is written.
         motors: written.
-        targets: (N, 2) or (1, 2) angles at the end of the period according to the schedule [rad].
-        interval: length of the period [s].
     """
-    note(shape, bodies, motors)
-    shared = targets.shape[0] == 1
-    for i in range(bodies.position.shape[0]):
+    now = min(motors.due[0], motors.targets.shape[0] - 1)
+    motors.due[0], motors.due[1] = now + 1, motors.period
+    look_some(bodies, motors, now, motors.elapsed[0], 0, bodies.position.shape[0])
+    motors.elapsed[0] = 0.0
+
+
+@inlined
+def look_some(bodies: Bodies, motors: Motoring, now: int, elapsed: float, begin: int, stop: int) -> None:
+    """The same for smarticles from `begin` up to `stop`, by row `now`, a time [s] after the last look."""
+    interval = motors.interval
+    _note_some(bodies, motors, elapsed, begin, stop)
+    for i in range(begin, stop):
         r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
         for k in range(2):
-            target = targets[0 if shared else i, k]
+            target = motors.targets[now, i, k]
             if motors.law >= SLIP:
                 most = motors.speed * interval
                 motors.command[i, k] += min(most, max(-most, target - motors.command[i, k]))
@@ -150,16 +166,24 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring, targets: Array, interva
 
 @inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
-    """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
+    """Rate of an angle in the period that begins, for motors that halt, stall or ease; `halted` is written."""
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
     behind = motors.schedule[i, k] - bodies.alpha[i, k]
     # Catch up as fast as can be braked in time; what the schedule does meanwhile comes on top.
     catch_up = min(abs(behind) / interval, math.sqrt(2 * BRAKING * most * abs(behind)))
     rate = (target - motors.schedule[i, k]) / interval + math.copysign(catch_up, behind)
-    rate = min(motors.speed, max(-motors.speed, rate))
-    rate = min(before + most * interval, max(before - most * interval, rate))
     torque = motors.torque[i, k]
-    halted = abs(torque) >= motors.limit[i, k] and (motors.law == STALL or rate * torque > 0.0)
+    over, speed = abs(torque) >= motors.limit[i, k], motors.speed
+    if motors.law == EASE:
+        motors.over[i] = motors.over[i] + 1 if over else 0
+        if over:
+            speed = EASED * motors.speed
+    rate = min(speed, max(-speed, rate))
+    rate = min(before + most * interval, max(before - most * interval, rate))
+    if motors.law == EASE:
+        halted = over and motors.over[i] >= PATIENCE
+    else:
+        halted = over and (motors.law == STALL or rate * torque > 0.0)
     motors.halted[i, k] = halted
     return 0.0 if halted else rate
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from dem.engine.links.arrays import Bodies
+from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, kernel
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.shape import Shape
 
-SLIP = 2  # laws of motors from here on leave the angles free
+SLIP = 3  # laws of motors from here on leave the angles free
 
 
 @inlined
@@ -129,3 +129,40 @@ def pose_some(shape: Shape, bodies: Bodies, hinged: Any, begin: int, stop: int) 
         find_spin(bodies, i, hinged)
         find_motion(shape, bodies, i, hinged)
         place_links(shape, bodies, i)
+
+
+@kernel
+def find_links(bodies: Bodies, hinged: bool, places: Array, frames: Array, velocities: Array, spins: Array) -> None:
+    """Write where all links are and how they move.
+
+    Args:
+        bodies: the smarticles, posed.
+        hinged: whether links have velocities of their own.
+        places: (N, 3, 3) written: centres of the links [m].
+        frames: (N, 3, 3, 3) written: along, across and normal to each link, in columns [1].
+        velocities: (N, 3, 3) written: of the centres [m/s].
+        spins: (N, 3, 3) written: angular velocities [rad/s].
+    """
+    axes, plane, motion = bodies.axes, bodies.plane, bodies.motion
+    for i in range(bodies.position.shape[0]):
+        for k in range(3):
+            # Barb 1 and barb 2 about the centre of mass; the middle link is where the centre of mass is not.
+            x, y, ex, ey = -plane[i, 0], -plane[i, 1], 1.0, 0.0
+            if k == 0:
+                x, y, ex, ey = plane[i, 2], plane[i, 3], plane[i, 10], plane[i, 11]
+            elif k == 2:
+                x, y, ex, ey = plane[i, 4], plane[i, 5], plane[i, 12], plane[i, 13]
+            row = 3 * i + k if hinged else i
+            for d in range(3):
+                frames[i, k, d, 0] = axes[i, d, 0] * ex + axes[i, d, 1] * ey
+                frames[i, k, d, 1] = axes[i, d, 1] * ex - axes[i, d, 0] * ey
+                frames[i, k, d, 2] = axes[i, d, 2]
+                places[i, k, d] = axes[i, d, 0] * x + axes[i, d, 1] * y
+                spins[i, k, d] = motion[row, 3 + d]
+            rx, ry, rz = places[i, k, 0], places[i, k, 1], places[i, k, 2]
+            wx, wy, wz = spins[i, k, 0], spins[i, k, 1], spins[i, k, 2]
+            velocities[i, k, 0] = motion[row, 0] + wy * rz - wz * ry
+            velocities[i, k, 1] = motion[row, 1] + wz * rx - wx * rz
+            velocities[i, k, 2] = motion[row, 2] + wx * ry - wy * rx
+            for d in range(3):
+                places[i, k, d] += bodies.position[i, d]

@@ -11,6 +11,7 @@ from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import find_touching, push_touching
 from dem.engine.links.contact.rims import push_rims
 from dem.engine.links.contact.walls import push_sideways, push_up
+from dem.engine.links.motion.motoring import look_some
 from dem.engine.links.motion.moving import drift, kick
 from dem.engine.links.motion.poses import pose_some
 from dem.engine.links.neighbours.lists import FULL
@@ -130,16 +131,29 @@ def advance_together(
     """
     n, hinged = bodies.position.shape[0], motors is not None
     i, j = share(n, mine, threads)
+    # Every thread counts for itself; the first one notes it where no other thread will look.
+    next_row, left, elapsed = 0, -1, 0.0
+    if motors is not None:
+        next_row, left, elapsed = motors.due[0], motors.due[1], motors.elapsed[0]
     for step in range(steps):
         if over(shared.gate):
             return step
         if mine == 0:
             shaken_to(ground, begin + (made + step) * dt)
+        if motors is not None:
+            if left == 0:
+                now = min(next_row, motors.targets.shape[0] - 1)
+                look_some(bodies, motors, now, elapsed, i, j)
+                next_row, left, elapsed = now + 1, motors.period, 0.0
         pose_some(shape, bodies, motors, i, j)
         bodies.load[i:j] = 0.0
         if hinged:
             bodies.shares[3 * i : 3 * j] = 0.0
-        if look_together(mine, threads, shape, bodies, pairs, cells, skins, shared) == FULL:
+        found = look_together(mine, threads, shape, bodies, pairs, cells, skins, shared)
+        if motors is not None:
+            if mine == 0:
+                motors.due[0], motors.due[1], motors.elapsed[0] = next_row, left, elapsed
+        if found == FULL:
             return step
         ground.force[:] = 0.0
         lost = push_apart_together(mine, threads, shape, law, own, pairs, motors, ledger, dt, out, shared)
@@ -152,8 +166,6 @@ def advance_together(
         wait(shared.gate, threads)
         if mine == 0:
             note_forces(ground, shared, totals, dt)
-            if motors is not None:
-                motors.elapsed[0] += dt
         gather(shared, bodies, hinged, i, j)
         kick(shape, bodies, motors, gravity, planar, dt, i, j)
         if ledger is not None:
@@ -165,6 +177,10 @@ def advance_together(
                 for t in range(threads):
                     totals[LOST] += shared.lost[t, 0]
         drift(shape, bodies, motors, dt, row, i, j)
+        left, elapsed = left - 1, elapsed + dt
+        if motors is not None:
+            if mine == 0:
+                motors.due[1], motors.elapsed[0] = left, elapsed
         if mine == 0:
             for k in range(4):
                 if not ground.shaken[k]:
