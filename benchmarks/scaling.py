@@ -83,8 +83,8 @@ def with_ratios(table: Any) -> Any:
     alone = table["N [-]"].map(wide[1]) if 1 in wide else np.nan
     table["faster than one thread [1]"] = alone / table[WALL]
     base = table[(table["N [-]"] == 100) & (table["threads [-]"] == 1)][PROCESSOR]
-    growth = table[PROCESSOR] / base.iloc[0] if len(base) else np.nan
-    table["growth against N = 100 [1]"] = growth.where(table["threads [-]"] == 1) if len(base) else growth
+    growth = table[PROCESSOR] / (base.iloc[0] if len(base) else np.nan)
+    table["growth against N = 100 [1]"] = growth.where(table["threads [-]"] == 1)
     return table
 
 

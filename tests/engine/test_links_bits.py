@@ -52,6 +52,7 @@ def test_a_run_killed_four_times_gives_the_same_bits(tmp_path: Path) -> None:
     assert max(tally.lost_s, default=0.0) <= INTERVAL_S + 1e-6
 
 
+@pytest.mark.validation  # in seconds on free cores, in minutes where threads have to wait for one
 def test_a_run_on_two_threads_killed_and_resumed_gives_the_same_bits(scene: Path, tmp_path: Path) -> None:
     threads = ("--threads", "2")
     for name in ("whole", "killed", "other"):

@@ -29,11 +29,11 @@ def fetch(typing: Any, array: Any, row: Any, lines: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = signature.args[0]
-        made = make_array(kind)(context, builder, arguments[0])
+        made = make_array(kind)(context, builder, arguments[0])  # type: ignore[no-untyped-call]
         number, byte = ir.IntType(32), ir.IntType(8).as_pointer()
         asked = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
-        prefetch = cgutils.get_or_insert_function(builder.module, asked, "llvm.prefetch.p0")
-        stride = cgutils.unpack_tuple(builder, made.strides, kind.ndim)[0]
+        prefetch = cgutils.get_or_insert_function(builder.module, asked, "llvm.prefetch.p0")  # type: ignore[no-untyped-call]
+        stride = cgutils.unpack_tuple(builder, made.strides, kind.ndim)[0]  # type: ignore[no-untyped-call]
         start = builder.gep(builder.bitcast(made.data, byte), [builder.mul(stride, arguments[1])])
         for line in range(lines.literal_value):
             place = builder.gep(start, [ir.Constant(ir.IntType(64), LINE * line)])

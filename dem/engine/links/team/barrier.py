@@ -26,7 +26,7 @@ PLACES = 48
 LOOKS, SLEEP = 4000, 50  # before a thread sleeps, about 60 us; and how long it sleeps [us]
 
 X86, UNIX = platform.machine() in ("x86_64", "AMD64", "i386", "i686"), sys.platform != "win32"
-_usleep = types.ExternalFunction("usleep", types.intc(types.uintc)) if UNIX else None
+_usleep: Any = types.ExternalFunction("usleep", types.intc(types.uintc)) if UNIX else None
 
 
 def gate() -> Gate:
@@ -35,7 +35,7 @@ def gate() -> Gate:
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
-    return builder.gep(make_array(kind)(context, builder, array).data, [index])
+    return builder.gep(make_array(kind)(context, builder, array).data, [index])  # type: ignore[no-untyped-call]
 
 
 @intrinsic
@@ -78,7 +78,7 @@ def _rest(typing: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if X86:
             kind = ir.FunctionType(ir.VoidType(), [])
-            builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.sse2.pause"), [])
+            builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.sse2.pause"), [])  # type: ignore[no-untyped-call]
         return context.get_dummy_value()
 
     return types.void(), generate
