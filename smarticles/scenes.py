@@ -58,12 +58,15 @@ def run_here(
         RunError: the run failed.
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
+    from dem.engine.cores import threads_warning  # noqa: PLC0415
     from dem.record.manifest import read_run  # noqa: PLC0415
     from dem.record.names import MANIFEST  # noqa: PLC0415
 
     scene = read_scene(scene_file, settings)
     if threads is None:
         threads = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
+    if (warning := threads_warning(threads)) is not None:
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
     # Engines read it when they are loaded, and a batch system may have set it to all cores of the node.
     os.environ["OMP_NUM_THREADS"] = str(threads)
     # These lead to YADE: not before the scene is known to be good.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -24,7 +24,7 @@ class Shake(Part, Phase):
 
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]")
-    frequency_hz: float = Field(30.0, gt=0, le=2000, description="f, frequency [Hz]")
+    frequency_hz: float = Field(30.0, ge=0.01, le=2000, description="f, frequency [Hz]")
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
     moves: Literal["container", "floor"] = Field(
         "container", description="what moves: the whole container, or its floor alone, as in the paper's own code"
@@ -33,6 +33,15 @@ class Shake(Part, Phase):
     def amplitude(self, gravity: float) -> float:
         """A = Γ g / (2πf)² [m], gravity in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        """See `Phase.warnings`: shaking that never lets go of the pile."""
+        if not 0 < self.peak_acceleration_g < 1:
+            return ()
+        return (
+            f"phases.{index}.peak_acceleration_g: Γ = {self.peak_acceleration_g:g} is below 1, so that the floor never "
+            "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
+        )
 
     @property
     def known_duration(self) -> float:

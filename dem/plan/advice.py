@@ -20,26 +20,15 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene))
 
 
-def thread_warnings(scene: Scene, threads: int, cores: int) -> tuple[str, ...]:
-    """Threads that make a run slower rather than faster.
-
-    Args:
-        scene: what is run.
-        threads: that it runs with.
-        cores: that there are for it.
-    """
-    found, pays = [], engine_kind(scene.engine).threads_pay_from
-    if threads > cores:
-        found.append(
-            f"--threads {threads}: more than the {cores} core{'s' if cores > 1 else ''} that this process has; threads "
-            f"that wait for a core make a run slower, not faster: use {cores} at most"
-        )
-    if threads > 1 and scene.count < pays:
-        found.append(
-            f"--threads {threads}: {scene.count} smarticles gain little by more than one thread, from about {pays} on "
-            "they do; for many small runs use a sweep with one thread each"
-        )
-    return tuple(found)
+def thread_warnings(scene: Scene, threads: int) -> tuple[str, ...]:
+    """Threads that a scene has no use for, in one line."""
+    pays = engine_kind(scene.engine).threads_pay_from
+    if threads == 1 or scene.count >= pays:
+        return ()
+    return (
+        f"--threads {threads}: {scene.count} smarticles gain little by more than one thread, from about {pays} on "
+        "they do; for many small runs use a sweep with one thread each",
+    )
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:

@@ -62,11 +62,19 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
 
 
 def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
-    """What the watchdog looks at of a state, (N, P, 3) [m]: all spheres, or ends and middles of links without any."""
-    if scene.smooth:
-        return lambda state: np.concatenate([state.vertices, state.link_positions], axis=1)
+    """What the watchdog looks at of a state, (N, P, 3) [m]: all spheres, or the ends and the middle of smooth links."""
     particle = scene.particle
-    return lambda state: state.spheres(particle)
+    if not scene.smooth:
+        return lambda state: state.spheres(particle)
+    # The first, the middle and the last of each straight row of the chain that stands for a link in pictures.
+    places = np.column_stack([particle.links, np.round(particle.local_centres[:, 1:] / particle.radius, 6)])
+    which = []
+    for row in np.unique(places, axis=0):
+        (numbers,) = np.nonzero((places == row).all(axis=1))
+        along = numbers[np.argsort(particle.local_centres[numbers, 0])]
+        which += [along[0], along[len(along) // 2], along[-1]]
+    kept = np.unique(which)
+    return lambda state: state.spheres(particle, kept)
 
 
 def build_watchdog(scene: Scene) -> Watchdog:
