@@ -74,8 +74,8 @@ class FixturesDouble:
     def upper_height(self) -> float:
         return self.floor + (self.upper_start or 0.0) + self._moved[1]
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
-        self.told.append(("shake", amplitude, frequency))
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+        self.told.append(("shake", amplitude, frequency) if walls else ("shake the floor", amplitude, frequency))
         self._shaken, self._clock = (self.floor, amplitude, 2 * math.pi * frequency), 0.0
 
     def lift_wall(self, speed: float) -> None:
@@ -116,6 +116,8 @@ class MotorsDouble:
     readings: MotorReadings | None = None
     work: float = 0.0
     angles: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    looks_at_once: int = 1
+    targets: list[Array] = field(default_factory=list)
 
     def articulate(self) -> None:
         assert self.present
@@ -129,14 +131,12 @@ class MotorsDouble:
             self.told.append(("weld",))
             self.articulated = False
 
-    @property
-    def looks_at_once(self) -> int:
-        return 1
-
     def actuate(self, targets: Array, interval: float) -> None:
         assert self.articulated
+        assert len(targets) <= self.looks_at_once
         self.told.append(("actuate", interval))
-        self._hold(targets[0])
+        self.targets += list(targets)
+        self._hold(targets[-1])
 
     def _hold(self, angles: Array) -> None:
         none = np.zeros_like(angles)

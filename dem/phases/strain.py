@@ -95,10 +95,10 @@ class Straining(Actuating):
     """The motors hold while strings pull the chain apart, until it has parted or the end of the way."""
 
     def __init__(self, schedule: Drive, interval: float, phase: Strain, chain: Chain) -> None:
-        super().__init__(schedule, interval)
+        self._looks_per_check = max(1, round(CHECK_INTERVAL / interval))
+        super().__init__(schedule, interval, halt_every=self._looks_per_check)
         self._phase = phase
         self._chain = chain
-        self._looks_per_check = max(1, round(CHECK_INTERVAL / interval))
 
     def proceed(self, engine: Engine) -> float:
         """See `Stage.proceed`."""

@@ -21,6 +21,7 @@ from dem.setting.fidelity import FIDELITIES
 
 SCHEMA_VERSION = 1
 DEFAULT_ENGINE = "yade"
+DEFAULT_MOVES = "container"
 
 
 def parse_scene(data: Any, *, source: str) -> Scene:
@@ -85,10 +86,13 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """The resolved scene as plain data; the default engine is not told, as before there was another one."""
+    """The resolved scene as plain data; keys younger than the format are not told where they have their defaults."""
     data = scene.model_dump(mode="json")
     if scene.engine == DEFAULT_ENGINE:
         del data["engine"]
+    for phase in data["phases"]:
+        if phase.get("moves") == DEFAULT_MOVES:
+            del phase["moves"]
     return data
 
 

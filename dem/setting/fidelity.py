@@ -84,7 +84,7 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
 }
 
 # On the links engine, chosen by results/accuracy-links. What has no meaning there is as in `FIDELITIES`. Its stable
-# step is met with less to spare (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
+# step may be used to the full (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
 _ON_LINKS: Mapping[str, Mapping[str, Any]] = {
     "draft": {"rows": 1, "stiffness_N_per_m": 250.0, "time_step_fraction": 0.92},
     "standard": {"rows": 1, "stiffness_N_per_m": 500.0, "time_step_fraction": 0.92},

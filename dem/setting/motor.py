@@ -20,11 +20,13 @@ class Motor(Part):
         "at the lever w",
     )
     speed_limit_rad_per_s: Turning = Field(6.0, description="ω, greatest speed of a motor [rad/s]")
-    law: Literal["halt", "stall", "slip", "servo"] = Field(
+    law: Literal["halt", "stall", "ease", "slip", "servo"] = Field(
         "halt",
         description="at τ_max or above: halt: the motor stops advancing towards the load and holds; stall: it does not "
-        "move in either direction, the paper's rule to the letter; slip: it gives way, a spring capped at τ_max; "
-        "servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped at τ_max",
+        "move in either direction, the paper's rule to the letter; ease: it goes on at half the speed, and stops after "
+        "20 findings in a row of both barbs in turn, the rule of the paper's own code; slip: it gives way, a spring "
+        "capped at τ_max; servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped "
+        "at τ_max",
     )
     stiffness_N_m_per_rad: float = Field(
         3e-3,

@@ -117,7 +117,7 @@ def drive(
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
     for look in range(1, round(duration / interval) + 1):
-        engine.motors.actuate(np.array(targets(look * interval), dtype=float).reshape(-1, 2), interval)
+        engine.motors.actuate(np.array(targets(look * interval), dtype=float).reshape(1, -1, 2), interval)
         if each is None:
             engine.advance(steps)
         else:

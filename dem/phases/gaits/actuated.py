@@ -49,12 +49,19 @@ class ActuatedPhase(Phase):
 
 
 class Actuating:
-    """The motors follow their schedule, one look per control period; smarticles are articulated meanwhile."""
+    """The motors follow their schedule, one look per control period; smarticles are articulated meanwhile.
 
-    def __init__(self, schedule: Drive, interval: float) -> None:
+    Args:
+        schedule: the target angles.
+        interval: a control period [s].
+        halt_every: looks after which time is to stop, so that somebody can look at the pile; None: never.
+    """
+
+    def __init__(self, schedule: Drive, interval: float, *, halt_every: int | None = None) -> None:
         self._drive = schedule
         self._interval = interval
         self._looks = math.ceil(schedule.duration / interval - 1e-9)
+        self._halt_every = halt_every or self._looks
         self.memory: Memory = {"look": 0}
 
     def proceed(self, engine: Engine) -> float:
@@ -63,7 +70,8 @@ class Actuating:
         if look == 0:
             engine.motors.articulate()
         # The last look only takes note of the work since the one before.
-        looks = range(look, max(look + 1, min(look + engine.motors.looks_at_once, self._looks)))
+        stop = min(look + engine.motors.looks_at_once, (look // self._halt_every + 1) * self._halt_every, self._looks)
+        looks = range(look, max(look + 1, stop))
         targets = [self._drive.targets(min((k + 1) * self._interval, self._drive.duration)) for k in looks]
         engine.motors.actuate(np.stack(targets), self._interval)
         self.memory["look"] = looks.stop

@@ -13,7 +13,7 @@ from smarticles.verification.check import Check, above, below, near, says
 from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.extremes import narrowest
 from smarticles.verification.hard.runs import Watched, whole
-from smarticles.verification.hard.scenes import RELAX, scene, shape_change, turn
+from smarticles.verification.hard.scenes import RELAX, REST, scene, shape_change, turn
 
 TORQUE_LIMIT = 1.607e-5  # N m, the paper's
 
@@ -44,7 +44,7 @@ def weak_motors(hands: Hands, out: Path, *, law: str, count: int) -> list[Check]
 
 def strong_motors(hands: Hands, out: Path, *, count: int) -> list[Check]:
     """τ_max · 100: motors that nothing stops."""
-    run = whole(scene(hands, turn(40, 0.3), RELAX, count=count, motor={"torque_limit_N_m": 100 * TORQUE_LIMIT}), out)
+    run = whole(scene(hands, turn(40, 0.3), REST, count=count, motor={"torque_limit_N_m": 100 * TORQUE_LIMIT}), out)
     checks = run.sound()
     if run.error is None:
         angles = run.series["angle_rad"][run.during(1)][-1]
@@ -123,7 +123,7 @@ def oscillation(hands: Hands, out: Path, *, seconds: float, count: int = 3) -> l
     rows, said = [], None
     for n in range(1, round(seconds / interval) + 1):
         angle = math.radians(5) * math.sin(2 * math.pi * 8 * n * interval)
-        engine.motors.actuate(np.tile(centre + angle, (count, 1)), interval)
+        engine.motors.actuate(np.tile(centre + angle, (1, count, 1)), interval)
         engine.advance(round(interval / engine.time_step))
         if n % 20 == 0:
             state = engine.state()

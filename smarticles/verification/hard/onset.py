@@ -166,7 +166,7 @@ def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, flo
     while engine.time < SETTLE + WATCH:
         for _ in range(looks):
             if engine.motors.articulated:
-                engine.motors.actuate(held, interval)
+                engine.motors.actuate(held[None], interval)
             engine.advance(round(interval / dt))
         state = engine.state()
         total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())

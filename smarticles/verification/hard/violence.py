@@ -30,7 +30,7 @@ def drop(hands: Hands, out: Path, *, articulated: bool, time: float) -> list[Che
     interval = described.fidelity.control_interval_s
     for _ in range(round(time / interval)):
         if articulated:
-            engine.motors.actuate(held, interval)
+            engine.motors.actuate(held[None], interval)
         engine.advance(round(interval / engine.time_step))
         energies.append(energy(engine))
         lows.append(engine.state().positions[0, 2])
@@ -77,7 +77,7 @@ def landing(hands: Hands, out: Path, *, time: float) -> list[Check]:
     engine.motors.articulate()
     held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
     while not said and engine.time < time:
-        engine.motors.actuate(held, interval)
+        engine.motors.actuate(held[None], interval)
         engine.advance(round(interval / engine.time_step))
         assert engine.motors.readings is not None  # articulated smarticles have them
         hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / described.torque_limit)

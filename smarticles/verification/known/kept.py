@@ -51,7 +51,7 @@ def move(one: Scene, engine: Engine, looks: int, seen: Callable[[], None]) -> No
     interval = one.fidelity.control_interval_s
     for look in range(looks):
         angle = math.pi / 2 + AMPLITUDE * math.sin(2 * math.pi * look / PERIOD_LOOKS)
-        engine.motors.actuate(np.full((2, 2), angle), interval)
+        engine.motors.actuate(np.full((1, 2, 2), angle), interval)
         engine.advance(round(interval / engine.time_step))
         seen()
 

@@ -11,7 +11,7 @@ import pytest
 from double import EngineDouble
 from scenes import chain, small
 
-from dem.errors import RunError
+from dem.errors import InputError, RunError
 from dem.phases.phase import CHECK_INTERVAL, Stage
 from dem.scene.scene import Scene
 
@@ -156,6 +156,16 @@ def test_shaking_tells_amplitude_and_frequency_and_stops() -> None:
     assert engine.told == [("shake", pytest.approx(amplitude), 25), ("stop",)]
 
 
+def test_the_floor_alone_is_shaken_within_its_wall() -> None:
+    floor = {"type": "shake", "duration_s": 0.1, "moves": "floor"}
+    scene, engine = begin(floor)
+    run_phase(scene, engine)
+    assert [told[0] for told in engine.told] == ["shake the floor", "stop"]
+    with pytest.raises(InputError, match=r"phases\.1\.moves: the floor alone would go 0\.00276 m down, and the wall"):
+        begin(floor | {"peak_acceleration_g": 10})
+    begin(floor | {"peak_acceleration_g": 10, "moves": "container"})
+
+
 def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     scene, engine = begin({"type": "remove-container", "duration_s": 0.5})
     run_phase(scene, engine)
@@ -219,3 +229,28 @@ def test_straining_ends_when_the_chain_has_parted() -> None:
     # The last one is drawn out of the next by two thicknesses and a gap; looked at every 10 ms.
     needed = (2 * 0.0095 + 0.00105) / 0.5
     assert needed <= duration <= needed + CHECK_INTERVAL + 1e-4
+
+
+@pytest.mark.parametrize("at_once", [2, 7, 64])
+def test_looks_that_are_told_at_once(at_once: int) -> None:
+    ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
+    ends = []
+    for looks in (1, at_once):
+        scene, engine = begin({"type": "actuate", "barbs": ramp})
+        engine.motors.looks_at_once = looks
+        run_phase(scene, engine)
+        ends.append((np.array(engine.motors.targets), engine.time))
+    assert len(ends[0][0]) == round(0.01 / scene.fidelity.control_interval_s) + 1
+    np.testing.assert_array_equal(ends[0][0], ends[1][0])
+    assert ends[0][1] == pytest.approx(ends[1][1], abs=1e-9)
+
+
+def test_a_chain_that_has_parted_is_noticed_whatever_is_told_at_once() -> None:
+    ends = []
+    for looks in (1, 64):
+        scene = chain({"phases.1.distance_m": 0.05, "phases.1.speed_m_per_s": 0.5})
+        engine = EngineDouble.of(scene, scene.fidelity.control_interval_s)
+        engine.motors.looks_at_once = looks
+        run_phase(scene, engine, 0)
+        ends.append(run_phase(scene, engine, 1))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)

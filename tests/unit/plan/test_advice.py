@@ -23,8 +23,8 @@ def test_a_plain_scene_has_no_warnings() -> None:
 def test_length_of_a_run_is_estimated_where_a_pour_is_in_it() -> None:
     planned, phases = plan(small()), small().phases
     length = sum(phase.expected_duration(10) for phase in phases)
-    # Two layers of 0.1 s, 0.2 s to settle, 0.1 s of rest, 0.2 s of shaking.
-    assert length == pytest.approx(0.7)
+    # Two layers of 0.125 s, 0.35 s to settle, 0.1 s of rest, 0.2 s of shaking.
+    assert length == pytest.approx(0.9)
     assert length == pytest.approx(sum(phase.estimate_s for phase in planned.phases))
     assert [phase.known_duration for phase in phases] == [None, 0.1, 0.2]
 
@@ -33,11 +33,11 @@ def test_length_of_a_run_is_estimated_where_a_pour_is_in_it() -> None:
     ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
 )
 def test_an_interval_longer_than_the_run_is_told(key: str, left_out: str) -> None:
-    assert warnings_of(small({f"recording.{key}": 0.68})) == ()
+    assert warnings_of(small({f"recording.{key}": 0.88})) == ()
     scene = small({f"recording.{key}": 10.0})
     (told,) = plan(scene).warnings
     assert told == (
-        f"recording.{key}: 10 s is longer than the whole run, about 0.7 s, so that {left_out}; shorten it, or lengthen "
+        f"recording.{key}: 10 s is longer than the whole run, about 0.9 s, so that {left_out}; shorten it, or lengthen "
         "the run"
     )
     assert told == warnings_of(scene)[0]

@@ -54,7 +54,7 @@ def test_several_errors_are_told_together(scene_data: SceneData) -> None:
         ({"fidelity": "standart"}, "fidelity: unknown fidelity 'standart'; did you mean 'standard'?"),
         ({"phases.1.type": "relaks"}, "phases.1.type: 'relaks' is not known; did you mean 'relax'?"),
         ({"motor": {"law": "servoo"}}, "motor.law: 'servoo' is not known; did you mean 'servo'?"),
-        ({"motor": {"law": "x"}}, "motor.law: 'x' is not known; use 'halt', 'stall', 'slip' or 'servo'"),
+        ({"motor": {"law": "x"}}, "motor.law: 'x' is not known; use 'halt', 'stall', 'ease', 'slip' or 'servo'"),
     ],
 )
 def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict[str, Any], told: str) -> None:
