@@ -17,25 +17,26 @@ from smarticles.commands import (
     accuracy,
     compare,
     doctor,
-    init,
+    export,
     measure,
     plan,
     render,
     report,
     resume,
     run,
-    schema,
+    scene_files,
     status,
     study,
     sweep,
     verify,
+    view,
 )
 from smarticles.completion import add_completion
 from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
 COMMANDS = (
-    *(init, run, plan, schema, doctor, measure, compare, render, report),
+    *(scene_files, run, plan, doctor, measure, compare, render, view, export, report),
     *(sweep, status, resume, study, accuracy, verify),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""

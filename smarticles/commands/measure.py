@@ -51,6 +51,7 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
   smarticles measure runs/a --json
   smarticles measure friction --table runs.csv              of a sweep: its variables are columns
   smarticles measure friction --by friction                 means ± SE over the runs of each value
+  smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
@@ -59,23 +60,38 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
     measure.add_argument(
         "--by", metavar="NAME,…", help="means over the runs that have the same values of these columns, with their SE"
     )
+    measure.add_argument(
+        "--profile",
+        type=Path,
+        metavar="FILE.csv",
+        help="write φ(r, z), rings and layers at the end of each phase, as CSV",
+    )
     add_overwrite(measure)
     add_json(measure)
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
+    import pandas as pd  # noqa: PLC0415
+
     from dem.record.manifest import read_run  # noqa: PLC0415
     from dem.record.series import lost_series  # noqa: PLC0415
+    from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
-    if output is not None and output.exists() and not arguments.overwrite:
-        # Said before measuring, not after.
-        msg = f"--table {output}: exists; choose another name or give --overwrite"
+    profile: Path | None = arguments.profile
+    for option, path in (("--table", output), ("--profile", profile)):
+        if path is not None and path.exists() and not arguments.overwrite:
+            # Said before measuring, not after.
+            msg = f"{option} {path}: exists; choose another name or give --overwrite"
+            raise InputError(msg)
+    if output is not None and output == profile:
+        msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
     by = _groups(arguments)
-    for warning in filter(None, (lost_series(read_run(directory)) for directory in sources(arguments.directories))):
+    directories = list(sources(arguments.directories))
+    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:
@@ -86,6 +102,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
             raise InputError(msg) from None
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
+    if profile is not None:
+        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
+        write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
@@ -96,6 +115,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
+    if profile is not None:
+        print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
 
 

@@ -18,8 +18,8 @@ from smarticles.main import build_parser, guarded
 from smarticles.stopping import orderly_stop
 
 COMMANDS = {
-    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
-    "verify", "init", "compare", "report",
+    "run", "plan", "schema", "doctor", "measure", "render", "view", "export", "sweep", "status", "resume", "study",
+    "accuracy", "verify", "init", "compare", "report",
 }  # fmt: skip
 
 
