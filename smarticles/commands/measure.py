@@ -49,22 +49,22 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
   smarticles measure runs/a runs/b --table phases.csv
   smarticles measure runs/a --frames --table frames.csv     one row per frame
   smarticles measure runs/a --json
-  smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
   smarticles measure friction --table runs.csv              of a sweep: its variables are columns
   smarticles measure friction --by friction                 means ± SE over the runs of each value
+  smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
     measure.add_argument("--table", type=Path, metavar="FILE.csv", help="write all columns as CSV")
     measure.add_argument("--frames", action="store_true", help="one row per frame, not per phase")
     measure.add_argument(
+        "--by", metavar="NAME,…", help="means over the runs that have the same values of these columns, with their SE"
+    )
+    measure.add_argument(
         "--profile",
         type=Path,
         metavar="FILE.csv",
         help="write φ(r, z), rings and layers at the end of each phase, as CSV",
-    )
-    measure.add_argument(
-        "--by", metavar="NAME,…", help="means over the runs that have the same values of these columns, with their SE"
     )
     add_overwrite(measure)
     add_json(measure)
@@ -90,7 +90,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
     by = _groups(arguments)
-    for warning in filter(None, (lost_series(read_run(directory)) for directory in sources(arguments.directories))):
+    directories = list(sources(arguments.directories))
+    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:
@@ -102,7 +103,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
-        rings = pd.concat([profile_table(directory) for directory in sources(arguments.directories)], ignore_index=True)
+        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
         write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
