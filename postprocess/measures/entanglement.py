@@ -14,11 +14,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
-from postprocess.geometry.links import bounding_spheres, checked_vertices, link_lengths, plane_frames
+from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 if TYPE_CHECKING:
@@ -235,13 +234,8 @@ def _close_pairs(
     vertices: NDArray[np.float64], planes: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
-    if len(vertices) < 2:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    centres, radii = bounding_spheres(vertices)
-    pairs = cKDTree(centres).query_pairs(2 * radii.max(), output_type="ndarray")
-    distance = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1)
-    pairs = pairs[distance < radii[pairs].sum(axis=1)]
-    i, j = np.concatenate([pairs, pairs[:, ::-1]]).astype(np.int64).T
+    low, high = close_pairs(vertices)
+    i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 

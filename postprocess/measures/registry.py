@@ -53,7 +53,8 @@ class FrameMeasure:
         take: The values of a frame of a run, one per column; NaN where they have no meaning in this frame.
         told_of: Whether a run has it at all; else its tables have no such columns.
         definition: Where several measures define one quantity, by what name this one is chosen.
-        costly: Whether it takes tenths of a second per frame or more.
+        costly: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables
+            have it of the last frame of a phase, unless asked for at every frame.
     """
 
     name: str

@@ -64,11 +64,18 @@ directory, all runs that have frames are measured.""",
   smarticles measure runs/a runs/b --table phases.csv
   smarticles measure runs/a --frames --table frames.csv     one row per frame
   smarticles measure runs/a --json
+  smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
     measure.add_argument("--table", type=Path, metavar="FILE.csv", help="write all columns as CSV")
     measure.add_argument("--frames", action="store_true", help="one row per frame, not per phase")
+    measure.add_argument(
+        "--profile",
+        type=Path,
+        metavar="FILE.csv",
+        help="write φ(r, z), rings and layers at the end of each phase, as CSV",
+    )
     add_overwrite(measure)
     add_json(measure)
 
@@ -102,13 +109,19 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
     from dem.record.manifest import read_run  # noqa: PLC0415
     from dem.record.series import lost_series  # noqa: PLC0415
+    from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
-    if output is not None and output.exists() and not arguments.overwrite:
-        # Said before measuring, not after.
-        msg = f"--table {output}: exists; choose another name or give --overwrite"
+    profile: Path | None = arguments.profile
+    for option, path in (("--table", output), ("--profile", profile)):
+        if path is not None and path.exists() and not arguments.overwrite:
+            # Said before measuring, not after.
+            msg = f"{option} {path}: exists; choose another name or give --overwrite"
+            raise InputError(msg)
+    if output is not None and output == profile:
+        msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
     measure = measure_run if arguments.frames else summarise_run
     directories = run_directories(arguments.directories)
@@ -117,6 +130,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     table = pd.concat([measure(directory) for directory in directories], ignore_index=True)
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
+    if profile is not None:
+        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
+        write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
@@ -127,6 +143,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
+    if profile is not None:
+        print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
 
 
