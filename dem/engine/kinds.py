@@ -29,7 +29,7 @@ class EngineKind(Protocol):
 
     @property
     def threads_pay_from(self) -> int:
-        """Smarticles from which on a second thread makes a run faster; measured, see `benchmarks/`."""
+        """Smarticles from which on a second thread makes a run clearly faster, about."""
 
     def version(self) -> str:
         """Version of what results depend on.
