@@ -23,8 +23,8 @@ TIMES = (5.0, 10.0, 20.0)
 
 _TIME, _PHI, _SHAKEN = "time [s]", "phi [-]", "shaken [s]"
 
-WINDOW = 0.5
-"""Over how long before those times it is averaged [s]: 15 periods of shaking."""
+WINDOW = 1.0
+"""Over how long before those times it is averaged [s]: 30 periods of shaking."""
 
 COMPARED: Mapping[str, str] = MappingProxyType(
     {

@@ -274,8 +274,8 @@ def test_what_was_put_in_is_found(study):
     assert row[f"phi_f {DEFINITION} [-]"] == pytest.approx(0.130 * factor, rel=1e-4)
     assert row[f"phi_f relaxed {DEFINITION} [-]"] == pytest.approx(0.140 * factor, rel=1e-4)
     for time in (5, 10, 20):
-        # The series rises as 1 - exp(-5 t / 20 s); the mean over the last half second lies a little below.
-        value = factor * (0.105 + 0.025 * (1 - math.exp(-(time - 0.2) / 4)))
+        # The series rises as 1 - exp(-5 t / 20 s); the mean over the last second lies a little below.
+        value = factor * (0.105 + 0.025 * (1 - math.exp(-(time - 0.45) / 4)))
         assert row[f"phi {time} s {DEFINITION} [-]"] == pytest.approx(value, rel=2e-3)
     table = report.tables["crossings"].set_index(["stage", ASPECT])
     assert table.loc[("phi_f", 0.7), FRICTION] == pytest.approx(0.5, abs=1e-3)
