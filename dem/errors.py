@@ -32,6 +32,19 @@ def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
         raise RunError(msg)
 
 
+def shown(value: object) -> str:
+    """A value as YAML would have it, cut where it is long; in one line, whatever is in it."""
+    named = {None: "null", True: "true", False: "false"}
+    try:
+        text = named[value] if value is None or isinstance(value, bool) else repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        text = "a number of thousands of digits"
+    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
+
+
+_MOST = 60  # characters of a value that are shown
+
+
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
     """`did you mean …` where a known word is close, else the list of known words.
 

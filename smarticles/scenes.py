@@ -58,7 +58,11 @@ def run_here(
         RunError: the run failed.
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
+    from dem.engine.cores import threads_warning  # noqa: PLC0415
+
     scene = read_scene(scene_file, settings)
+    if (warning := threads_warning(threads)) is not None:
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
     # YADE reads it when it is loaded, and a batch system may have set it to all cores of the node.
     os.environ["OMP_NUM_THREADS"] = str(threads)
     # These lead to YADE: not before the scene is known to be good.

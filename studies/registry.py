@@ -19,6 +19,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             sensitivity.SHIPPED,
             sensitivity.SECTION,
             procedures.SHIPPED,
+            procedures.CODE,
             fracture.SHIPPED,
             melting.SHIPPED,
             casting.SHIPPED,

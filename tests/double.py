@@ -74,8 +74,8 @@ class FixturesDouble:
     def upper_height(self) -> float:
         return self.floor + (self.upper_start or 0.0) + self._moved[1]
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
-        self.told.append(("shake", amplitude, frequency))
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+        self.told.append(("shake", amplitude, frequency) if walls else ("shake the floor", amplitude, frequency))
         self._shaken, self._clock = (self.floor, amplitude, 2 * math.pi * frequency), 0.0
 
     def lift_wall(self, speed: float) -> None:

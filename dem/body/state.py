@@ -97,10 +97,12 @@ class State:
         across2 = np.einsum("ni,ni->n", self.link_rotations[:, 2, :, 0], middle[..., 1])
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
-    def spheres(self, particle: Particle) -> Array:
-        """(N, S, 3) centres of the spheres [m]."""
-        links = particle.links
-        turned: Array = np.einsum("nsij,sj->nsi", self.link_rotations[:, links], particle.local_centres)
+    def spheres(self, particle: Particle, which: NDArray[np.int64] | None = None) -> Array:
+        """(N, S, 3) centres of the spheres [m], or of those `which` alone, by their numbers."""
+        links, local = particle.links, particle.local_centres
+        if which is not None:
+            links, local = links[which], local[which]
+        turned: Array = np.einsum("nsij,sj->nsi", self.link_rotations[:, links], local)
         centres: Array = turned + self.link_positions[:, links]
         return centres
 

@@ -98,12 +98,13 @@ class Fixtures(Protocol):
 
     # -- how they move -----------------------------------------------------------------------------------------
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         """Move what is there as z = A sin(2πf t), t from now; it starts where it is.
 
         Args:
             amplitude: A [m].
             frequency: f [Hz].
+            walls: whether wall and hooks move with the floor.
 
         Raises:
             RunError: the engine was built without a shaker.

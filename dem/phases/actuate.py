@@ -15,7 +15,7 @@ from dem.setting.part import Duration, Part
 from dem.setting.smarticle import Smarticle
 
 ActiveFraction = Annotated[
-    float, Field(gt=0, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]")
+    float, Field(ge=1e-6, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]")
 ]
 
 

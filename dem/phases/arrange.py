@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from dem.body.chain import Chain
 from dem.engine.interface import Engine
 from dem.phases.phase import Memory, Phase, SceneView, Stage
-from dem.setting.part import Length, Part, refuse_wrong_unit
+from dem.setting.part import Length, Part
 
 LEAST_COUNT = 2
 
@@ -21,8 +21,6 @@ class Arrange(Part, Phase):
     lays_out: ClassVar[bool] = True
     type: Literal["arrange"]
     gap_m: Length = Field(..., description="free distance of neighbours where they will touch first [m]")
-
-    _length_unit = field_validator("gap_m")(refuse_wrong_unit)
 
     def check(self, scene: SceneView, index: int) -> None:
         """See `Phase.check`: the chain can be laid out, fits between its walls, and can reach them."""

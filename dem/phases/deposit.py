@@ -12,7 +12,7 @@ from dem.body.placement import place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.setting.part import Duration, Part
+from dem.setting.part import Duration, Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
 LAYER_SECONDS = 0.125  # from a layer of a pour to the next, about; measured on both engines, N = 100 … 270
@@ -22,9 +22,11 @@ SETTLE_SECONDS = 0.35  # of a pile that was poured, about
 class Settle(Part):
     """When a pile counts as settled: all hold at every look over a stretch of time."""
 
-    speed_m_per_s: float = Field(0.02, gt=0, description="largest speed of any smarticle [m/s]")
-    unbalanced_force: float = Field(0.05, gt=0, description="mean net force on a smarticle over its weight [1]")
-    hold_s: float = Field(0.05, ge=0, description="how long both must hold [s]")
+    speed_m_per_s: Speed = Field(0.02, description="largest speed of any smarticle [m/s]")
+    unbalanced_force: float = Field(
+        0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
+    )
+    hold_s: float = Field(0.05, ge=0, le=1e6, description="how long both must hold [s]")
     timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
 
 
@@ -33,16 +35,15 @@ class Deposit(Part, Phase):
 
     pours: ClassVar[bool] = True
     type: Literal["deposit"]
-    per_layer: int = Field(10, ge=1, description="smarticles per layer [1]")
+    per_layer: int = Field(10, ge=1, le=100_000, description="smarticles per layer [1]")
     layer_height_w: float = Field(
         1.0,
-        gt=0,
+        ge=1e-3,
         le=10,
         description="height of the slab above the pile that a layer is spread over, in units of w [1]",
     )
-    landed_speed_m_per_s: float = Field(
+    landed_speed_m_per_s: Speed = Field(
         0.2,
-        gt=0,
         description="a layer has come down when each of its smarticles touches something "
         "and falls slower than this [m/s]",
     )

@@ -19,7 +19,7 @@ class InternalOscillation(Part, ActuatedPhase):
     """Swing both barbs at the motor's speed limit, θ/2 to either side of the smarticle's own angles."""
 
     type: Literal["internal-oscillation"]
-    theta_deg: float = Field(..., gt=0, description="θ, full swing, peak to peak [deg]")
+    theta_deg: float = Field(..., ge=1e-6, le=240, description="θ, full swing, peak to peak [deg]")
     scaled: bool = Field(
         True,
         description="swing by θ · 0.7/(l/w) instead, so that the arc of a barb's tip is the same for every l/w",

@@ -144,6 +144,10 @@ class SceneView(Demand, Protocol):
     def ample_height(self, hooks_top: float = 0.0) -> float:
         """Height [m] of a wall that is enough for the loosest pile."""
 
+    @property
+    def loose_height(self) -> float:
+        """About the height [m] of the poured pile."""
+
     def seed_for(self, purpose: str) -> int:
         """A seed for one purpose, from the scene's."""
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
-from dem.setting.hooks import TOLERANCE, with_defaults
-from dem.setting.part import Duration, Length, Part, refuse_wrong_unit
+from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
+from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.smarticle import Smarticle
 
 HELD_FAST = 0.1  # s that a hook stays where its force limit has stopped it, for the force to be measured
@@ -28,19 +28,16 @@ class PullHook(Part, Phase):
     type: Literal["pull-hook"]
     which: Literal["upper"] = Field("upper", description="the hook that is raised; the other one stays")
     distance_m: Length = Field(..., description="how far the hook is raised [m]; default: 2w")
-    speed_m_per_s: float = Field(..., gt=0, description="speed of the hook [m/s]; default: w per second")
+    speed_m_per_s: Speed = Field(..., description="speed of the hook [m/s]; default: w per second")
     duration_s: Duration = Field(
         default_factory=_time_of_pull,
         description="length of the phase [s]; default: until the hook has arrived; longer: it then stays where it is",
     )
-    force_limit_N: float | None = Field(
+    force_limit_N: Force | None = Field(
         None,
-        gt=0,
         description="force on the raised hook, mean over 0.01 s, at which it stops and the phase soon ends [N], as a "
         "testing machine does before it breaks; null: none. A rigid smarticle that holds both hooks takes any force",
     )
-
-    _length_unit = field_validator("distance_m")(refuse_wrong_unit)
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
@@ -60,9 +57,21 @@ class PullHook(Part, Phase):
             raise ValueError(msg)
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`: hooks that one smarticle can hold both of, where one is pulled with any force."""
+        """See `Phase.warnings`: a hook over the pile, and hooks that one smarticle can hold both of."""
         hooks = scene.hooks
-        if hooks is None or self.force_limit_N is not None:
+        return () if hooks is None else (*self._over_the_pile(scene, hooks), *self._held_by_one(scene, hooks))
+
+    def _over_the_pile(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
+        if scene.container.tiers is not None or hooks.upper_height_m - hooks.side_m / 2 < scene.loose_height:
+            return ()
+        return (
+            f"hooks.upper_height_m: {hooks.upper_height_m:g} m is about as high as {scene.count} smarticles pile up, "
+            f"{scene.loose_height:.2g} m, so that few or none will lie on the hook that is pulled; lower it or raise "
+            "count",
+        )
+
+    def _held_by_one(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
+        if self.force_limit_N is not None:
             return ()
         across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
         inside = scene.smarticle.middle_length_m - scene.sphere_diameter

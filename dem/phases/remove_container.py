@@ -10,7 +10,7 @@ from pydantic import Field
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
-from dem.setting.part import Duration, Part
+from dem.setting.part import Duration, Part, Speed
 
 
 class RemoveContainer(Part, Phase):
@@ -24,9 +24,8 @@ class RemoveContainer(Part, Phase):
     type: Literal["remove-container"]
     duration_s: Duration = Field(1.0, description="length of the phase [s]")
     parts: Literal["wall"] = Field("wall", description="what is taken away: the whole wall, every tier of it")
-    speed_m_per_s: float | None = Field(
+    speed_m_per_s: Speed | None = Field(
         None,
-        gt=0,
         description="speed at which the wall is lifted, rubbing along the pile, until its lower edge is above the pile "
         "[m/s]; a wall that is not clear of it at the end of the phase stays where it is; null: gone at once",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -16,7 +16,7 @@ from dem.setting.part import Duration, Part
 
 
 class Shake(Part, Phase):
-    """Shake the whole container along the vertical, z = A sin(2πft) with A = Γg/(2πf)².
+    """Shake the container along the vertical, z = A sin(2πft) with A = Γg/(2πf)², as a whole or its floor alone.
 
     After a phase that takes the container away, its floor alone is shaken, a plane without end: what rolls off the
     pile goes on being shaken.
@@ -24,12 +24,24 @@ class Shake(Part, Phase):
 
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]")
-    frequency_hz: float = Field(30.0, gt=0, le=2000, description="f, frequency [Hz]")
+    frequency_hz: float = Field(30.0, ge=0.01, le=2000, description="f, frequency [Hz]")
     peak_acceleration_g: float = Field(2.0, ge=0, le=100, description="Γ, peak acceleration in units of gravity [1]")
+    moves: Literal["container", "floor"] = Field(
+        "container", description="what moves: the whole container, or its floor alone, as in the paper's own code"
+    )
 
     def amplitude(self, gravity: float) -> float:
         """A = Γ g / (2πf)² [m], gravity in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        """See `Phase.warnings`: shaking that never lets go of the pile."""
+        if not 0 < self.peak_acceleration_g < 1:
+            return ()
+        return (
+            f"phases.{index}.peak_acceleration_g: Γ = {self.peak_acceleration_g:g} is below 1, so that the floor never "
+            "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
+        )
 
     @property
     def known_duration(self) -> float:
@@ -42,11 +54,21 @@ class Shake(Part, Phase):
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         """See `Phase.calls`."""
-        alone = ", the floor alone" if _freed(scene, index) else ""
+        alone = ", the floor alone" if _freed(scene, index) or self.moves == "floor" else ""
         return {
             EffectName.CONTAINER_MOTION: f"phase {index}: Γ = {self.peak_acceleration_g:g}, f = "
             f"{self.frequency_hz:g} Hz, A = {1e3 * self.amplitude(scene.gravity_m_per_s2):.3g} mm{alone}"
         }
+
+    def check(self, scene: SceneView, index: int) -> None:
+        """See `Phase.check`: a floor that moves alone stays within its wall."""
+        amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
+        if self.moves == "floor" and amplitude > below:
+            msg = (
+                f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
+                f"{below:.3g} m below it; use a lower peak_acceleration_g, a higher frequency_hz, or moves: container"
+            )
+            raise ValueError(msg)
 
     def begin(self, scene: SceneView, index: int) -> Stage:
         """See `Phase.begin`."""
@@ -88,5 +110,6 @@ class Shaking:
             raise RunError(msg)
         self.memory["begun"] = True
         engine.motors.weld()
-        engine.fixtures.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz)
+        walls = self._phase.moves == "container"
+        engine.fixtures.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz, walls=walls)
         return self._phase.duration_s

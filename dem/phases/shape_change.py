@@ -20,7 +20,7 @@ class ShapeChange(Part, ActuatedPhase):
     type: Literal["shape-change"]
     straight_deg: HingeAngle = Field(0.0, description="angle that the barbs are turned to [deg]")
     opening_s: Duration = Field(1.5, description="time to get there [s]")
-    straight_hold_s: float = Field(0.0, ge=0, description="time to stay there [s]")
+    straight_hold_s: float = Field(0.0, ge=0, le=1e6, description="time to stay there [s]")
     closing_s: Duration = Field(1.5, description="time to get back [s]")
 
     @property

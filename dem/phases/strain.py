@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from dem.body.chain import Chain, parted
 from dem.engine.effect import EffectName
@@ -17,7 +17,7 @@ from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
 from dem.physics.strings import StringLaw
 from dem.setting.motion import Hold
 from dem.setting.motor import Motor
-from dem.setting.part import Length, Part, refuse_wrong_unit
+from dem.setting.part import Length, Part, Speed, Stiffness
 from dem.setting.smarticle import Smarticle
 
 
@@ -29,16 +29,14 @@ class Strain(Part, ActuatedPhase):
 
     planar: ClassVar[bool | None] = True
     type: Literal["strain"]
-    speed_m_per_s: float = Field(0.005, gt=0, description="speed of the moved end [m/s]")
+    speed_m_per_s: Speed = Field(0.005, description="speed of the moved end [m/s]")
     distance_m: Length = Field(..., description="how far it moves at most [m]; the phase ends when the chain parts")
     tied_at: Literal["tip", "axis"] = Field(
         "tip", description="where on the end barbs: at their tips, or where they cross the chain's axis"
     )
     string_length_m: Length = Field(0.1, description="length of either string [m]")
-    string_stiffness_N_per_m: float = Field(5000.0, gt=0, description="of either string when taut [N/m]")
-    string_damping_N_s_per_m: float = Field(1.0, ge=0, description="of either string when taut [N s/m]")
-
-    _length_unit = field_validator("distance_m", "string_length_m")(refuse_wrong_unit)
+    string_stiffness_N_per_m: Stiffness = Field(5000.0, description="of either string when taut [N/m]")
+    string_damping_N_s_per_m: float = Field(1.0, ge=0, le=1e6, description="of either string when taut [N s/m]")
 
     @property
     def duration_s(self) -> float:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-Law = Literal["halt", "stall", "slip", "servo"]
+Law = Literal["halt", "stall", "ease", "slip", "servo"]
+EASED = 0.5  # of the speed, for a motor that eases
+PATIENCE = 20  # findings in a row, of both barbs of a smarticle one after the other, after which it stops
 _MEMORY = ("commands", "schedule", "angles", "torques", "work", "begun", "halted")
 
 
@@ -25,7 +27,9 @@ class MotorLaw:
         stiffness: twist stiffness of the shaft between motor and barb [N m/rad].
         law: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever
             torque it takes; "stall": it does not move at all until its torque has fallen, the paper's rule to the
-            letter; "slip": a spring that gives way at τ_max; "servo": the same with a damper beside the spring, the
+            letter; "ease": it goes on at half the speed with whatever torque that takes, and stops only when twenty
+            barbs in a row, those of the smarticle in turn, were found there: what the paper's own code does; "slip": a
+            spring that gives way at τ_max; "servo": the same with a damper beside the spring, the
             torque as a whole limited.
         damping: a servo's derivative gain [N m s/rad].
     """
@@ -70,6 +74,7 @@ class Motors:
         """(N, 2) whether a motor wanted to advance at the last look and did not."""
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)
+        self._over = np.zeros(len(angles), dtype=np.int64)
 
     def engage(self, angles: Array) -> None:
         """Take hold of barbs at (N, 2) angles [rad], without torque."""
@@ -101,9 +106,14 @@ class Motors:
         most = self.law.speed_limit * interval
         advance = np.clip(targets - self.commands, -most, most)
         self.halted = np.abs(before) >= self._limit
+        if self.law.law == "ease":
+            advance = np.where(self.halted, np.clip(advance, -EASED * most, EASED * most), advance)
+            for barb in range(angles.shape[1]):
+                self._over = np.where(self.halted[:, barb], self._over + 1, 0)
+                self.halted[:, barb] &= self._over >= PATIENCE
         if self.law.law == "halt":
             self.halted &= advance * before > 0
-        if self.law.law in ("halt", "stall"):
+        if self.law.law in ("halt", "stall", "ease"):
             advance = np.where(self.halted, 0.0, advance)
         self.commands, self.schedule = self.commands + advance, targets
         self.angles = angles
@@ -134,7 +144,12 @@ class Motors:
         """Plain data that `restore` needs."""
         arrays = (self.commands, self.schedule, self.angles, self.torques, self.work, self._begun, self.halted)
         memory = dict(zip(_MEMORY, (array.tolist() for array in arrays), strict=True))
-        return memory | ({"rates": self._rates.tolist()} if self.law.law == "servo" else {})
+        return memory | self._more_memory()
+
+    def _more_memory(self) -> dict[str, Any]:
+        if self.law.law == "servo":
+            return {"rates": self._rates.tolist()}
+        return {"over": self._over.tolist()} if self.law.law == "ease" else {}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken."""
@@ -145,3 +160,5 @@ class Motors:
         self.halted = np.array(memory["halted"], dtype=bool).reshape(shape)
         if self.law.law == "servo":
             self._rates = np.array(memory["rates"], dtype=np.float64).reshape(shape)
+        if self.law.law == "ease":
+            self._over = np.array(memory["over"], dtype=np.int64)

@@ -124,8 +124,11 @@ class Plan:
 
 
 def _told(wall: float) -> str:
-    """A wall time for a person: tenths of seconds where seconds would say nothing."""
-    return f"{wall:.1f} s" if wall < 10 else f"{wall:.0f} s"
+    """A wall time for a person: in the unit in which it is a number of two or three digits."""
+    for most, unit, name, form in ((10, 1, "s", ".1f"), (600, 1, "s", ".0f"), (7200, 60, "min", ".0f")):
+        if wall < most:
+            return f"{wall / unit:{form}} {name}"
+    return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
 
 
 def _doing(scene: Scene, index: int) -> Doing:

@@ -22,11 +22,17 @@ from numpy.typing import NDArray
 from dem.body.particle import LINKS, Particle
 from dem.body.state import State
 from dem.record.files import cannot_read
+from dem.record.names import FRAME, SCENE, collection
 
 Array = NDArray[np.float64]
 
 VERTICES = 4
-_REMEDY = "remove its line from frames.pvd, or run again with --resume"
+
+
+def _remedy(path: Path) -> str:
+    """What to do about a frame that cannot be read. A run that goes on does not write the frames of before again."""
+    scene = path.parent.parent / SCENE
+    return f"remove its line from {scene.with_name(collection(FRAME))} to do without it, or run {scene} anew elsewhere"
 
 
 def frame_mesh(
@@ -214,10 +220,10 @@ def _read_mesh(path: Path) -> Any:
         ):
             return meshio.vtu.read(str(path))
     except OSError as error:
-        cannot_read("frame", path, error, _REMEDY)
+        cannot_read("frame", path, error, _remedy(path))
     except (Exception, SystemExit) as error:
         cause = f"truncated or not VTK ({type(error).__name__})"
-        cannot_read("frame", path, cause, _REMEDY)
+        cannot_read("frame", path, cause, _remedy(path))
 
 
 class _FrameReader:
@@ -257,7 +263,7 @@ class _FrameReader:
         )
 
     def _refuse(self, cause: str) -> NoReturn:
-        cannot_read("frame", self._path, cause, _REMEDY)
+        cannot_read("frame", self._path, cause, _remedy(self._path))
 
     def _check_topology(self) -> None:
         if self._count == 0:

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from dem.errors import RunError
 from dem.record.files import cannot_read, write_json
-from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT
+from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, OF_SWEEP
 
 _REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
@@ -271,8 +271,8 @@ def read_run(directory: Path | str) -> RunManifest:
         'done'
     """
     directory = Path(directory)
-    if not directory.is_dir():
-        cannot_read("run directory", directory, "no such directory", _REMEDY)
+    if not (directory / MANIFEST).is_file():
+        _refuse_place(directory)
     run = _Document.read(directory / MANIFEST)
     if run.data.get("format") != MANIFEST_FORMAT:
         found = run.data.get("format")
@@ -321,6 +321,19 @@ def read_run(directory: Path | str) -> RunManifest:
         time_step=run.number("time_step_s", positive=True),
         **_ending(directory, phases),
     )
+
+
+def _refuse_place(directory: Path) -> NoReturn:
+    """Say what is there instead of a run."""
+    if not directory.exists():
+        cause, remedy = "no such directory", _REMEDY
+    elif not directory.is_dir():
+        cause, remedy = "it is a file", _REMEDY
+    elif (directory / OF_SWEEP).is_file():
+        cause, remedy = "it is a sweep", f"give one of its runs, {directory / 'runs' / 'NAME'}"
+    else:
+        cause, remedy = f"it holds no {MANIFEST}", _REMEDY
+    cannot_read("run directory", directory, cause, remedy)
 
 
 def _first_engine(versions: Mapping[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 SCENE = "scene.yaml"
 MANIFEST = "run.json"
+OF_SWEEP = "sweep.json"  # the manifest of a sweep, which holds run directories; written by `templates.sweep`
 DONE = "done.json"
 FAILED = "failed.json"
 PROGRESS = "progress.json"

@@ -7,6 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.state import State
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
@@ -48,12 +52,29 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
         series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
         frames=FrameWriter(out),
         watchdog=build_watchdog(scene),
+        points=watched_points(scene),
         progress=progress,
         interval=recording.series_interval_s,
         frame_every=recording.samples_in(recording.frame_interval_s),
         spheres=FrameWriter(out, SPHERE) if called_for(scene, EffectName.SPHERE_GLYPHS) else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
+
+
+def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
+    """What the watchdog looks at of a state, (N, P, 3) [m]: all spheres, or the ends and the middle of smooth links."""
+    particle = scene.particle
+    if not scene.smooth:
+        return lambda state: state.spheres(particle)
+    # The first, the middle and the last of each straight row of the chain that stands for a link in pictures.
+    places = np.column_stack([particle.links, np.round(particle.local_centres[:, 1:] / particle.radius, 6)])
+    which = []
+    for row in np.unique(places, axis=0):
+        (numbers,) = np.nonzero((places == row).all(axis=1))
+        along = numbers[np.argsort(particle.local_centres[numbers, 0])]
+        which += [along[0], along[len(along) // 2], along[-1]]
+    kept = np.unique(which)
+    return lambda state: state.spheres(particle, kept)
 
 
 def build_watchdog(scene: Scene) -> Watchdog:

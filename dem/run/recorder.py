@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.state import State
@@ -31,6 +32,7 @@ class Recorder:
         series: writes them.
         frames: writes the frames.
         watchdog: looks at the state now and then, at every checkpoint and at the end.
+        points: (N, P, 3) points of the smarticles that must stay inside [m], of a state.
         progress: told at every sample.
         interval: time between samples [s].
         frame_every: samples between frames.
@@ -43,6 +45,7 @@ class Recorder:
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
+    points: Callable[[State], NDArray[np.float64]]
     progress: ProgressWriter
     interval: float
     frame_every: int
@@ -102,7 +105,7 @@ class Recorder:
             state,
             floor=engine.fixtures.floor,
             time=time,
-            spheres=state.spheres(engine.particle),
+            points=self.points(state),
             raised=engine.fixtures.raised,
             gaps=engine.motors.gaps() if engine.motors.articulated else None,
         )

@@ -21,12 +21,13 @@ from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_text
 from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
-from dem.record.names import DONE, FAILED, SCENE
+from dem.record.names import DONE, FAILED, MANIFEST, SCENE
 from dem.record.progress import ProgressWriter
 from dem.record.rundir import claimed, log_of, recorded_scene_hash
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
-from dem.scene.reading import dump_scene, scene_hash
+from dem.scene.comparing import difference
+from dem.scene.reading import dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
 
 
@@ -72,10 +73,10 @@ def run_scene(
     builders, kind = builders or Builders(), engine_kind(scene.engine)
     steps, made_by = builders.steps(scene), (kind.name, kind.version())
     with claimed(out, resume=resume):
-        if resume and (out / DONE).exists():
-            return None
         if resume:
             _check_scene(scene, out)
+            if (out / DONE).exists():
+                return None
         else:
             write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=kind.threads()))
         if not (out / SCENE).exists():
@@ -87,13 +88,25 @@ def run_scene(
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
-    made, wanted = recorded_scene_hash(out), scene_hash(scene)
-    if made != wanted:
+    """Refuse to go on, or to call done, what was made from another scene."""
+    made = recorded_scene_hash(out)
+    if made == scene_hash(scene):
+        return
+    try:
+        there = load_scene(out / SCENE)
+    except InputError:
+        there = None
+    if there is None or scene_hash(there) != made:
         msg = (
-            f"--out {out}: was made from another scene (hash {made[:12]}, this one {wanted[:12]}); "
-            f"resume with {out / SCENE}, or run the changed scene in another directory"
+            f"--out {out}: {out / SCENE} is not the scene that this run was made from (its hash is not the "
+            f"{made[:12]} of {MANIFEST}); put it back as it was, or run it in another directory"
         )
         raise InputError(msg)
+    msg = (
+        f"--out {out}: was made from another scene: {difference(there, scene)}; resume with {out / SCENE} and no "
+        "--set, or run the changed scene in another directory"
+    )
+    raise InputError(msg)
 
 
 def _run(

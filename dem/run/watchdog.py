@@ -24,8 +24,8 @@ class Watchdog:
     """Limits that no smarticle may pass.
 
     Args:
-        cylinder: the container; who has a sphere's centre beyond its wall or under its floor has escaped, whose centre
-            of mass is above it has been thrown out.
+        cylinder: the container; who has a sphere's centre, or a link's axis, beyond its wall or under its floor has
+            escaped, whose centre of mass is above it has been thrown out.
         speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
         gap: [m]; a hinge whose links are farther apart is broken.
         depth: [m]; contacts that overlap by more no longer keep bodies apart.
@@ -46,7 +46,7 @@ class Watchdog:
         *,
         floor: float,
         time: float,
-        spheres: Array | None = None,
+        points: Array | None = None,
         raised: float | None = 0.0,
         gaps: Array | None = None,
     ) -> None:
@@ -54,8 +54,9 @@ class Watchdog:
 
         Args:
             state: the smarticles.
-            spheres: (N, S, 3) centres of their spheres [m]; None: their centres of mass stand for them. Contacts with
-                wall and floor do not tell: from the centre on YADE takes them for shallower the deeper they are.
+            points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of mass
+                stand for them. Contacts with wall and floor do not tell: from the centre on YADE takes them for
+                shallower the deeper they are.
             floor: height of the floor [m].
             time: simulated time [s].
             raised: how far a hook may have raised smarticles [m]; None: nothing holds them, so that none escapes.
@@ -84,7 +85,7 @@ class Watchdog:
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
                 f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
             )
-        points = positions[:, None] if spheres is None else spheres
+        points = positions[:, None] if points is None else points
         above = points[..., 2] - floor
         outside: NDArray[np.bool_] = np.less(above, 0)
         height = math.inf

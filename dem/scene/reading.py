@@ -11,15 +11,17 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
+from dem.record.names import SCENE
+from dem.refusal import refusals
 from dem.scene.overrides import apply_override
-from dem.scene.refusal import first_line
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import load_yaml
+from dem.scene.yaml_text import parse_yaml
 from dem.setting.fidelity import FIDELITIES
 
 SCHEMA_VERSION = 1
 DEFAULT_ENGINE = "yade"
+DEFAULT_MOVES = "container"
 
 
 def parse_scene(data: Any, *, source: str) -> Scene:
@@ -36,16 +38,19 @@ def parse_scene(data: Any, *, source: str) -> Scene:
         msg = f"{source}: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
         raise InputError(msg)
     if not isinstance(data, Mapping):
-        msg = f"{source}: a scene is a mapping of keys to values, got {type(data).__name__}"
+        msg = f"{source}: a scene is a mapping of keys to values, got {shown(data)}"
+        raise InputError(msg)
+    if "template" in data and "points" in data:
+        msg = f"{source}: is a sweep file, which makes many scenes; give it to `smarticles sweep`"
         raise InputError(msg)
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
-        msg = f"{source}: schema_version: {version} is not known here; this version reads {SCHEMA_VERSION}"
+        msg = f"{source}: schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
         raise InputError(msg)
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        msg = f"{source}: {first_line(error, data)}"
+        msg = f"{source}: {refusals(error, data, described='`smarticles schema`')}"
         raise InputError(msg) from None
 
 
@@ -59,27 +64,35 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
+    if path.is_dir():
+        inside = path / SCENE
+        msg = f"{path}: is a directory; give " + (str(inside) if inside.is_file() else "the path of a scene file")
+        raise InputError(msg)
+    if path.suffix == ".j2" and path.is_file():
+        msg = f"{path}: is a template of scenes; give the sweep file that names it to `smarticles sweep`"
+        raise InputError(msg)
     try:
-        data = load_yaml(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror}); give the path of a scene file"
         raise InputError(msg) from None
     except UnicodeDecodeError:
         msg = f"{path}: is not a text file; give the path of a scene file"
         raise InputError(msg) from None
-    except yaml.YAMLError as error:
-        msg = f"{path}: not valid YAML: {' '.join(str(error).split())}"
-        raise InputError(msg) from None
+    data = parse_yaml(text, str(path))
     for override in overrides if isinstance(data, Mapping) else ():
         apply_override(data, override)
     return parse_scene(data, source=str(path))
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """The resolved scene as plain data; the default engine is not told, as before there was another one."""
+    """The resolved scene as plain data; keys younger than the format are not told where they have their defaults."""
     data = scene.model_dump(mode="json")
     if scene.engine == DEFAULT_ENGINE:
         del data["engine"]
+    for phase in data["phases"]:
+        if phase.get("moves") == DEFAULT_MOVES:
+            del phase["moves"]
     return data
 
 

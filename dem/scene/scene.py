@@ -19,6 +19,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
+from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import check
@@ -35,6 +36,7 @@ from dem.setting.smarticle import Smarticle
 # Diameters from sphere to sphere of the chains that stand for smooth links where poses are drawn, and in pictures: two
 # of them overlap by a thirtieth of a diameter at most before the links do.
 SMOOTH_PITCH = 0.35
+_LEAST_GRAVITY = 1e-6  # m/s²; of a tenth of a micron of rock, and motors that are scaled by it have no strength left
 
 
 class Scene(Part):
@@ -53,7 +55,7 @@ class Scene(Part):
     hooks: Hooks | None = Field(None, description="hooks in the pile, for phases that pull one; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
-    gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]")
+    gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
         default_factory=lambda given: Fidelity(base="standard", **fidelities(given.get("engine", ""))["standard"]),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
@@ -70,9 +72,17 @@ class Scene(Part):
             return value
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
-            msg = f"unknown fidelity {base!r}; known: {', '.join(FIDELITIES)}"
+            msg = f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}"
             raise ValueError(msg)
         return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
+
+    @field_validator("gravity_m_per_s2")
+    @classmethod
+    def _some_or_none(cls, value: float) -> float:
+        if 0 < value < _LEAST_GRAVITY:
+            msg = f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²"
+            raise ValueError(msg)
+        return value
 
     @field_validator("hooks", mode="before")
     @classmethod
@@ -117,11 +127,24 @@ class Scene(Part):
         Args:
             hooks_top: height of the hooks' top [m]; 0 without hooks.
         """
-        boxes = self.smarticle.boxes
-        loosest = 1.2 * self.sphere_diameter / float(boxes.lengths.sum())
-        pile = self.count * boxes.volume / (math.pi * self.container.radius_m**2 * loosest)
         # What is poured may come to lie on a hook.
-        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * boxes.middle_length
+        pile = self._height_at(1.2)
+        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * self.smarticle.middle_length_m
+
+    @property
+    def loose_height(self) -> float:
+        """About the height [m] of the poured pile, by the packing that `ample_height` tells.
+
+        Of 9 piles of 100 to 160, l/w 0.4 and 0.7, half of the smarticles end below 0.6 to 0.7 of it, and the highest at
+        1.2 to 1.7 of it.
+        """
+        return self._height_at(2.4)
+
+    def _height_at(self, factor: float) -> float:
+        """Height [m] of a pile of φ = `factor` d/L in the container."""
+        boxes = self.smarticle.boxes
+        filling = factor * self.sphere_diameter / float(boxes.lengths.sum())
+        return self.count * boxes.volume / (math.pi * self.container.radius_m**2 * filling)
 
     @property
     def smooth(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from typing import Any
 
 import yaml
@@ -68,7 +69,11 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
         # A SafeLoader underneath: no Python objects can be made.
         return yaml.load(text, Loader=loader)
     except ValueError as error:
-        raise yaml.YAMLError(str(error)) from error  # a date that does not exist
+        digits = sys.get_int_max_str_digits()
+        lengthy = f"Exceeds the limit ({digits} digits)" in str(error)
+        # Else a date that does not exist.
+        problem = f"a whole number of more than {digits} digits" if lengthy else str(error)
+        raise yaml.YAMLError(problem) from error
     except RecursionError as error:
         msg = "nested too deeply to read"
         raise yaml.YAMLError(msg) from error
@@ -90,8 +95,11 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        msg = f"{source}{where}: not valid YAML: {error.problem or error.context}; correct this line"
-        raise InputError(msg) from error
+        problem = str(error.problem or error.context)
+        if "'\\t'" in problem:
+            problem = "a tab; YAML is indented and spaced by blanks"
+        msg = f"{source}{where}: not valid YAML: {problem}" + ("" if ";" in problem else "; correct this line")
+        raise InputError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
-        raise InputError(msg) from error
+        raise InputError(msg) from None

@@ -20,7 +20,7 @@ class Contact(Part):
         "harmonic mean over the smarticle's spheres and directions [1]; 0.7: steel on steel below 1 m/s",
     )
     tangential_stiffness_ratio: float = Field(
-        0.82, gt=0, le=1, description="ks/kn [1]; Mindlin's 2(1-ν)/(2-ν) is 0.82 for steel, ν = 0.3"
+        0.82, ge=1e-3, le=1, description="ks/kn [1]; Mindlin's 2(1-ν)/(2-ν) is 0.82 for steel, ν = 0.3"
     )
     tangential_damping_ratio: float = Field(
         0.9,

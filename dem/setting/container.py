@@ -9,9 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from dem.setting.part import Length, Part, refuse_wrong_unit
+from dem.setting.part import Length, Part
 
 Array = NDArray[np.float64]
 
@@ -22,16 +22,12 @@ class Tier(Part):
     radius_m: Length = Field(..., description="inner radius [m]; at most that of the tier below")
     height_m: Length = Field(..., description="height of this tier alone [m]")
 
-    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
-
 
 class Container(Part):
     """Upright hollow cylinder, closed at the bottom, open at the top; or a mould of several tiers."""
 
     radius_m: Length = Field(0.0234, description="inner radius [m]; the paper's is 2w")
-    height_m: float | None = Field(
-        None, gt=0, description="height of the wall [m]; by default high enough for the pour"
-    )
+    height_m: Length | None = Field(None, description="height of the wall [m]; by default high enough for the pour")
 
     tiers: tuple[Tier, ...] | None = Field(
         None,
@@ -39,8 +35,6 @@ class Container(Part):
         description="instead of radius_m and height_m: coaxial cylinders from the bottom up, none wider than the one "
         "below; a flat ceiling closes each step, the top tier is open",
     )
-
-    _length_unit = field_validator("radius_m", "height_m")(refuse_wrong_unit)
 
     @model_validator(mode="before")
     @classmethod

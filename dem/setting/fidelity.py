@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from dem.setting.part import Part
+from dem.setting.part import Length, Part, Stiffness
 
 
 class Fidelity(Part):
@@ -17,37 +17,40 @@ class Fidelity(Part):
         "standard", description="named setting that the other knobs start from"
     )
     rows: int = Field(..., ge=1, le=4, description="rows of spheres across t1, the thickness along the normal [1]")
-    diameter_m: float | None = Field(
+    diameter_m: Length | None = Field(
         None,
-        gt=0,
         description="sphere diameter [m]; default: one row such that two crossing chains touch at the same mean "
         "distance as two bars of the true section, 2(t1+t2)/π; several rows t2, the true section",
     )
     pitch: float = Field(
         ...,
-        gt=0,
+        ge=0.01,
         le=1.4,
         description="largest distance of neighbouring spheres over their diameter [1]; "
         "from √2 on chains pass through each other",
     )
-    stiffness_N_per_m: float = Field(..., gt=0, description="normal stiffness kn of one contact [N/m]")
+    stiffness_N_per_m: Stiffness = Field(..., description="normal stiffness kn of one contact [N/m]")
     time_step_fraction: float = Field(
         ...,
-        gt=0,
+        ge=1e-4,
         le=1,
         description="time step over the stable one, which is computed from masses and stiffness [1]",
     )
     time_step_s: float | None = Field(
         None,
-        gt=0,
+        ge=1e-12,
+        le=1,
         description="time step [s] by hand; refused above the stable one; default: from the fraction",
     )
     wall_facets: int = Field(64, ge=16, le=512, description="flat facets around the cylinder's wall [1]")
     control_interval_s: float = Field(
-        ..., gt=0, description="time between two looks of the motor control [s]; the paper's time step is 2e-4 s"
+        ...,
+        ge=1e-9,
+        le=1,
+        description="time between two looks of the motor control [s]; the paper's time step is 2e-4 s",
     )
-    hinge_stiffness_N_per_m: float = Field(
-        ..., gt=0, description="stiffness of the pin that holds the two links of a hinge together [N/m]"
+    hinge_stiffness_N_per_m: Stiffness = Field(
+        ..., description="stiffness of the pin that holds the two links of a hinge together [N/m]"
     )
 
 
@@ -81,7 +84,7 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
 }
 
 # On the links engine, chosen by results/accuracy-links. What has no meaning there is as in `FIDELITIES`. Its stable
-# step is met with less to spare (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
+# step may be used to the full (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
 _ON_LINKS: Mapping[str, Mapping[str, Any]] = {
     "draft": {"rows": 1, "stiffness_N_per_m": 250.0, "time_step_fraction": 0.92},
     "standard": {"rows": 1, "stiffness_N_per_m": 500.0, "time_step_fraction": 0.92},

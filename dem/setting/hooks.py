@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from dem.setting.part import Length, Part, refuse_wrong_unit
+from dem.setting.part import Length, Part
 from dem.setting.smarticle import Smarticle
 
 Array = NDArray[np.float64]
@@ -34,8 +34,6 @@ class Hooks(Part):
     upper_height_m: Length = Field(
         ..., description="height of the upper cross's centre above the floor at the start [m]; default: 20 t2"
     )
-
-    _length_unit = field_validator("side_m", "length_m", "lower_height_m", "upper_height_m")(refuse_wrong_unit)
 
     @property
     def crosses(self) -> tuple[Cross, Cross]:

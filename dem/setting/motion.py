@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dem.setting.part import Duration, HingeAngle, Part
+from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
 
 Array = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ class SimpleMotion(BaseMotion):
 class _Endless(SimpleMotion):
     """A motion that lasts as long as its phase, unless it is given an end."""
 
-    duration_s: float | None = Field(None, gt=0, description="length [s]; default: as long as the phase")
+    duration_s: Duration | None = Field(None, description="length [s]; default: as long as the phase")
 
     @property
     def duration(self) -> float:
@@ -219,8 +219,12 @@ class _Wave(_Endless):
     """Swing about an angle, up first; the first point is jumped to."""
 
     centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
-    amplitude_deg: float = Field(..., gt=0, description="largest distance from the centre, half the full swing [deg]")
-    cycles_offset: float = Field(0.0, description="cycles that lie behind at the beginning; 0.25: starts on top [1]")
+    amplitude_deg: float = Field(
+        ..., ge=1e-6, le=120, description="largest distance from the centre, half the full swing [deg]"
+    )
+    cycles_offset: float = Field(
+        0.0, ge=-1e6, le=1e6, description="cycles that lie behind at the beginning; 0.25: starts on top [1]"
+    )
 
     @property
     def frequency(self) -> float:
@@ -258,7 +262,7 @@ class Sine(_Wave):
     """Swing about an angle like a pendulum: centre + amplitude · sin(2π (frequency · t + offset))."""
 
     type: Literal["sine"]
-    frequency_hz: float = Field(..., gt=0, description="cycles per second [Hz]")
+    frequency_hz: Frequency = Field(..., description="cycles per second [Hz]")
 
     pace: ClassVar[tuple[str, str]] = ("frequency_hz", "Hz")
 
@@ -280,7 +284,7 @@ class Triangle(_Wave):
     """Swing about an angle at a constant speed between the turning points."""
 
     type: Literal["triangle"]
-    speed_rad_per_s: float = Field(..., gt=0, description="speed between the turning points [rad/s]")
+    speed_rad_per_s: Turning = Field(..., description="speed between the turning points [rad/s]")
 
     pace: ClassVar[tuple[str, str]] = ("speed_rad_per_s", "rad/s")
 
@@ -304,7 +308,9 @@ class Sequence(BaseMotion):
 
     type: Literal["sequence"]
     steps: tuple[Motion, ...] = Field(..., description="motions in order, at least one")
-    repeat: int | None = Field(1, ge=1, description="how often the steps are run [1]; null: as long as the phase")
+    repeat: int | None = Field(
+        1, ge=1, le=1_000_000, description="how often the steps are run [1]; null: as long as the phase"
+    )
 
     @model_validator(mode="after")
     def _steps_end(self) -> Self:

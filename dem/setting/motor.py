@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from dem.setting.part import Part
+from dem.setting.part import Part, Turning
 
 
 class Motor(Part):
@@ -14,21 +14,27 @@ class Motor(Part):
 
     torque_limit_N_m: float | None = Field(
         None,
-        gt=0,
+        ge=1e-15,
+        le=1e6,
         description="τ_max [N m]; default: the weight of the smarticle with l/w = 0.7 of this material and section "
         "at the lever w",
     )
-    speed_limit_rad_per_s: float = Field(6.0, gt=0, description="ω, greatest speed of a motor [rad/s]")
-    law: Literal["halt", "stall", "slip", "servo"] = Field(
+    speed_limit_rad_per_s: Turning = Field(6.0, description="ω, greatest speed of a motor [rad/s]")
+    law: Literal["halt", "stall", "ease", "slip", "servo"] = Field(
         "halt",
         description="at τ_max or above: halt: the motor stops advancing towards the load and holds; stall: it does not "
-        "move in either direction, the paper's rule to the letter; slip: it gives way, a spring capped at τ_max; "
-        "servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped at τ_max",
+        "move in either direction, the paper's rule to the letter; ease: it goes on at half the speed, and stops after "
+        "20 findings in a row of both barbs in turn, the rule of the paper's own code; slip: it gives way, a spring "
+        "capped at τ_max; servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped "
+        "at τ_max",
     )
     stiffness_N_m_per_rad: float = Field(
-        3e-3, gt=0, description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]"
+        3e-3,
+        ge=1e-12,
+        le=1e6,
+        description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]",
     )
-    damping_N_m_s_per_rad: float = Field(0.0, ge=0, description="a servo's derivative gain [N m s/rad]")
+    damping_N_m_s_per_rad: float = Field(0.0, ge=0, le=1e6, description="a servo's derivative gain [N m s/rad]")
     strength_spread: float = Field(
         0.0,
         ge=0,

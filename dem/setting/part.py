@@ -1,35 +1,24 @@
-"""What every part of a scene is made of: strict, frozen models, and the kinds of numbers that several parts share."""
+"""What every part of a scene is made of: frozen models, and the kinds of numbers that several parts share."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field
+
+from dem.strict import Strict
 
 HINGE_RANGE = (-15.0, 105.0)  # deg; the range of the hinges
 LONGEST_LENGTH = 1.0  # m; a longer smarticle or container is taken for a mistaken unit
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle that the paper states torques and swings for
 
 
-class Part(BaseModel):
-    """A frozen part of a scene: no unknown keys, no NaN, no infinity, no silent conversion of text to numbers."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_unknown_keys(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            for key in data:
-                if key not in cls.model_fields:
-                    msg = f"unknown key {key!r}; {cls._nearest(str(key))}"
-                    raise ValueError(msg)
-        return data
+class Part(Strict):
+    """A frozen part of a scene."""
 
     @classmethod
-    def _nearest(cls, key: str) -> str:
+    def nearest_key(cls, key: str) -> str:
         """The way out for an unknown key: a key of this part that is spelt alike, or of the part it belongs in."""
         # Most often the unit, or the second half of a name, was left out.
         here = [field for field in cls.model_fields if field.startswith(f"{key}_")]
@@ -50,37 +39,6 @@ class Part(BaseModel):
         kind = cls.model_fields.get("type")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
 
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_other_kinds_as_numbers(cls, data: Any) -> Any:
-        # YAML reads `yes` and `on` as true, and true would pass as 1; "0.4" in quotes would pass as 0.4.
-        if isinstance(data, Mapping):
-            for key, value in data.items():
-                field = cls.model_fields.get(str(key))
-                if field is None:
-                    continue
-                for item in value if isinstance(value, list) else [value]:
-                    if isinstance(item, bool) and field.annotation is not bool:
-                        msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(field.annotation)}"
-                        raise ValueError(msg)
-                    if isinstance(item, str) and _kind(field.annotation) == "a number":
-                        msg = f"{key}: got the text {item!r}, expected a number; leave out the quotes and the unit"
-                        raise ValueError(msg)
-        return data
-
-
-_NUMBERS = (int, float, float | None, int | None, tuple[float, float])
-
-
-def _kind(annotation: Any) -> str:
-    """What a key takes, in words; `annotation` is the type of its field."""
-    if annotation in _NUMBERS:
-        return "a number"
-    if get_origin(annotation) is Literal:
-        return " or ".join(map(repr, get_args(annotation)))
-    models = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type) and issubclass(kind, Part)]
-    return "keys and values" if models else "text" if annotation is str else "a value of its kind"
-
 
 def in_hinge_range(angle: float) -> float:
     """The angle [deg], refused outside the range of the hinges."""
@@ -91,9 +49,9 @@ def in_hinge_range(angle: float) -> float:
     return angle
 
 
-def refuse_wrong_unit(value: float | None) -> float | None:
+def refuse_wrong_unit(value: float) -> float:
     """The length [m], refused where it can only be millimetres."""
-    if value is not None and value > LONGEST_LENGTH:
+    if value > LONGEST_LENGTH:
         msg = (
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
             f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
@@ -102,6 +60,18 @@ def refuse_wrong_unit(value: float | None) -> float | None:
     return value
 
 
-Length = Annotated[float, Field(gt=0)]
-Duration = Annotated[float, Field(gt=0)]
-HingeAngle = Annotated[float, AfterValidator(in_hinge_range)]
+# Limits of what is physical, wide: beyond them stands a slip of the keyboard, and numbers that no sum survives.
+Length = Annotated[
+    float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(refuse_wrong_unit)
+]
+Duration = Annotated[float, Field(ge=1e-6, le=1e6)]
+Speed = Annotated[float, Field(ge=1e-9, le=1e3)]  # m/s
+Turning = Annotated[float, Field(ge=1e-6, le=1e4)]  # rad/s
+Frequency = Annotated[float, Field(ge=1e-3, le=1e4)]  # Hz
+Stiffness = Annotated[float, Field(ge=1e-3, le=1e9)]  # N/m
+Force = Annotated[float, Field(ge=1e-12, le=1e6)]  # N
+HingeAngle = Annotated[
+    float,
+    Field(json_schema_extra={"minimum": HINGE_RANGE[0], "maximum": HINGE_RANGE[1]}),
+    AfterValidator(in_hinge_range),
+]

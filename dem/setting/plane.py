@@ -8,19 +8,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from dem.setting.part import Part, refuse_wrong_unit
+from dem.setting.part import Length, Part
 
 
 class Plane(Part):
     """Smarticles lie flat on a table that carries them without friction, and stay in the plane; no container."""
 
-    width_m: float | None = Field(
-        None, gt=0, description="H, distance between two walls along x that confine them [m]; null: no walls"
+    width_m: Length | None = Field(
+        None, description="H, distance between two walls along x that confine them [m]; null: no walls"
     )
-
-    _length_unit = field_validator("width_m")(refuse_wrong_unit)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,38 +4,34 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from dem.setting.part import Part
+from dem.setting.part import Duration, Part
 
 
 class Recording(Part):
     """What is written, and how often."""
 
-    frame_interval_s: float = Field(
+    frame_interval_s: Duration = Field(
         0.04,
-        gt=0,
         description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
     )
-    sphere_interval_s: float | None = Field(
+    sphere_interval_s: Duration | None = Field(
         None,
-        gt=0,
         description="time between VTK files of the spheres that stand for the smarticles, for ParaView's glyphs [s]; "
         "null: none",
     )
-    series_interval_s: float = Field(0.004, gt=0, description="time between samples of the HDF5 series [s]")
+    series_interval_s: Duration = Field(0.004, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
         False,
         strict=True,
         description="whether to record energies and the work of the container as well as the motors'",
     )
-    dissipation_interval_s: float | None = Field(
+    dissipation_interval_s: Duration | None = Field(
         None,
-        gt=0,
         description="time between samples of what contacts dissipate [s], which closes the account of energies; null: "
         "none. A sample costs 10 µs per contact, as much as some twenty steps of a small pile; 2e-4 s is dense enough",
     )
-    checkpoint_interval_s: float | None = Field(
+    checkpoint_interval_s: Duration | None = Field(
         0.4,
-        gt=0,
         description="simulated time between checkpoints [s]; null: none. At a checkpoint the run reloads itself, so "
         "that a resumed run has the same bits; runs with other intervals differ in their last bits",
     )

@@ -8,7 +8,7 @@ from typing import Self
 from pydantic import Field, field_validator, model_validator
 
 from dem.body.particle import Boxes
-from dem.setting.part import Length, Part, in_hinge_range, refuse_wrong_unit
+from dem.setting.part import Length, Part, in_hinge_range
 
 
 class Smarticle(Part):
@@ -22,15 +22,13 @@ class Smarticle(Part):
     thickness_in_plane_m: Length = Field(0.5e-3, description="t2, thickness in the smarticle's plane [m]")
     density_kg_per_m3: float = Field(
         7850.0,
-        gt=0,
+        json_schema_extra={"minimum": 50, "maximum": 25000},
         description="density of the links [kg/m³]; mass and inertia are those of the boxes",
     )
     angles_deg: tuple[float, float] = Field(
         (90.0, 90.0),
         description="barb angles (α1, α2) [deg]: 0 straight, 90 the U; from -15 to 105",
     )
-
-    _length_unit = field_validator("middle_length_m", "thickness_normal_m", "thickness_in_plane_m")(refuse_wrong_unit)
 
     @field_validator("density_kg_per_m3")
     @classmethod

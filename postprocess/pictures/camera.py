@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.pictures.colouring import COLOURINGS, Colouring
@@ -52,10 +52,10 @@ class Look:
             InputError: Unknown colouring or view, or a bad size.
         """
         if color_by not in COLOURINGS:
-            msg = f"color_by must be one of {', '.join(COLOURINGS)}: got '{color_by}'"
+            msg = f"colour by {color_by!r}: is not known; {nearest(color_by, COLOURINGS)}"
             raise InputError(msg)
         if view not in VIEWS:
-            msg = f"view must be one of {', '.join(VIEWS)}: got '{view}'"
+            msg = f"view {view!r}: is not known; {nearest(view, VIEWS)}"
             raise InputError(msg)
         if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
             msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"

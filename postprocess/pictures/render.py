@@ -60,11 +60,13 @@ def render_run(
         >>> render_run("runs/pile", color_by="height", view="oblique").name
         'render.png'
     """
-    output = _checked_output(directory, output, "render.png", (".png",), overwrite=overwrite)
+    output = _checked_output(directory, output, "render.png", (".png",))
     run = read_run(directory)
     look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
     frames = read_frames(directory)
     frame = frames[_frame_at(frames, time)]
+    # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
+    figures.refuse_to_overwrite(output, overwrite=overwrite)
     values = look.colouring.values(frame)
     around = read_surroundings(run)
     with Canvas(run, look, around, extent(frame, run, look, around), _span(values)) as canvas:
@@ -106,7 +108,7 @@ def render_film(
         InputError: Fewer than two frames, a kind of file that cannot be written here, an output
             that exists, or as in `render_run`.
     """
-    output = _checked_output(directory, output, "film.gif", film.KINDS, overwrite=overwrite)
+    output = _checked_output(directory, output, "film.gif", film.KINDS)
     run = read_run(directory)
     look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
     if not (math.isfinite(frames_per_second) and frames_per_second > 0 and most_frames >= 2):
@@ -118,8 +120,9 @@ def render_film(
     film.check_film(output, size)
     frames = read_frames(directory)
     if len(frames) < 2:
-        msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; use render_run"
+        msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; draw a picture (.png)"
         raise InputError(msg)
+    figures.refuse_to_overwrite(output, overwrite=overwrite)
     shown = np.unique(np.linspace(0, len(frames) - 1, most_frames).round().astype(int))
     around = read_surroundings(run)
     extents, values = [], []
@@ -154,15 +157,11 @@ def _checked_output(
     output: Path | str | None,
     default: str,
     kinds: tuple[str, ...],
-    *,
-    overwrite: bool,
 ) -> Path:
     path = Path(directory) / default if output is None else Path(output)
     if path.suffix not in kinds:
         msg = f"{path}: the output must end in {' or '.join(kinds)}: got '{path.suffix}'"
         raise InputError(msg)
-    # Before an hour of drawing, not after it.
-    figures.refuse_to_overwrite(path, overwrite=overwrite)
     return path
 
 

@@ -205,7 +205,7 @@ def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
         InputError: the file exists and `overwrite` is false.
     """
     if path.exists() and not overwrite:
-        msg = f"{path}: exists already: choose another output, or allow overwriting"
+        msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
         raise InputError(msg)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -99,6 +100,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
     import pandas as pd  # noqa: PLC0415
 
+    from dem.record.manifest import read_run  # noqa: PLC0415
+    from dem.record.series import lost_series  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -109,6 +112,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         raise InputError(msg)
     measure = measure_run if arguments.frames else summarise_run
     directories = run_directories(arguments.directories)
+    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = pd.concat([measure(directory) for directory in directories], ignore_index=True)
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)

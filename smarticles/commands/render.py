@@ -9,6 +9,7 @@ from typing import Any
 from dem.errors import InputError
 from smarticles.parsing import Commands, add_overwrite, positive_int
 
+_PICTURE_SUFFIX = ".png"
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 
 
@@ -47,6 +48,10 @@ def render_run(arguments: argparse.Namespace) -> int:
     """`smarticles render`."""
     output: Path | None = arguments.output
     film = output is not None and output.suffix in _FILM_SUFFIXES
+    if output is not None and not film and output.suffix != _PICTURE_SUFFIX:
+        kinds = f"{_PICTURE_SUFFIX} for a picture, {', '.join(_FILM_SUFFIXES)} for a film"
+        msg = f"--output {output}: {output.suffix!r} is no kind of file that is drawn here; end the name in {kinds}"
+        raise InputError(msg)
     if film and arguments.time is not None:
         msg = f"--time {arguments.time:g}: a film shows all times; leave it out, or write .png"
         raise InputError(msg)

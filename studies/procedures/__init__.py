@@ -1,4 +1,4 @@
-"""The study `procedures`: shape change, external and internal oscillation, against Savoie et al."""
+"""The studies `procedures` and `procedures-code`: what each does to a pile, by the paper's text and by its code."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 def _load(*, quick: bool) -> Procedures:
     from studies.procedures.study import Procedures  # noqa: PLC0415  (pandas, matplotlib)
 
-    return Procedures()
+    return Procedures("procedures")
+
+
+def _load_code(*, quick: bool) -> Procedures:
+    from studies.procedures.study import Procedures  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Procedures("procedures-code")
 
 
 SHIPPED = Shipped(
@@ -27,4 +33,14 @@ shape change, external and internal oscillation of smarticles of several l/w, th
 amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): packing fraction, entanglement,
 energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
 reach at a small l/w are left out. --quick takes minutes.""",
+)
+
+CODE = Shipped(
+    name="procedures-code",
+    folder=Path(__file__).parent,
+    load=_load_code,
+    pictured={"procedure": "shape-change", "l_over_w": 0.7},
+    about="""\
+the same by the rules of the paper's own code: a motor at its torque limit goes on at half the speed and stops after
+20 findings in a row, friction 0.2, the floor shaken alone.""",
 )

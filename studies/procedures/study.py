@@ -27,9 +27,12 @@ from studies.procedures.findings import findings
 
 
 class Procedures(PaperStudy):
-    """Runs of one activity between two rests; static is the state before it."""
+    """Runs of one activity between two rests; static is the state before it.
 
-    name = "procedures"
+    Args:
+        name: Of the study: by the paper's text, or by its code.
+    """
+
     one_engine = False
     title = "Procedures of smarticles against the findings of Savoie et al."
     quantities = QUANTITIES
@@ -43,6 +46,9 @@ class Procedures(PaperStudy):
             HEIGHT: ("h/h0", ".3f"),
         }
     )
+
+    def __init__(self, name: str = "procedures") -> None:
+        self.name = name
 
     def measure(self, run: RunManifest) -> MeasuredRun:
         """One activity, and the rests before and after it."""

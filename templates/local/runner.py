@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Literal, Protocol
 
+from dem.engine.cores import usable_cores
 from templates.local.estimate import PhaseClock, time_left
 from templates.sweep.files import read_json
 from templates.sweep.folder import Entry, Folder
@@ -118,7 +119,7 @@ class Display(Protocol):
 
 def slots_here() -> int:
     """How many runs this process may have at once: one per core it is allowed to use."""
-    return len(os.sched_getaffinity(0))
+    return usable_cores()
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:

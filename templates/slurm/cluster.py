@@ -8,17 +8,33 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest
+from dem.refusal import refusals
+from dem.strict import Strict
 from templates.sweep.files import read_text
-from templates.sweep.refusal import Models, explain
 
 SHIPPED = Path(__file__).parent / "clusters"
 
+
 # These go into lines that Slurm reads without a shell: nothing in them may need quoting.
-Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+/:@=,-]*$", max_length=200)]
-Option = Annotated[str, Field(pattern=r"^--[a-z][A-Za-z0-9._+/:@=,&|*%\[\]-]*$", max_length=200)]
+def _plain_word(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+/:@=,-]*", text):
+        msg = f"{text!r} would need quoting in a job script; use letters, digits and . _ + / : @ = , - only"
+        raise ValueError(msg)
+    return text
+
+
+def _plain_option(text: str) -> str:
+    if not re.fullmatch(r"--[a-z][A-Za-z0-9._+/:@=,&|*%\[\]-]*", text):
+        msg = f"{text!r} is no option of sbatch that can be written without quoting; write it as --name=value"
+        raise ValueError(msg)
+    return text
+
+
+Word = Annotated[str, Field(max_length=200), AfterValidator(_plain_word)]
+Option = Annotated[str, Field(max_length=200), AfterValidator(_plain_option)]
 
 _UNITS = (86400, 3600, 60, 1)
 
@@ -56,20 +72,24 @@ def format_time(seconds: float) -> str:
     return f"{days}-{clock}" if days else clock
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Partition(_Model):
+class Partition(Strict):
     """One queue of a cluster.
 
     `cores_per_node` and `memory_per_node_mib` may be "here": those of the machine that submits.
     """
 
-    cores_per_node: Annotated[int, Field(ge=1)] | Literal["here"]
-    memory_per_node_mib: Annotated[int, Field(ge=1)] | Literal["here"]
+    cores_per_node: int | Literal["here"]
+    memory_per_node_mib: int | Literal["here"]
     max_time: str
     named: bool = Field(default=True, description="false: leave --partition out, Slurm takes its default")
+
+    @field_validator("cores_per_node", "memory_per_node_mib", mode="before")
+    @classmethod
+    def _is_amount(cls, value: object) -> object:
+        if value != "here" and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            msg = f'{value!r} is no whole number from 1; give one, or "here" for that of the machine that submits'
+            raise ValueError(msg)
+        return value
 
     @field_validator("max_time")
     @classmethod
@@ -95,14 +115,14 @@ class Partition(_Model):
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20
 
 
-class Container(_Model):
+class Container(Strict):
     """An Apptainer image whose run script is `smarticles`."""
 
     image: str = Field(min_length=1)
     command: tuple[str, ...] = Field(default=("apptainer", "run"), min_length=1)
 
 
-class Cluster(_Model):
+class Cluster(Strict):
     """Everything the job scripts need to know of a cluster."""
 
     schema_version: Literal[1]
@@ -140,9 +160,6 @@ class Cluster(_Model):
             msg = f"--partition {wanted}: cluster {self.name} has no such partition; {advice}"
             raise InputError(msg)
         return wanted, self.partitions[wanted]
-
-
-_MODELS: Models = {(): Cluster, ("partitions", "*"): Partition, ("container",): Container}
 
 
 def shipped_clusters() -> list[str]:
@@ -185,7 +202,8 @@ def load_cluster(reference: str) -> Cluster:
     try:
         cluster = Cluster.model_validate(content)
     except ValidationError as error:
-        raise InputError(explain(error, path, _MODELS, f"see {SHIPPED / 'example-large.toml'}")) from error
+        msg = f"{path}: {refusals(error, content, described=str(SHIPPED / 'example-large.toml'))}"
+        raise InputError(msg) from error
     if cluster.template is not None:
         cluster = cluster.model_copy(update={"template": str(path.parent / cluster.template)})
     return cluster

@@ -29,6 +29,7 @@ from templates.sweep.sweep_file import SEED, Sweep
 
 FORMAT = 1
 MANIFEST = "sweep.json"
+RUN = "run.json"  # of each run directory
 CHECKPOINT = "checkpoint.zip"
 
 State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
@@ -178,7 +179,7 @@ class Folder:
         return stopped and (directory / CHECKPOINT).is_file() and self._is_of_scene(entry)
 
     def _is_of_scene(self, entry: Entry) -> bool:
-        manifest = read_json(self.run(entry) / "run.json") or {}
+        manifest = read_json(self.run(entry) / RUN) or {}
         return manifest.get("scene_sha256") == entry.scene_sha256
 
     def status(self) -> list[RunStatus]:
@@ -353,7 +354,7 @@ def open_folder(path: Path) -> Folder:
     """
     file = path / MANIFEST
     if not file.is_file():
-        msg = f"{path}: holds no {MANIFEST}; give the directory that a sweep or study made"
+        msg = f"{path}: {_instead(path)}"
         raise InputError(msg)
     content = read_json(file)
     try:
@@ -379,6 +380,19 @@ def open_folder(path: Path) -> Folder:
     except (KeyError, TypeError, ValueError) as error:
         msg = f"{file}: not a sweep manifest of format {FORMAT}; write the sweep to a new directory"
         raise InputError(msg) from error
+
+
+def _instead(path: Path) -> str:
+    """What a path is that is not the directory of a sweep, and what to give."""
+    if (path / RUN).is_file():
+        return "is one run; give the directory that a sweep or study made"
+    if not path.exists():
+        what = "there is no such directory"
+    elif not path.is_dir():
+        what = "is a file"
+    else:
+        what = f"holds neither a run ({RUN}) nor a sweep ({MANIFEST})"
+    return f"{what}; give the directory of a run, a sweep or a study"
 
 
 def count_states(runs: Sequence[RunStatus]) -> dict[str, int]:

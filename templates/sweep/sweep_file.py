@@ -24,12 +24,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from dem.errors import InputError, nearest
+from dem.errors import InputError, nearest, shown
+from dem.refusal import refusals
 from dem.scene.yaml_text import parse_yaml
+from dem.strict import Strict
 from templates.sweep.files import IDENTIFIER, parse_table, read_text
-from templates.sweep.refusal import Models, explain
 from templates.sweep.render import Value
 
 SEED = "seed"
@@ -57,18 +58,14 @@ def _finite(value: Value) -> Value:
     return value
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Table(_Model):
+class Table(Strict):
     """Points from the rows of a CSV file."""
 
     file: str = Field(description="CSV file; a relative path starts at the sweep file")
     only: dict[str, list[Value]] = Field(default={}, description="keep the rows whose column holds one of these values")
 
 
-class Points(_Model):
+class Points(Strict):
     """Where the points come from. Several sources are crossed; later ones vary faster."""
 
     table: Table | None = None
@@ -100,7 +97,7 @@ class Points(_Model):
         return self
 
 
-class Repeats(_Model):
+class Repeats(Strict):
     """The same point with other random numbers."""
 
     seeds: tuple[int, ...] = Field(min_length=1, description="seeds of the scene, one run each")
@@ -119,7 +116,7 @@ class Repeats(_Model):
         return seeds
 
 
-class Again(_Model):
+class Again(Strict):
     """Some of the points once more, with other constants, after all others; such as on another engine."""
 
     constants: dict[str, Value] = Field(min_length=1, description="constants that differ there")
@@ -128,16 +125,16 @@ class Again(_Model):
     )
 
 
-class SweepFile(_Model):
+class SweepFile(Strict):
     """What a sweep file says, validated."""
 
     schema_version: Literal[1]
     name: str = Field(min_length=1)
     template: str = Field(description="scene template; a relative path starts at the sweep file")
     run_name: str = Field(description="Jinja2 text that names a run's directory")
-    constants: dict[str, Value] = {}
+    constants: dict[str, Value] = Field(default={})
     points: Points
-    derived: dict[str, str | int | float | bool] = {}
+    derived: dict[str, Value] = Field(default={})
     repeats: Repeats | None = None
     again: Again | None = None
 
@@ -148,6 +145,17 @@ class SweepFile(_Model):
                 msg = f"again.constants: {name!r} is none of the constants; add it there"
                 raise ValueError(msg)
         return self
+
+    @field_validator("derived")
+    @classmethod
+    def _expressions(cls, mapping: dict[str, Value]) -> dict[str, Value]:
+        for name, value in mapping.items():
+            if not isinstance(value, str | int | float | bool):
+                msg = (
+                    f'{name}: {value!r} is neither an expression nor a number; write it in quotes, "(count / 2) | int"'
+                )
+                raise ValueError(msg)
+        return mapping
 
     @field_validator("constants", "derived")
     @classmethod
@@ -191,12 +199,16 @@ def load_sweep(path: Path) -> Sweep:
     text = read_text(path, "sweep file")
     data = parse_yaml(text, str(path))
     if not isinstance(data, dict):
-        msg = f"{path}: a sweep file holds keys such as template and points: got {data!r}"
+        msg = f"{path}: a sweep file holds keys such as template and points: got {shown(data)}"
+        raise InputError(msg)
+    if "phases" in data and "points" not in data:
+        msg = f"{path}: is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"
         raise InputError(msg)
     try:
         content = SweepFile.model_validate(data)
     except ValidationError as error:
-        raise InputError(explain(error, path, _MODELS, "see `smarticles sweep --help`")) from error
+        msg = f"{path}: {refusals(error, data, described='`smarticles sweep --help`')}"
+        raise InputError(msg) from error
     template = path.parent / content.template
     table, table_path, table_text = _read_table(path, content.points.table)
     return Sweep(
@@ -284,12 +296,3 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
         msg = f"{path}: points.table.only: keeps no row of {file}; give fewer conditions"
         raise InputError(msg)
     return rows, file, text
-
-
-_MODELS: Models = {
-    (): SweepFile,
-    ("points",): Points,
-    ("points", "table"): Table,
-    ("repeats",): Repeats,
-    ("again",): Again,
-}

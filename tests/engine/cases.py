@@ -163,7 +163,7 @@ def _wall(engine: YadeEngine) -> float:
     return float(engine._omega.bodies[engine.fixtures.container[0]].state.pos[2])
 
 
-def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0) -> dict[str, Any]:
+def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0, walls: bool = True) -> dict[str, Any]:
     """Position and velocity of an empty container at every step."""
     scene = scene_of(data)
     engine = build(scene, shaken=True)
@@ -173,7 +173,7 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
         engine.advance(delay)
     begun, start = engine.time, engine.fixtures.floor
     wall_start = _wall(engine)
-    engine.fixtures.shake(amplitude=amplitude, frequency=phase.frequency_hz)
+    engine.fixtures.shake(amplitude=amplitude, frequency=phase.frequency_hz, walls=walls)
     rows: list[tuple[float, float]] = []
     steps = math.ceil(periods / phase.frequency_hz / engine.time_step)
     advance_watched(engine, steps, lambda: rows.append((engine.fixtures.floor, engine.fixtures.velocity)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import builds
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from dem.engine.interface import Saved
 from dem.engine.links.engine import LinksEngine
 from dem.errors import InputError
+from dem.physics.motor import Motors
 
 HERE = Path()
 
@@ -253,3 +255,47 @@ def test_a_fast_spin_is_seen() -> None:
     made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 6000
     made.advance(10)
     assert made.overlaps(0.5 * builds.DIAMETER).deep.any()
+
+
+def test_an_easing_motor_is_that_of_the_other_engine() -> None:
+    # Both barbs or one of them at the limit, in turns: the same commands as of the law in plain arithmetic.
+    law = builds.motor_law("ease")
+    made = builds.engine(motor_law=law, dt=5e-5)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    motors = made._world.motors
+    assert motors is not None
+    motors.acceleration[:] = 1e12
+    plain = Motors(replace(law, stiffness=1.0), made._world.bodies.alpha)
+    rng = np.random.default_rng(1)
+    loads = [np.repeat(rng.random((1, 2)) < 0.8, 15, axis=0) for _ in range(40)]
+    speeds = set()
+    for over in np.concatenate(loads):
+        torque = np.where(over, 1.5, 0.5) * law.torque_limit
+        motors.torque[0] = torque
+        before = plain.commands.copy()
+        far = before + 1.0
+        plain.look(before - torque, far, 2e-4, 5e-5)
+        motors.schedule[0] = motors.command[0] = made._world.bodies.alpha[0]
+        made.motors.actuate((made._world.bodies.alpha + 1.0)[None], 2e-4)
+        np.testing.assert_allclose(made._world.bodies.rate * 2e-4, plain.commands - before, atol=1e-15)
+        np.testing.assert_array_equal(motors.halted, plain.halted)
+        speeds |= set(np.round(made._world.bodies.rate[0], 9))
+    assert speeds == {0.0, law.speed_limit / 2, law.speed_limit}
+
+
+@pytest.mark.parametrize("walls", [True, False])
+def test_the_floor_is_shaken_with_its_wall_or_alone(walls: bool) -> None:
+    made = poured(6)
+    amplitude, frequency = 5e-4, 30.0
+    made.fixtures.shake(amplitude=amplitude, frequency=frequency, walls=walls)
+    begun, floors, wall = made.time, [], []
+    for _ in range(400):
+        made.advance(4)
+        floors.append(made.fixtures.floor)
+        wall.append(made.fixtures.wall_bottom)
+    times = begun + 2e-4 * np.arange(1, 401)
+    np.testing.assert_allclose(floors, amplitude * np.sin(2 * math.pi * frequency * (times - begun)), atol=1e-12)
+    assert np.ptp(wall) == pytest.approx(np.ptp(floors) if walls else 0.0, abs=1e-15)
+    # What the floor alone gives is all that the account has.
+    assert made.account.container_work > 0.0

@@ -246,7 +246,7 @@ class Motoring(NamedTuple):
     """Two motors on each of N smarticles.
 
     Args:
-        law: 0 halt, 1 stall, 2 slip, 3 servo.
+        law: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo.
         speed: ω, the greatest speed [rad/s].
         limit: (N, 2) τ_max [N m].
         stiffness: (N, 2) of the shaft of a slip or servo motor [N m/rad].
@@ -265,6 +265,7 @@ class Motoring(NamedTuple):
         period: the same in steps.
         targets: (looks, N, 2) angles at the ends of the periods to come according to the schedule [rad].
         due: (2,) the row of `targets` that the next look goes by, and the steps until then; -1: no look is due.
+        over: (N,) how often in a row a barb of each smarticle was found at τ_max, one after the other, for ease.
     """
 
     law: int
@@ -286,6 +287,7 @@ class Motoring(NamedTuple):
     period: int
     targets: Array
     due: NDArray[np.int64]
+    over: NDArray[np.int64]
 
 
 def no_bodies(links: int) -> Bodies:

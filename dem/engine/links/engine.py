@@ -162,8 +162,10 @@ class LinksEngine:
 
     def neighbours(self) -> NDArray[np.int64]:
         """See the interface."""
-        pairs = np.unique(self._world.look().pairs, axis=0)
-        return np.bincount(pairs.ravel(), minlength=self.count).astype(np.int64)
+        pairs = self._world.look().pairs
+        # Two numbers as one: rows are sorted twenty times slower.
+        both = np.unique(pairs[:, 0] * self.count + pairs[:, 1])
+        return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
         """See the interface."""

@@ -116,15 +116,15 @@ class LinksFixtures:
 
     # -- how they move -----------------------------------------------------------------------------------------
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         """See the interface."""
         if not self._shaken:
             msg = "the engine was built without a shaker"
             raise RunError(msg)
-        ground, hooked = self._ground, self._world.hooks is not None
+        ground, hooked = self._ground, walls and self._world.hooks is not None
         ground.base[:] = ground.place
         ground.speed[:] = 0.0
-        ground.shaken[:] = [1, ground.flags[0], hooked, hooked]
+        ground.shaken[:] = [1, walls and ground.flags[0], hooked, hooked]
         ground.wave[:] = amplitude, 2 * math.pi * frequency, self._world.time
 
     def lift_wall(self, speed: float) -> None:

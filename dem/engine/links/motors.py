@@ -16,7 +16,7 @@ from dem.physics.motor import MotorLaw
 
 Array = NDArray[np.float64]
 
-LAWS = ("halt", "stall", "slip", "servo")
+LAWS = ("halt", "stall", "ease", "slip", "servo")
 LOOKS = 64  # that may be told at once: so many that a call of the kernel costs nothing beside them
 
 
@@ -140,6 +140,7 @@ class LinksMotors:
             period=0,
             targets=np.zeros((1, n, 2)),
             due=np.array([0, -1]),
+            over=np.zeros(n, dtype=np.int64),
         )
 
     # -- checkpoints -------------------------------------------------------------------------------------------

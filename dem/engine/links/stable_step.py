@@ -126,4 +126,4 @@ def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
         return float(eigh(stiffness * step**2 + 2 * damping * step, mass, eigvals_only=True)[-1]) - 4
 
     undamped = 2 / math.sqrt(float(eigh(stiffness, mass, eigvals_only=True)[-1]))
-    return float(brentq(excess, 0.0, undamped, xtol=1e-12)) if damping.any() else undamped
+    return float(brentq(excess, 0.0, undamped, xtol=1e-12)) if damping.any() and excess(undamped) > 0 else undamped

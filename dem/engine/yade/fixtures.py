@@ -92,7 +92,7 @@ class YadeFixtures:
             self._yade.omega.bodies[body].state.vel = self._yade.vector(0, 0, speed)
         self.moving = list(bodies)
 
-    def shake(self, *, amplitude: float, frequency: float) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         """See `dem.engine.interface.Fixtures`."""
         if self._shaker is None:
             msg = "the engine was built without a shaker"
@@ -104,7 +104,7 @@ class YadeFixtures:
         self._shaker.A = self._yade.vector(0, 0, amplitude)
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
-        self._shaker.ids = self.moving = self.bodies
+        self._shaker.ids = self.moving = self.bodies if walls else self.container[-1:]
         self._shaker.dead = False
 
     def stop(self) -> None:

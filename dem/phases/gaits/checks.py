@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9  # relative; angles and speeds that meet their limit up to rounding are allowed
 BARB_LINKS = (0, 2)
+_MOST_PARTS = 100  # that are tried: among them is one of few digits, unless there are very many parts
 # Share of τ_max that one look of a motor may add before it notices and halts. The defaults add 0.22.
 MOST_OVERSHOOT = 0.5
 
@@ -116,7 +117,7 @@ def _check_control(scene: SceneView) -> None:
 
 def _whole_fraction(whole: float, parts: int) -> str:
     """A whole fraction of a time [s], in so many parts or a few more, such that it can be written in few digits."""
-    for more in range(parts, 10 * parts + 1):
+    for more in range(parts, min(10 * parts, parts + _MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
             return text

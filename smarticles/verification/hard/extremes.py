@@ -14,7 +14,7 @@ from smarticles.verification.bench import scene_of
 from smarticles.verification.check import Check, below, near, says
 from smarticles.verification.hands.interface import Hands
 from smarticles.verification.hard.runs import Watched, whole
-from smarticles.verification.hard.scenes import RELAX, scene, shape_change, swing
+from smarticles.verification.hard.scenes import RELAX, REST, scene, shape_change, swing
 
 
 def weight_on_floor(run: Watched, error: float) -> list[Check]:
@@ -84,7 +84,7 @@ def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], floa
 
 def step_below(hands: Hands, out: Path, *, share: float, count: int) -> list[Check]:
     """A time step by hand, below the stable one."""
-    data, asked, _ = _with_step(scene(hands, swing(0.04), RELAX, count=count), share)
+    data, asked, _ = _with_step(scene(hands, swing(0.04), REST, count=count), share)
     run = whole(data, out)
     assert run.scene is not None  # draft, and a step that is allowed
     # Shorter, but for rounding, by as much as makes it a whole fraction of the control period.

@@ -7,6 +7,7 @@ from typing import Any
 from smarticles.verification.hands.interface import Hands
 
 RELAX = {"type": "relax", "duration_s": 0.05}
+REST = {"type": "relax", "duration_s": 0.3}  # for what was moved just before to stand or fall
 
 
 def scene(

@@ -13,7 +13,7 @@ OBLIQUE = "impulse theory with Coulomb friction, as in MFiX DEM-05 and Chung and
 RIGID = "rigid-body impulse theory: 1/m_eff = 1/m + (r × n)·I⁻¹(r × n), impulse (1 + e) m_eff v"
 
 YADES_TURNS = {"yade": "its turns are of first order: ladder `spin`"}
-LAWS = (("halt", 0.0), ("stall", 0.0), ("slip", 0.0), ("servo", 2e-6))
+LAWS = (("halt", 0.0), ("stall", 0.0), ("ease", 0.0), ("slip", 0.0), ("servo", 2e-6))
 
 CASES = (
     Case(

@@ -115,7 +115,7 @@ def test_an_error_in_the_smarticle_is_one_error(scene_data: SceneData) -> None:
     data = scene_data({"smarticle.middle_length_m": -1, "hooks": {}, "phases": [DEPOSIT, PULL]})
     with pytest.raises(InputError) as caught:
         parse_scene(data, source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: -1 m is out of range; use more than 0 m"
+    assert str(caught.value) == "bad.yaml: smarticle.middle_length_m: -1 m is out of range; use at least 1e-06 m"
 
 
 def test_a_hook_may_be_pulled_out_over_the_wall() -> None:

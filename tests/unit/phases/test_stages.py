@@ -11,7 +11,7 @@ import pytest
 from double import EngineDouble
 from scenes import chain, small
 
-from dem.errors import RunError
+from dem.errors import InputError, RunError
 from dem.phases.phase import CHECK_INTERVAL, Stage
 from dem.scene.scene import Scene
 
@@ -154,6 +154,16 @@ def test_shaking_tells_amplitude_and_frequency_and_stops() -> None:
     run_phase(scene, engine)
     amplitude = 3 * 9.81 / (2 * np.pi * 25) ** 2
     assert engine.told == [("shake", pytest.approx(amplitude), 25), ("stop",)]
+
+
+def test_the_floor_alone_is_shaken_within_its_wall() -> None:
+    floor = {"type": "shake", "duration_s": 0.1, "moves": "floor"}
+    scene, engine = begin(floor)
+    run_phase(scene, engine)
+    assert [told[0] for told in engine.told] == ["shake the floor", "stop"]
+    with pytest.raises(InputError, match=r"phases\.1\.moves: the floor alone would go 0\.00276 m down, and the wall"):
+        begin(floor | {"peak_acceleration_g": 10})
+    begin(floor | {"peak_acceleration_g": 10, "moves": "container"})
 
 
 def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:

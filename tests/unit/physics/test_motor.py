@@ -15,6 +15,7 @@ from dem.physics.motor import MotorLaw, Motors
 
 HALT = MotorLaw(torque_limit=1.6e-5, speed_limit=6.0, stiffness=3e-3, law="halt")
 SLIP = replace(HALT, law="slip")
+EASE = replace(HALT, law="ease")
 PERIOD, STEP = 2e-4, 4e-5  # s
 ADVANCE = 3e-3 * 6.0 * PERIOD  # k ω Δt [N m]
 
@@ -139,6 +140,36 @@ def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> No
 # -- the slipping law --------------------------------------------------------------------------------------------------
 
 
+def test_an_easing_motor_goes_on_at_half_the_speed_whatever_it_takes() -> None:
+    # One barb alone is at its limit: the other one, which follows freely, starts the count anew at each look.
+    motors = Motors(EASE, np.zeros((1, 2)))
+    angles = np.zeros((1, 2))
+    for _ in range(200):
+        angles[0, 1] = motors.commands[0, 1]
+        motors.look(angles, np.array([[1.0, 1.0]]), PERIOD, STEP)
+    slow = math.ceil(EASE.torque_limit / ADVANCE)  # looks until the shaft is wound up to the limit
+    assert motors.commands[0, 0] == pytest.approx((slow + (200 - slow) / 2) * 6 * PERIOD, rel=1e-12)
+    assert motors.torques[0, 0] > 10 * EASE.torque_limit
+    assert motors.commands[0, 1] == pytest.approx(200 * 6 * PERIOD, rel=1e-12)
+    assert not motors.halted.any()
+
+
+def test_easing_motors_stop_when_both_are_found_at_the_limit_ten_times_in_a_row() -> None:
+    slow = math.ceil(EASE.torque_limit / ADVANCE)
+    # Twenty findings, of barb 1 and barb 2 in turn: the second barb is the twentieth and stops a look earlier.
+    motors = held(EASE, 0.0, 1.0, slow + 10)
+    assert motors.halted.tolist() == [[False, True]]
+    stopped = held(EASE, 0.0, 1.0, 100)
+    assert stopped.halted.all()
+    assert stopped.commands[0] / (6 * PERIOD) == pytest.approx([slow + 5.0, slow + 4.5], rel=1e-12)
+    # One that comes free starts the count anew, for both.
+    angles = np.array([[0.0, stopped.commands[0, 1]]])
+    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
+    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
+    assert not stopped.halted.any()
+    assert stopped.commands[0, 0] / (6 * PERIOD) > slow + 5
+
+
 @given(st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=40))
 def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
     motors, free = Motors(SLIP, np.zeros((1, 2))), Motors(replace(HALT, torque_limit=1.0), np.zeros((1, 2)))
@@ -212,15 +243,16 @@ def test_engaging_forgets_torque_but_not_work() -> None:
 # -- memory ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", [HALT, SLIP])
+@pytest.mark.parametrize("law", [HALT, EASE, SLIP])
 def test_memory_through_json_keeps_every_bit(law: MotorLaw) -> None:
     rng = np.random.default_rng(3)
     way = np.cumsum(rng.normal(size=(60, 4, 2)), axis=0) * 2e-3
     motors = Motors(law, way[0])
     for angles in way[:30]:
         motors.look(angles, angles + rng.normal(size=(4, 2)) * 0.01, PERIOD, STEP)
-    assert motors.halted.any()
-    assert not motors.halted.all()
+    remembered = motors.halted if law is not EASE else np.array(motors.memory["over"]) > 1
+    assert remembered.any()
+    assert not remembered.all()
     again = Motors(law, np.zeros((4, 2)))
     again.restore(json.loads(json.dumps(motors.memory)))
     assert again.halted.tolist() == motors.halted.tolist()

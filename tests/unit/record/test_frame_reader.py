@@ -89,7 +89,9 @@ def test_truncated_frame(tmp_path, write_frame, kept, capfd):
     path.write_bytes(data[: kept if isinstance(kept, int) else int(kept * len(data))])
     with pytest.raises(InputError, match="cannot read frame") as error:
         read_frame(path)
-    assert_one_line(error, str(path), "truncated or not VTK", "--resume")
+    assert_one_line(
+        error, str(path), "truncated or not VTK", "remove its line from", "frames.pvd", "scene.yaml anew elsewhere"
+    )
     assert capfd.readouterr() == ("", "")
 
 

@@ -81,8 +81,13 @@ def test_truncated_manifest(run, text):
 def test_missing_directory_and_manifest(tmp_path):
     with pytest.raises(InputError, match="no such directory"):
         read_run(tmp_path / "none")
-    with pytest.raises(InputError, match=r"run\.json: No such file"):
+    with pytest.raises(InputError, match=r"it holds no run\.json; give the directory of a run"):
         read_run(tmp_path)
+    (tmp_path / "sweep.json").write_text("{}")
+    with pytest.raises(InputError, match=r"it is a sweep; give one of its runs, .*/runs/NAME"):
+        read_run(tmp_path)
+    with pytest.raises(InputError, match=r"sweep\.json: it is a file; give the directory of a run"):
+        read_run(tmp_path / "sweep.json")
 
 
 def test_ending_that_belongs_to_another_run(make_run):

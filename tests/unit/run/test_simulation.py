@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
@@ -136,13 +137,45 @@ def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
     assert len(kind.built) == 1
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"seed": 2}, "seed 1 there, 2 here; resume with"),
+        (
+            {"seed": 2, "count": 12, "engine": "links", "gravity_m_per_s2": 5},
+            "engine yade there, links here; seed 1 there",
+        ),
+    ],
+)
+def test_a_finished_run_of_another_scene_is_not_called_done(
+    kind: KindDouble, tmp_path: Path, changes: dict[str, Any], told: str
+) -> None:
+    run(scene_of("rested"), tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match="was made from another scene: ") as caught:
+        run(scene_of("rested", **changes), tmp_path, resume=True)
+    assert told in str(caught.value)
+    assert "run the changed scene in another directory" in str(caught.value)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    assert len(kind.built) == 1
+
+
+def test_a_scene_changed_in_the_run_directory_is_told_as_that(kind: KindDouble, tmp_path: Path) -> None:
+    run(scene_of("rested"), tmp_path)
+    path = tmp_path / "scene.yaml"
+    path.write_text(path.read_text().replace("seed: 1", "seed: 5"))
+    with pytest.raises(InputError, match=r"scene.yaml is not the scene that this run was made from .* put it back"):
+        run(load_scene(path), tmp_path, resume=True)
+    assert len(kind.built) == 1
+
+
 def test_another_scene_or_another_version_does_not_go_on(
     kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     interrupted(2)
     with pytest.raises(KeyboardInterrupt):
         run(scene_of("rested"), tmp_path)
-    with pytest.raises(InputError, match=r"was made from another scene .* run the changed scene in another directory"):
+    with pytest.raises(InputError, match=r"was made from another scene: .* run the changed scene in another directory"):
         run(scene_of("rested", seed=2), tmp_path, resume=True)
     monkeypatch.setattr(kind, "name", "another")
     with pytest.raises((InputError, RunError), match="double 1"):
@@ -226,8 +259,32 @@ def test_a_directory_that_holds_something_is_left_as_it_is(
     with pytest.raises(InputError) as caught:
         run(scene_of("rested"), tmp_path)
     assert str(caught.value) == f"--out {tmp_path}: holds {what} another directory"
+    if "run.json" not in held:
+        # What is not a run's is left alone with --resume as well, and nothing is advised that would be refused.
+        with pytest.raises(InputError) as caught:
+            run(scene_of("rested"), tmp_path, resume=True)
+        told = "no run to resume but files (notes.txt, …) and is left as it is; choose another directory"
+        assert str(caught.value) == f"--out {tmp_path}: holds {told}"
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
+    assert not kind.built
+
+
+def test_who_comes_second_does_not_write_over_who_was_quicker(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked = fcntl.flock
+
+    def quicker(file: Any, how: int) -> None:
+        # Between the look into the directory and the lock, another process runs from beginning to end.
+        monkeypatch.setattr("dem.record.rundir.fcntl.flock", locked)
+        (tmp_path / "run.json").write_text("{}")
+        locked(file, how)
+
+    monkeypatch.setattr("dem.record.rundir.fcntl.flock", quicker)
+    with pytest.raises(InputError, match="holds a run and is left as it is"):
+        run(scene_of("rested"), tmp_path)
+    assert (tmp_path / "run.json").read_text() == "{}"
     assert not kind.built
 
 

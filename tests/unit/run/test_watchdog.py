@@ -141,12 +141,12 @@ def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
 def test_a_single_sphere_that_is_outside_is_seen(where: tuple[float, float, float]) -> None:
     state = healthy()
     spheres = np.repeat(state.positions[:, None], 7, axis=1)
-    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
     spheres[2, 3] = [0.05, 0.0, 0.1001]  # over the rim: allowed for a barb
-    WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+    WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
     spheres[2, 3] = where
     with pytest.raises(RunError, match=r"1 smarticle\(s\) \(2\): left through the wall or the floor"):
-        WATCHDOG.check(state, floor=0.0, time=1.25, spheres=spheres)
+        WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
 
 
 def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:

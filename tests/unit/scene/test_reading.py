@@ -33,13 +33,55 @@ def test_container_narrower_than_a_smarticle(scene_data: SceneData) -> None:
     small({"container.radius_m": 1.01 * reach})
 
 
-def test_several_errors_show_the_first_and_how_many_more(scene_data: SceneData) -> None:
+def test_several_errors_are_told_together(scene_data: SceneData) -> None:
     with pytest.raises(InputError) as caught:
         parse_scene(scene_data({"seed": -1, "count": 0}), source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: seed: -1 is out of range; use at least 0 (and 1 more)"
+    both = "seed: -1 is out of range; use at least 0; also count: 0 is out of range; use at least 1"
+    assert str(caught.value) == f"bad.yaml: {both}"
+    with pytest.raises(InputError) as caught:
+        parse_scene(
+            scene_data({"seed": -1, "count": 0, "name": 5, "gravity_m_per_s2": -1, "engine": "abacus"}),
+            source="bad.yaml",
+        )
+    assert str(caught.value).endswith("; also seed: -1 is out of range; use at least 0 (and 2 more)")
+    assert str(caught.value).count("; also ") == 2
 
 
-@pytest.mark.parametrize(("data", "kind"), [([1], "list"), ("text", "str"), (3, "int")], ids=["list", "text", "3"])
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"engine": "yad"}, "engine: 'yad' is not known; did you mean 'yade'?"),
+        ({"fidelity": "standart"}, "fidelity: unknown fidelity 'standart'; did you mean 'standard'?"),
+        ({"phases.1.type": "relaks"}, "phases.1.type: 'relaks' is not known; did you mean 'relax'?"),
+        ({"motor": {"law": "servoo"}}, "motor.law: 'servoo' is not known; did you mean 'servo'?"),
+        ({"motor": {"law": "x"}}, "motor.law: 'x' is not known; use 'halt', 'stall', 'ease', 'slip' or 'servo'"),
+    ],
+)
+def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_scene(scene_data(changes), source="bad.yaml")
+    assert str(caught.value) == f"bad.yaml: {told}"
+
+
+@pytest.mark.parametrize(
+    ("text", "way_out"),
+    [
+        ("twenty", "write it in digits"),
+        ("1:30", "write it in digits"),
+        ("20", "leave out the quotes"),
+        ("1e3", "leave out the quotes"),
+        ("3 h", "leave out the unit, which the key names"),
+        ("2.5mm", "leave out the unit, which the key names"),
+        ("0,5", "write 0.5, with a point"),
+    ],
+)
+def test_text_where_a_number_is_wanted_is_told_what_it_lacks(scene_data: SceneData, text: str, way_out: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_scene(scene_data({"phases.1.duration_s": text}), source="bad.yaml")
+    assert str(caught.value) == f"bad.yaml: phases.1.duration_s: got the text {text!r}, expected a number; {way_out}"
+
+
+@pytest.mark.parametrize(("data", "kind"), [([1], "[1]"), ("text", "'text'"), (3, "3")], ids=["list", "text", "3"])
 def test_file_that_is_no_mapping(data: Any, kind: str) -> None:
     with pytest.raises(InputError) as caught:
         parse_scene(data, source="bad.yaml")
@@ -51,7 +93,7 @@ def test_missing_key(scene_data: SceneData) -> None:
     del data["seed"]
     with pytest.raises(InputError) as caught:
         parse_scene(data, source="bad.yaml")
-    assert str(caught.value) == "bad.yaml: seed: missing; it has no default"
+    assert str(caught.value) == "bad.yaml: seed: missing; it has no default, see `smarticles schema`"
 
 
 def refused(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
@@ -66,15 +108,22 @@ def refused(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -
 
 
 def test_key_given_twice(tmp_path: Path) -> None:
-    assert refused(tmp_path, GOOD + "seed: 2\n").startswith("bad.yaml: not valid YAML: key 'seed' is given twice")
+    line = GOOD.count("\n") + 1
+    told = f"bad.yaml, line {line}, column 1: not valid YAML: key 'seed' is given twice; keep one of the two"
+    assert refused(tmp_path, GOOD + "seed: 2\n") == told
     nested = GOOD + "smarticle: {aspect_ratio: 0.4, aspect_ratio: 0.7}\n"
     assert "key 'aspect_ratio' is given twice" in refused(tmp_path, nested)
 
 
 def test_file_that_is_no_yaml(tmp_path: Path) -> None:
     message = refused(tmp_path, "a: [1\nb")
-    assert message.startswith("bad.yaml: not valid YAML: while parsing a flow sequence")
-    assert "line 2" in message
+    assert message.startswith("bad.yaml, line 2, column 2: not valid YAML: expected ',' or ']'")
+    assert message.endswith("; correct this line")
+    for tabbed in (GOOD + "\tname: x\n", GOOD + "name:\tx\n", GOOD + "motor:\n\tlaw: slip\n"):
+        line = tabbed[: tabbed.index("\t")].count("\n") + 1
+        told = refused(tmp_path, tabbed)
+        assert told.startswith(f"bad.yaml, line {line}, column ")
+        assert told.endswith(": not valid YAML: a tab; YAML is indented and spaced by blanks")
     assert "could not determine a constructor" in refused(tmp_path, GOOD + "name: !!python/object:os.system x\n")
 
 
@@ -91,7 +140,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError) as caught:
         load_scene(tmp_path)
-    assert str(caught.value) == f"{tmp_path}: cannot be read (Is a directory); give the path of a scene file"
+    assert str(caught.value) == f"{tmp_path}: is a directory; give the path of a scene file"
 
 
 @pytest.mark.parametrize(
@@ -117,11 +166,14 @@ def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
 
 
 def test_nested_too_deeply(tmp_path: Path) -> None:
-    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read"
+    assert refused(tmp_path, "[" * 5000) == "bad.yaml: not valid YAML: nested too deeply to read; correct the file"
 
 
 def test_impossible_date(tmp_path: Path) -> None:
-    assert refused(tmp_path, GOOD + "name: 2020-99-99\n") == "bad.yaml: not valid YAML: month must be in 1..12"
+    assert (
+        refused(tmp_path, GOOD + "name: 2020-99-99\n")
+        == "bad.yaml: not valid YAML: month must be in 1..12; correct the file"
+    )
     assert refused(tmp_path, GOOD, ["name=2020-99-99"]) == "--set name=2020-99-99: the value is not valid YAML"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dem.scene.refusal import unit_of
+from dem.refusal import unit_of
 
 
 @pytest.mark.parametrize(

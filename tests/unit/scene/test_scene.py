@@ -133,6 +133,14 @@ def test_dump_survives_the_file(tmp_path: Path) -> None:
     assert load_scene(write(tmp_path, dump_scene(scene))) == scene
 
 
+def test_what_a_shake_moves_is_neither_written_nor_hashed_where_it_is_the_container() -> None:
+    plain, named, alone = small(), small({"phases.2.moves": "container"}), small({"phases.2.moves": "floor"})
+    assert "moves" not in dump_scene(named)
+    assert scene_hash(named) == scene_hash(plain) == PLAIN_HASH
+    assert scene_hash(alone) != scene_hash(plain)
+    assert parse_scene(yaml.safe_load(dump_scene(alone)), source="dump") == alone
+
+
 def test_hash_is_stable_over_notation_and_sensitive_to_everything(scene_data: SceneData) -> None:
     scene = small()
     assert re.fullmatch(r"[0-9a-f]{64}", scene_hash(scene))

@@ -310,7 +310,7 @@ def test_from_the_second_time_on_a_sequence_is_periodic(data: dict[str, Any], st
             "steps.0: sequence has no end; give it a finite repeat, as each step but the last needs one",
         ),
         ({"type": "hold", "to_deg": 3}, "unknown key 'to_deg'; known keys: type, duration_s"),
-        (sine(duration_s="4"), "duration_s: got the text '4', expected a number; leave out the quotes and the unit"),
+        (sine(duration_s="4"), "duration_s: got the text '4', expected a number; leave out the quotes"),
     ],
 )
 def test_refused(data: dict[str, Any], message: str) -> None:

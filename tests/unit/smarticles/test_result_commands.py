@@ -6,6 +6,7 @@ import csv
 import json
 from pathlib import Path
 
+import pytest
 from command_cases import Smarticles, WriteRun
 from PIL import Image
 
@@ -95,6 +96,92 @@ def test_measure_of_nothing_is_status_2(tmp_path: Path, smarticles: Smarticles) 
     assert said.status == 2
     assert said.err.startswith("smarticles: error: ")
     assert "absent" in said.err
+
+
+def test_a_frame_that_is_cut_off_has_a_way_out_that_works(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a")
+    frame, listed = run / "frames" / "frame_000003.vtu", run / "frames.pvd"
+    frame.write_bytes(frame.read_bytes()[:500])
+    said = smarticles("measure", run)
+    assert (said.status, said.out) == (2, "")
+    assert f"cannot read frame {frame}: truncated" in said.err
+    assert f"remove its line from {listed} to do without it, or run {run / 'scene.yaml'} anew elsewhere" in said.err
+    listed.write_text("\n".join(line for line in listed.read_text().splitlines() if frame.name not in line))
+    rows = json.loads(smarticles("measure", run, "--frames", "--json").out)
+    assert len(rows) == 15
+
+
+def test_measure_tells_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    assert smarticles("measure", run).err == ""
+    (run / "series.h5").unlink()
+    said = smarticles("measure", run, "--json")
+    assert said.status == 0
+    assert len(json.loads(said.out)) == 4
+    (line,) = said.err.splitlines()
+    assert line.startswith(f"smarticles: warning: {run / 'series.h5'}: is gone, although the run is done, ")
+    assert "put it back, or run" in line
+
+
+def test_render_names_the_kinds_of_files(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a", frames_per_phase=1)
+    said = smarticles("render", run, "--output", tmp_path / "film.avi")
+    assert said.status == 2
+    assert "'.avi' is no kind of file that is drawn here; end the name in .png for a picture" in said.err
+    assert ".gif, .webp, .mp4 for a film" in said.err
+
+
+def test_a_picture_that_is_there_hides_no_bad_option(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", frames_per_phase=1)
+    (run / "render.png").write_text("mine")
+    for options, told in (
+        (["--view", "nope"], "view 'nope': is not known; known: front"),
+        (["--time", "99"], "time must be between"),
+        (["--color-by", "sped"], "did you mean 'speed'?"),
+        (
+            [],
+            "render.png: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)",
+        ),
+    ):
+        said = smarticles("render", run, *options)
+        assert said.status == 2
+        assert told in said.err
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("render", "it is a sweep; give one of its runs, "),
+        ("measure", "no run of this sweep has frames yet; start them with: smarticles resume"),
+    ],
+)
+def test_a_sweep_where_a_run_is_wanted(
+    command: str, told: str, tmp_path: Path, sweep_file: Path, smarticles: Smarticles
+) -> None:
+    smarticles("sweep", sweep_file, "--out", tmp_path / "out")
+    said = smarticles(command, tmp_path / "out")
+    assert said.status == 2
+    assert told in said.err
+
+
+@pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
+def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, smarticles: Smarticles) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "note.txt").write_text("x")
+    both = command in ("status", "resume")
+    for name, told in (
+        ("photos", "holds neither a run (run.json) nor a sweep (sweep.json)" if both else "it holds no run.json"),
+        ("note.txt", "is a file"),
+        ("absent", "no such directory"),
+    ):
+        said = smarticles(command, tmp_path / name)
+        assert said.status == 2
+        assert told in said.err
+        assert "; give the directory of a run" in said.err
 
 
 def test_render_refuses_a_time_for_a_film(tmp_path: Path, smarticles: Smarticles) -> None:

@@ -80,7 +80,7 @@ def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> No
     sweep_file.write_text(SWEEP.replace("grid", "gird"))
     said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out")
     assert said.status == 2
-    assert said.err == (f"smarticles: error: {sweep_file}: points.gird: unknown key; did you mean 'grid'?\n")
+    assert said.err == (f"smarticles: error: {sweep_file}: points: unknown key 'gird'; did you mean 'grid'?\n")
     assert not (sweep_file.parent / "out").exists()
 
 
@@ -124,7 +124,9 @@ def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
 def test_status_of_something_else_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("status", tmp_path)
     assert said.status == 2
-    assert said.err.startswith(f"smarticles: error: {tmp_path}: holds no sweep.json; ")
+    assert said.err.startswith(
+        f"smarticles: error: {tmp_path}: holds neither a run (run.json) nor a sweep (sweep.json); "
+    )
 
 
 def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:

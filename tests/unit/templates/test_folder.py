@@ -125,7 +125,9 @@ def test_a_damaged_manifest_is_an_input_error(tmp_path: Path, text: str) -> None
 
 
 def test_no_manifest_is_an_input_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"holds no sweep.json; give the directory that"):
+    with pytest.raises(
+        InputError, match=r"holds neither a run \(run.json\) nor a sweep \(sweep.json\); give the directory of"
+    ):
         open_folder(tmp_path)
 
 

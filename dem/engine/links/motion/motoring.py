@@ -1,6 +1,6 @@
 """Motors in the kernels: what they measure, what they prescribe, and what they exert.
 
-Halt and stall are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
+Halt, stall and ease are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
 mean torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle:
 τ = dp/dt - ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look
 the rate jumps at once, by no more than what τ_max alone would give to a free barb in the period (`acceleration`): a
@@ -35,8 +35,9 @@ from dem.engine.links.motion.planar import (
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
 
-HALT, STALL = range(2)
+HALT, STALL, EASE = range(3)
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
+EASED, PATIENCE = 0.5, 20  # of the speed at τ_max; findings in a row, of both barbs, after which a motor stops
 ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the turn in a step
 
 
@@ -152,16 +153,24 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
 
 @inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
-    """Rate of an angle in the period that begins, for motors that halt or stall; `halted` is written."""
+    """Rate of an angle in the period that begins, for motors that halt, stall or ease; `halted` is written."""
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
     behind = motors.schedule[i, k] - bodies.alpha[i, k]
     # Catch up as fast as can be braked in time; what the schedule does meanwhile comes on top.
     catch_up = min(abs(behind) / interval, math.sqrt(2 * BRAKING * most * abs(behind)))
     rate = (target - motors.schedule[i, k]) / interval + math.copysign(catch_up, behind)
-    rate = min(motors.speed, max(-motors.speed, rate))
-    rate = min(before + most * interval, max(before - most * interval, rate))
     torque = motors.torque[i, k]
-    halted = abs(torque) >= motors.limit[i, k] and (motors.law == STALL or rate * torque > 0.0)
+    over, speed = abs(torque) >= motors.limit[i, k], motors.speed
+    if motors.law == EASE:
+        motors.over[i] = motors.over[i] + 1 if over else 0
+        if over:
+            speed = EASED * motors.speed
+    rate = min(speed, max(-speed, rate))
+    rate = min(before + most * interval, max(before - most * interval, rate))
+    if motors.law == EASE:
+        halted = over and motors.over[i] >= PATIENCE
+    else:
+        halted = over and (motors.law == STALL or rate * torque > 0.0)
     motors.halted[i, k] = halted
     return 0.0 if halted else rate
 

@@ -9,7 +9,7 @@ from dem.engine.links.compiler import inlined, kernel
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.shape import Shape
 
-SLIP = 2  # laws of motors from here on leave the angles free
+SLIP = 3  # laws of motors from here on leave the angles free
 
 
 @inlined

@@ -197,19 +197,23 @@ def test_default_output_lies_in_the_run_directory_and_is_not_overwritten(tmp_pat
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"color_by": "mood"}, r"color_by must be one of crossings, .*: got 'mood'"),
-        ({"view": "below"}, r"view must be one of front, oblique, top: got 'below'"),
+        ({"color_by": "mood"}, r"colour by 'mood': is not known; known: crossings, "),
+        ({"view": "below"}, r"view 'below': is not known; known: front, oblique, top"),
         ({"size": (100, 400)}, r"size must be 200 to 8000 pixels each way: got 100 x 400"),
         ({"time": 99.0}, r"time must be between 0\.5 s and 22 s, the run's frames: got 99 s"),
         ({"output": "a.jpg"}, r"a\.jpg: the output must end in \.png: got '\.jpg'"),
+        ({"color_by": "crosings"}, r"colour by 'crosings': is not known; did you mean 'crossings'\?"),
         ({"output": "nowhere/a.png"}, r"the folder nowhere does not exist"),
     ],
 )
 def test_bad_input_is_named(run, wrong, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # A picture that is there hides nothing of what else is wrong.
+    (tmp_path / "there.png").write_text("mine")
+    wrong = {"output": "there.png", **wrong}
     with pytest.raises(InputError, match=message):
         render_run(run, **{"output": "a.png", "size": SIZE, **wrong})
-    assert list(tmp_path.iterdir()) == []
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 def test_run_without_frames_is_refused(tmp_path):
@@ -265,7 +269,7 @@ def test_failed_film_leaves_nothing_behind(run, tmp_path, monkeypatch):
     monkeypatch.setattr(film, "write_film", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         render_film(run, tmp_path / "a.gif", size=SIZE, most_frames=2)
-    assert list(tmp_path.iterdir()) == []
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 # Scales

@@ -1,43 +1,53 @@
-"""What is wrong with a scene that pydantic refuses: one line with key, value with its unit, and the way out."""
+"""What is wrong with a file that pydantic refuses: one line with key, value with its unit, and the way out."""
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
+from dem.errors import shown
+
 # Words that may end a key, and how the unit that they spell is written.
 _UNITS = {
     **{word: word for word in ("m", "s", "g", "w", "N", "kg", "rad", "deg")},
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
+_OF_A_KEY = "[key]"  # how pydantic ends the place of a key that is wrong itself
+_QUOTED = re.compile(r"'([^']*)'")
 # A message that begins with a key is about that key, below the place that pydantic tells.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
-_MOST = 60  # characters of a value that are shown
+_LONGEST_KEY = 60  # characters of a key that are shown
+_MOST_ERRORS = 3  # that are told at once; who made more reads the file again anyway
 
 
-def first_line(error: ValidationError, data: Any) -> str:
-    """The first of pydantic's errors as `key: value and what is wrong with it; way out`, and how many more there are.
+def refusals(error: ValidationError, data: Any, *, described: str) -> str:
+    """Pydantic's errors as `key: value and what is wrong with it; way out`, the first few of them in one line.
 
     Args:
         error: what pydantic found.
         data: what it was given.
+        described: where the keys are described, for one that is missing.
     """
-    # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
-    # Nor is a list too short whose items are there, but wrong.
-    errors = [
-        found
-        for found in error.errors()
-        if found["type"] != "default_factory_not_called" and not (found["type"] == "too_short" and found["input"])
-    ]
-    first = errors[0]
-    place = _key(first["loc"], data)
-    text = _text(first["type"], first["msg"], first["input"], first.get("ctx", {}), unit_of(place))
-    if place:
-        place += "." if _OWN_KEY.match(text) else ": "
-    return place + text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
+    told: dict[str, str] = {}
+    for found in error.errors(include_url=False):
+        # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
+        # Nor is a list too short whose items are there, but wrong.
+        if found["type"] == "default_factory_not_called" or (found["type"] == "too_short" and found["input"]):
+            continue
+        place = _key(found["loc"], data)
+        text = _text(found["type"], found["msg"], found["input"], found.get("ctx", {}), unit_of(place))
+        if found["type"] == "missing":
+            text += f", see {described}"
+        if place:
+            place += "." if _OWN_KEY.match(text) else ": "
+        told.setdefault(place, text)  # of one value, what was found first
+    lines = [place + text for place, text in told.items()]
+    more = f" (and {len(lines) - _MOST_ERRORS} more)" if len(lines) > _MOST_ERRORS else ""
+    return "; also ".join(lines[:_MOST_ERRORS]) + more
 
 
 def unit_of(key: str) -> str:
@@ -54,19 +64,22 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
     """What is wrong with a value and what to do about it; `kind`, `message` and `context` are pydantic's."""
     if kind in _BOUNDS:
         name, words = _BOUNDS[kind]
-        return f"{_shown(value)} {unit}".rstrip() + f" is out of range; use {words} {context[name]:g} {unit}".rstrip()
+        return f"{shown(value)} {unit}".rstrip() + f" is out of range; use {words} {context[name]:g} {unit}".rstrip()
     if kind in _TOLD:
-        return _TOLD[kind](_shown(value), value, context, unit)
+        return _TOLD[kind](shown(value), value, context, unit)
     if kind == "value_error":
         return message.removeprefix("Value error, ")
-    return f"{message[0].lower()}{message[1:]}, got {_shown(value)}"
+    return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
 
 
-def _shown(value: Any) -> str:
-    """A value as YAML would have it."""
-    named = {None: "null", True: "true", False: "false"}
-    text = named[value] if value is None or isinstance(value, bool) else repr(value)
-    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
+def _chosen(value: Any, choices: str) -> str:
+    """The one of the choices that a value is nearly, or all of them; `choices` is pydantic's list of them."""
+    close = difflib.get_close_matches(value, _QUOTED.findall(choices), n=1) if isinstance(value, str) else []
+    return f"did you mean {close[0]!r}?" if close else f"use {choices}"
+
+
+def _not_text(shown: str, value: Any, *_: Any) -> str:
+    return f"{shown} is not text; " + ("write it in quotes" if isinstance(value, int | float) else "write some")
 
 
 def _not_a_number(shown: str, unit: str, what: str = "a number") -> str:
@@ -93,19 +106,20 @@ _TOLD: Mapping[str, Callable[[str, Any, Mapping[str, Any], str], str]] = {
     "int_parsing_size": lambda shown, *_: f"{shown} is out of range; use a smaller one",
     "bool_type": lambda shown, *_: f"{shown} is neither true nor false; use one of them",
     "bool_parsing": lambda shown, *_: f"{shown} is neither true nor false; use one of them",
-    "string_type": lambda shown, *_: f"{shown} is not text; write it in quotes",
+    "string_type": _not_text,
     "string_too_short": lambda shown, _v, context, _u: (
         f"{shown} is too short; use {context['min_length']} or more characters"
     ),
     "string_too_long": lambda shown, value, context, _u: (
         f"{shown} has {len(value)} characters; use at most {context['max_length']}"
     ),
-    "literal_error": lambda shown, _v, context, _u: f"{shown} is not known; use {context['expected']}",
+    "literal_error": lambda shown, value, context, _u: f"{shown} is not known; {_chosen(value, context['expected'])}",
     "too_short": lambda _s, _v, context, _u: f"an empty list; give at least {_items(context['min_length'])}",
     "too_long": lambda shown, value, context, _u: (
         f"{shown} has {_items(len(value))}; give at most {_items(context['max_length'])}"
     ),
     "tuple_type": lambda shown, *_: f"{shown} is not a list; write its items in brackets, [ … ]",
+    "list_type": lambda shown, *_: f"{shown} is not a list; write its items in brackets, [ … ]",
     "dict_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{key: value}}",
     "model_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{key: value}}",
     "model_attributes_type": lambda shown, *_: f"{shown} is not keys and values; write them as {{type: …}}",
@@ -113,7 +127,7 @@ _TOLD: Mapping[str, Callable[[str, Any, Mapping[str, Any], str], str]] = {
         f"type: missing in {shown}; write which one it is, see `smarticles schema`"
     ),
     "union_tag_invalid": lambda _s, _v, context, _u: (
-        f"type: {context['tag']!r} is not known; known: {context['expected_tags']}"
+        f"type: {shown(context['tag'])} is not known; {_chosen(context['tag'], context['expected_tags'])}"
     ),
 }
 
@@ -127,7 +141,9 @@ def _key(steps: Sequence[int | str], data: Any) -> str:
     for step in steps:
         if isinstance(here, Mapping) and step not in here and here.get("type") == step:
             continue
-        keys.append(str(step))
+        if step == _OF_A_KEY:
+            continue
+        keys.append(str(step) if len(str(step)) <= _LONGEST_KEY else f"{str(step)[:_LONGEST_KEY]}…")
         if isinstance(here, Mapping):
             here = here.get(step)
         elif isinstance(here, list) and isinstance(step, int):

@@ -1,0 +1,334 @@
+"""Whatever a scene file says, reading and planning it ends within a second: in a plan, or in one clear line.
+
+Scenes are the shipped ones with any value in any place, keys dropped, added and nested, and scenes made from the JSON
+schema. `ANY_SCENES=20000 pytest tests/unit/plan/test_any_scene.py` tries so many of each kind instead of a few hundred.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scenes import CHAIN, SMALL, changed
+
+from dem.errors import InputError
+from dem.plan.outlook import plan
+from dem.scene.reading import dump_scene, json_schema
+from smarticles.scenes import read_scene
+from templates.sweep.expand import expand
+from templates.sweep.sweep_file import load_sweep
+
+STUDIES = Path(__file__).resolve().parents[3] / "studies"
+# As many as 20 s are enough for on a busy machine; 0.01 s each, and what hypothesis itself takes.
+TRIED = int(os.environ.get("ANY_SCENES", "200"))
+MOST_S = 1.0  # of processor time
+MOST_CHARACTERS = 1500  # of a line; three errors with long lists of choices have 1000
+ENOUGH = settings(
+    max_examples=TRIED,
+    derandomize="ANY_SCENES" not in os.environ,
+    suppress_health_check=list(HealthCheck),
+    database=None,
+)
+
+Place = tuple[str | int, ...]
+
+
+def shipped() -> list[dict[str, Any]]:
+    """Scenes of all shipped sweeps, every default written out, and small ones that leave most of them out."""
+    sweeps = sorted(STUDIES.rglob("*.quick.yaml"))
+    assert len(sweeps) > 5
+    points = [point for sweep in sweeps for point in expand(load_sweep(sweep))[::3]]
+    sine = {"type": "sine", "centre_deg": 90, "amplitude_deg": 5, "frequency_hz": 3}
+    ramp = {"type": "ramp", "to_deg": 0, "duration_s": 0.5}
+    swings = {"type": "sequence", "steps": [ramp, {"type": "return", "duration_s": 0.5}], "repeat": 3}
+    both = {"type": "actuate", "barb_1": sine, "barb_2": swings, "duration_s": 2}
+    tiers = [{"radius_m": 0.0234, "height_m": 0.05}, {"radius_m": 0.02, "height_m": 0.1}]
+    return [
+        *(yaml.safe_load(dump_scene(point.scene)) for point in points),
+        *(SMALL, CHAIN),
+        changed(SMALL, {"phases.1": both, "phases.2": {"type": "internal-oscillation", "theta_deg": 10}}),
+        changed(SMALL, {"hooks": {}, "phases.2": {"type": "pull-hook"}}),
+        changed(SMALL, {"container": {"tiers": tiers}, "phases.2": {"type": "remove-container"}, "engine": "links"}),
+    ]
+
+
+SCHEMA = json_schema()
+NUMBERS = st.one_of(
+    st.sampled_from([0, -0.0, 1, -1, 5e-324, 1e-300, 1e-30, 1e-9, 1e9, 1e30, 1e300, 1.7e308, -1e300, 10**30, 10**400]),
+    st.sampled_from([math.nan, math.inf, -math.inf, 2**31, 2**53 + 1, 2**63, 2**64]),
+    st.floats(),
+    st.integers(),
+    st.integers(-320, 308).map(lambda power: float(f"1e{power}")),
+)
+TEXTS = st.one_of(
+    st.sampled_from(
+        ["", " ", "0.4", "1 s", "1e3", "0,5", "true", "null", "yade", "deposit", "draft", "\n", "a\nb", "\x00"]
+    ),
+    st.sampled_from(["{{ 7 * 7 }}", "$(reboot)", "'; rm -rf / #", "../../etc/passwd", "<script>", "%s%n", "☃" * 200]),
+    st.sampled_from(["\ud800", "\u2028", "\x85", "\u202e", "x" * 2000]),
+    st.text(max_size=20),
+)
+ATOMS = st.one_of(st.none(), st.booleans(), NUMBERS, TEXTS, st.dates())
+ANYTHING = st.recursive(
+    ATOMS,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.one_of(TEXTS, NUMBERS), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+def from_schema(node: dict[str, Any], depth: int = 0) -> st.SearchStrategy[Any]:
+    """What a part of the schema allows."""
+    if "$ref" in node:
+        if depth > 6:  # motions hold motions
+            return st.just({"type": "hold", "duration_s": 1.0})
+        node = SCHEMA["$defs"][node["$ref"].rpartition("/")[2]]
+    choices = [from_schema(one, depth + 1) for several in ("anyOf", "oneOf") for one in node.get(several, ())]
+    choices += [st.just(value) for value in [*node.get("enum", ()), *([node["const"]] if "const" in node else [])]]
+    return st.one_of(choices) if choices else OF_TYPE.get(node.get("type"), lambda *_: ANYTHING)(node, depth)
+
+
+def _object(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
+    needed = node.get("required", [])
+    parts = {key: from_schema(value, depth + 1) for key, value in node.get("properties", {}).items()}
+    optional = {key: part for key, part in parts.items() if key not in needed}
+    return st.fixed_dictionaries({key: parts[key] for key in needed}, optional=optional)
+
+
+def _array(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
+    items = [from_schema(one, depth + 1) for one in node.get("prefixItems", [])]
+    return st.tuples(*items).map(list) if items else st.lists(from_schema(node["items"], depth + 1), max_size=3)
+
+
+def _number(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
+    low, high = node.get("minimum", -1e6), node.get("maximum", node.get("exclusiveMaximum", 1e6))
+    if node["type"] == "integer":
+        return st.integers(int(low), int(high))
+    within = st.floats(low, high) | st.floats(low, max(low, min(1.0, high)))
+    return within if node.get("default") is None else within | st.just(node["default"])
+
+
+OF_TYPE: dict[Any, Callable[[dict[str, Any], int], st.SearchStrategy[Any]]] = {
+    "object": _object,
+    "array": _array,
+    "number": _number,
+    "integer": _number,
+    "boolean": lambda *_: st.booleans(),
+    "string": lambda *_: st.text(max_size=10),
+    "null": lambda *_: st.none(),
+}
+PARTS = [(set(part.get("properties", {})), part) for part in [SCHEMA, *SCHEMA["$defs"].values()]]
+KEYS = sorted({key for keys, _ in PARTS for key in keys})
+
+
+def places(data: Any, here: Place = ()) -> Iterator[Place]:
+    """The places of all values below."""
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        yield (*here, key)
+        yield from places(value, (*here, key))
+
+
+def value_at(data: Any, place: Place) -> Any:
+    for step in place:
+        data = data[step]
+    return data
+
+
+@st.composite
+def broken(draw: st.DrawFn) -> Any:
+    """A shipped scene with one to three things done to it."""
+    data = deepcopy(draw(st.sampled_from(SHIPPED)))
+    for _ in range(draw(st.integers(1, 3))):
+        found = list(places(data))
+        if not found:
+            return data
+        *above, last = draw(st.sampled_from(found))
+        parent = value_at(data, tuple(above))
+        what = draw(
+            st.sampled_from(["put", "put", "scale", "scale", "drop", "add", "nest", "twice", "of another", "schema"])
+        )
+        value = parent[last]
+        if what == "drop":
+            del parent[last]
+        elif what == "scale" and isinstance(value, int | float) and not isinstance(value, bool):
+            factor = draw(
+                st.sampled_from([-1.0, 0.5, 0.999, 1.001, 2.0]) | st.integers(-320, 308).map(lambda p: 10.0**p)
+            )
+            parent[last] = type(value)(value * factor) if math.isfinite(value * factor) else value * factor
+        elif what == "add" and isinstance(parent, dict):
+            parent[draw(st.sampled_from(KEYS) | TEXTS)] = draw(ANYTHING)
+        elif what == "nest":
+            parent[last] = draw(st.sampled_from([[value], {last: value}, [value, value], {"type": value}]))
+        elif what == "twice" and isinstance(parent, list):
+            parent.append(deepcopy(value))
+        elif what == "of another":
+            other = draw(st.sampled_from(SHIPPED))
+            parent[last] = deepcopy(value_at(other, draw(st.sampled_from(list(places(other))))))
+        elif what == "schema":
+            fitting = [part for keys, part in PARTS if last in keys]
+            if fitting:
+                parent[last] = draw(from_schema(draw(st.sampled_from(fitting))["properties"][last], depth=3))
+        else:
+            parent[last] = draw(ANYTHING)
+    return data
+
+
+SHIPPED = shipped()
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Stops what takes more processor time: a search that never ends must not hold up the tests."""
+
+    def late(*_: object) -> None:
+        msg = f"still at it after {seconds:g} s of processor time"
+        raise TimeoutError(msg)
+
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def read_and_plan(text: str, folder: Path) -> str | None:
+    """The line with which a scene is refused; None where it is planned."""
+    file = folder / "scene.yaml"
+    file.write_text(text, encoding="utf-8")
+    begun = time.process_time()
+    try:
+        with at_most(5 * MOST_S):
+            planned = plan(read_scene(file, []))
+            told = planned.to_text()
+            json.dumps(planned.to_dict(), allow_nan=False)
+    except InputError as error:
+        line = str(error)
+        assert len(line.splitlines()) == 1, line
+        assert line.startswith(str(file)), line
+        assert len(line) <= MOST_CHARACTERS, line
+        return line
+    finally:
+        took = time.process_time() - begun
+        assert took <= MOST_S, f"took {took:.2f} s"
+    assert not {"nan", "inf"} & set(told.replace(",", " ").split()), told
+    return None
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scenes")
+
+
+def as_yaml(data: Any) -> str:
+    """The data as a file; text that YAML cannot hold is left out, as nobody can write it there."""
+    try:
+        return str(yaml.safe_dump(data, allow_unicode=True, sort_keys=False)).encode("utf-8", "replace").decode()
+    except yaml.YAMLError:
+        return "phases: 3"
+
+
+def numbers(node: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every number of the schema with its place."""
+    if isinstance(node, dict):
+        if node.get("type") in ("number", "integer"):
+            yield place, node
+        for key, value in node.items():
+            yield from numbers(value, f"{place}.{key}")
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from numbers(value, f"{place}.{index}")
+
+
+def test_every_number_states_its_range() -> None:
+    found = {place: node for place, node in numbers(SCHEMA) if "const" not in node and "prefixItems" not in place}
+    assert len(found) > 60
+    low, high = {"minimum", "exclusiveMinimum"}, {"maximum", "exclusiveMaximum"}
+    assert [place for place, node in found.items() if not (low & node.keys() and high & node.keys())] == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"phases.2.frequency_hz": 1e-300}, "phases.2.frequency_hz: 1e-300 Hz is out of range; use at least 0.01 Hz"),
+        ({"phases.2.duration_s": 1e7}, "phases.2.duration_s: 10000000.0 s is out of range; use at most 1e+06 s"),
+        (
+            {"gravity_m_per_s2": 1e-300},
+            "gravity_m_per_s2: 1e-300 m/s² is out of range; use 0 m/s² or at least 1e-06 m/s²",
+        ),
+        (
+            {"smarticle.middle_length_m": 1e-9},
+            "smarticle.middle_length_m: 1e-09 m is out of range; use at least 1e-06 m",
+        ),
+        (
+            {"motor.speed_limit_rad_per_s": 1e300, "phases.2": {"type": "internal-oscillation", "theta_deg": 10}},
+            "motor.speed_limit_rad_per_s: 1e+300 rad/s is out of range; use at most 10000 rad/s",
+        ),
+    ],
+)
+def test_numbers_that_no_physics_has(changes: dict[str, Any], told: str, folder: Path) -> None:
+    assert read_and_plan(as_yaml(changed(SMALL, changes)), folder) == f"{folder / 'scene.yaml'}: {told}"
+
+
+def test_motors_far_too_quick_and_stiff_are_planned_with_a_warning(folder: Path) -> None:
+    # What fraction of a period to advise was once searched for ever.
+    motor = {"speed_limit_rad_per_s": 1e4, "stiffness_N_m_per_rad": 1e6}
+    data = changed(SMALL, {"motor": motor, "phases.2": {"type": "actuate", "barbs": {"type": "hold"}, "duration_s": 1}})
+    assert read_and_plan(as_yaml(data), folder) is None
+
+
+@pytest.mark.parametrize(("engine", "ratio"), [("yade", 1e-15), ("links", 1e-16)])
+def test_damping_too_small_to_shorten_a_step_is_none(engine: str, ratio: float, folder: Path) -> None:
+    # The stable step is sought between 0 and that without damping, where rounding may leave nothing to be found.
+    swing = {"type": "internal-oscillation", "theta_deg": 10}
+    data = changed(SMALL, {"engine": engine, "contact.tangential_damping_ratio": ratio, "phases.2": swing})
+    assert read_and_plan(as_yaml(data), folder) is None
+
+
+@pytest.mark.parametrize("value", ["x" * 5000, {"x" * 5000: 1}, ["x" * 5000], 10**3000, "a\nb"], ids=range(5))
+@pytest.mark.parametrize("key", ["count", "name", "phases", "phases.1", "phases.1.type", "fidelity", "x" * 500])
+def test_long_values_are_cut_in_messages(key: str, value: Any, folder: Path) -> None:
+    read_and_plan(as_yaml(changed(SMALL, {key: value})), folder)
+
+
+def test_a_number_of_thousands_of_digits(folder: Path) -> None:
+    told = read_and_plan(as_yaml(SMALL).replace("count: 10", "count: 1" + 5000 * "0"), folder)
+    assert told is not None
+    assert told.endswith("scene.yaml: not valid YAML: a whole number of more than 4300 digits; correct the file")
+
+
+def test_shipped_scenes_are_planned(folder: Path) -> None:
+    assert len(SHIPPED) > 30
+    for data in SHIPPED:
+        assert read_and_plan(as_yaml(data), folder) is None
+
+
+@ENOUGH
+@given(data=broken())
+def test_shipped_scenes_with_anything_done_to_them(data: Any, folder: Path) -> None:
+    read_and_plan(as_yaml(data), folder)
+
+
+@ENOUGH
+@given(data=from_schema(SCHEMA))
+def test_scenes_made_from_the_schema(data: Any, folder: Path) -> None:
+    read_and_plan(as_yaml(data), folder)
+
+
+@ENOUGH
+@given(text=st.sampled_from(SHIPPED).map(as_yaml), at=st.integers(0, 3000), inserted=TEXTS, cut=st.integers(0, 200))
+def test_files_cut_and_filled_anywhere(text: str, at: int, inserted: str, cut: int, folder: Path) -> None:
+    inserted = inserted.encode("utf-8", "replace").decode()
+    read_and_plan(text[:at] + inserted + text[at + cut :], folder)
