@@ -190,4 +190,9 @@ def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
 def _legend(figure: Figure, panels: Sequence[Axes]) -> None:
     """One legend of all panels above them: not every panel has everything."""
     shown = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    figure.legend(list(shown.values()), list(shown), loc="outside upper center", ncols=4 if len(shown) == 4 else 3)
+    figure.legend(
+        list(shown.values()),
+        list(shown),
+        loc="outside upper center",
+        ncols=4 if len(shown) == 4 else min(len(panels) + 1, 3),
+    )

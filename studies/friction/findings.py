@@ -12,7 +12,7 @@ from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds, slope_within
 from studies.base.questions import Question, YesNo
 from studies.friction.measure import FRICTION, TIMES
-from studies.friction.steel import AS_IT_COMES, CLEANED, spanned
+from studies.friction.steel import AS_IT_COMES, CLEANED, Published, spanned
 from studies.friction.tables import (
     COMPARED_POINTS,
     CONFIDENCE,
@@ -47,7 +47,8 @@ def answers(
         *(_one_friction(what, verdicts, nearest) for what in JUDGED),
         _papers(verdicts),
         _common(crossings),
-        _steel(crossings),
+        _steel(crossings, "dry steel as it comes", AS_IT_COMES),
+        _steel(crossings, "clean, dry steel", CLEANED),
         *_growing(growth),
     )
 
@@ -127,24 +128,18 @@ def _common(crossings: pd.DataFrame) -> Question:
     return Question(question=question, answer="no", evidence=told)
 
 
-def _steel(crossings: pd.DataFrame) -> Question:
-    question = "Is the friction that phi_f asks for one that is published for dry steel on steel?"
+def _steel(crossings: pd.DataFrame, surface: str, published: tuple[Published, ...]) -> Question:
+    least, most = spanned(published)
+    question = f"Is the friction that phi_f asks for that of {surface} (static, as published: {least:g} to {most:g})?"
     found = _stages(crossings, ("phi_f",))
-    least, most = spanned((*AS_IT_COMES, *CLEANED))
-    as_it_comes, cleaned = spanned(AS_IT_COMES), spanned(CLEANED)
-    published = (
-        f"published static coefficients are {as_it_comes[0]:g} to {as_it_comes[1]:g} for steel as it comes and "
-        f"{cleaned[0]:g} to {cleaned[1]:g} for clean steel: so wide that they exclude little of what was measured, and "
-        f"the paper's {PAPERS:g} is among them too"
-    )
-    told = "; ".join(f"l/w = {row[ASPECT]:g}: {told_crossing(row)}" for _, row in found.iterrows())
     answer: YesNo = "undetermined"
     if len(found) and found[[LOW, HIGH]].notna().all(axis=None):
         if ((found[LOW] >= least) & (found[HIGH] <= most)).all():
             answer = "yes"
         elif ((found[LOW] > most) | (found[HIGH] < least)).any():
             answer = "no"
-    return Question(question=question, answer=answer, evidence=f"{told}; {published}")
+    told = "; ".join(f"l/w = {row[ASPECT]:g}: {told_crossing(row)}" for _, row in found.iterrows())
+    return Question(question=question, answer=answer, evidence=told or "no points of Gravish's at these l/w")
 
 
 def _growing(growth: pd.DataFrame) -> tuple[Question, ...]:
