@@ -1,8 +1,8 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
 Readers take a run directory (see ARCHITECTURE.md); measures are pure functions of NumPy arrays and
-return frozen results. Lengths are in metres, times in seconds. `heights` and `entanglement` are
-functions of the modules of the same name and are imported from there.
+return frozen results. Lengths are in metres, times in seconds. `heights`,
+`entanglement` and `linking` are functions of the modules of the same name and are imported from there.
 """
 
 from dem.record.frame import Frame, read_frame
@@ -11,7 +11,7 @@ from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.contacts import ContactPairs, contact_pairs, neighbours_in_contact
+from postprocess.measures.contacts import ContactPairs, contact_pairs, neighbours_in_contact, touching_pairs
 from postprocess.measures.entanglement import (
     CrossingPairs,
     Entanglement,
@@ -22,7 +22,10 @@ from postprocess.measures.entanglement import (
     linking_pairs,
 )
 from postprocess.measures.heights import Heights, material_height
+from postprocess.measures.linking import Linking, gauss_integral
+from postprocess.measures.nematic import NematicOrder, nematic_order
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
+from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table
 from postprocess.statistics.averages import Mean, mean_with_error
@@ -36,9 +39,12 @@ __all__ = [
     "FrameSequence",
     "Heights",
     "LinkedPairs",
+    "Linking",
     "Mean",
+    "NematicOrder",
     "PackingChange",
     "PackingFraction",
+    "PackingProfile",
     "PhaseRecord",
     "RunManifest",
     "Series",
@@ -46,6 +52,7 @@ __all__ = [
     "centres_of_mass",
     "contact_pairs",
     "crossing_pairs",
+    "gauss_integral",
     "has_plane",
     "link_crossings",
     "linking_pairs",
@@ -53,12 +60,16 @@ __all__ = [
     "mean_with_error",
     "measure_run",
     "neighbours_in_contact",
+    "nematic_order",
     "packing_change",
     "packing_fraction",
+    "packing_profile",
+    "profile_table",
     "read_frame",
     "read_frames",
     "read_run",
     "read_series",
     "summarise_run",
+    "touching_pairs",
     "write_table",
 ]

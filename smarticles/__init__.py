@@ -2,11 +2,12 @@
 
     import smarticles
 
-    scene = smarticles.load_scene("scene.yaml", ["count=50"])
-    smarticles.run(scene, "runs/a")
-    done = smarticles.read("runs/a")
+    scene = smarticles.Scene(seed=1, count=20, fidelity="draft", engine="links", phases=[{"type": "deposit"}])
+    done = smarticles.run(scene, "runs/a")
+    done.series["com_height_m"], done.frames[-1].vertices, done.table()
     smarticles.measures.link_crossings(done.frames[-1].vertices)
-    smarticles.sweep("friction.yaml", "friction")
+    many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
+    many.table(by="aspect_ratio")
 
 The command line is `smarticles.main`. Types of these names are in `__init__.pyi`.
 """
@@ -18,9 +19,11 @@ _HOMES = {
     "InputError": "dem.errors",
     "RunDirectory": "smarticles.public",
     "RunError": "dem.errors",
+    "SweepDirectory": "smarticles.public",
     "Scene": "dem.scene.scene",
     "load_scene": "dem.scene.reading",
     "read": "smarticles.public",
+    "read_sweep": "smarticles.public",
     "run": "smarticles.public",
     "sweep": "smarticles.public",
 }

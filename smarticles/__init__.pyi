@@ -4,7 +4,9 @@ from dem.errors import RunError as RunError
 from dem.scene.reading import load_scene as load_scene
 from dem.scene.scene import Scene as Scene
 from smarticles.public import RunDirectory as RunDirectory
+from smarticles.public import SweepDirectory as SweepDirectory
 from smarticles.public import read as read
+from smarticles.public import read_sweep as read_sweep
 from smarticles.public import run as run
 from smarticles.public import sweep as sweep
 
@@ -13,10 +15,12 @@ __all__ = [
     "RunDirectory",
     "RunError",
     "Scene",
+    "SweepDirectory",
     "__version__",
     "load_scene",
     "measures",
     "read",
+    "read_sweep",
     "run",
     "sweep",
 ]

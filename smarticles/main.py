@@ -15,22 +15,30 @@ from collections.abc import Callable, Sequence
 from dem.errors import InputError, RunError
 from smarticles.commands import (
     accuracy,
+    compare,
     doctor,
+    export,
     measure,
     plan,
     render,
+    report,
     resume,
     run,
-    schema,
+    scene_files,
     status,
     study,
     sweep,
     verify,
+    view,
 )
+from smarticles.completion import add_completion
 from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
-COMMANDS = (run, plan, schema, doctor, measure, render, sweep, status, resume, study, accuracy, verify)
+COMMANDS = (
+    *(scene_files, run, plan, doctor, measure, compare, render, view, export, report),
+    *(sweep, status, resume, study, accuracy, verify),
+)
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
 
 FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
@@ -45,8 +53,12 @@ first steps:
   smarticles doctor                        what is installed, and does it work
   smarticles study gravish --quick --out demo
                                            pour, shake, measure, compare with Gravish: minutes
+  smarticles init                          scene.yaml, small and commented
   smarticles plan scene.yaml               what a run would do and cost
   smarticles run scene.yaml --out run1     do it
+
+completion of commands and options: eval "$(smarticles --completion bash)" in ~/.bashrc; for zsh put
+what --completion zsh prints into a file _smarticles in a folder of $fpath
 
 exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint by SIGUSR1,
 to be continued; 130 stopped by Ctrl-C"""
@@ -62,6 +74,7 @@ def build_parser() -> tuple[Parser, Commands]:
         release = "not installed"
     parser = Parser(prog="smarticles", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"smarticles {release}")
+    add_completion(parser)
     add_debug(parser)
     commands = Commands(parser)
     for module in COMMANDS:

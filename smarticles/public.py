@@ -5,18 +5,27 @@ from __future__ import annotations
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any, overload
+
+import pandas as pd
 
 from dem.errors import InputError, RunError
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess import FrameSequence, RunManifest, Series, read_frames, read_run, read_series
 from smarticles.main import BAD_INPUT
+from smarticles.measuring import grouped, measured
+from smarticles.scene_sweep import write_sweep
 from smarticles.sweeps import complete, make_folder
 from templates.local.runner import environment, smarticles_command
+from templates.sweep.folder import Folder, open_folder
+
+# What the columns of a series of vectors are, by their number.
+_COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
 
 
 @dataclass(frozen=True)
@@ -41,8 +50,81 @@ class RunDirectory:
 
     @cached_property
     def series(self) -> Series:
-        """The recorded time series."""
+        """The recorded time series, as arrays."""
         return read_series(self.path)
+
+    def recorded(self) -> pd.DataFrame:
+        """The recorded time series as a table: one row per sample, units in its column names."""
+        series = self.series
+        columns = {name: series[name] for name in ("time_s", "phase")}
+        for name, values in series.data.items():
+            parts = values[:, None] if values.ndim == 1 else values
+            marks = _COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
+            for mark, part in zip(marks, parts.T, strict=True):
+                columns[f"{name}{mark}"] = part
+        return pd.DataFrame(columns)
+
+    def table(self, *, frames: bool = False) -> pd.DataFrame:
+        """All measures as a table, units in its column names, as `smarticles measure` gives them.
+
+        Args:
+            frames: one row per frame; else one per phase, means over its last frames with their standard errors.
+        """
+        return measured([self.path], frames=frames)
+
+
+@dataclass(frozen=True)
+class SweepDirectory(Sequence[RunDirectory]):
+    """The runs of a sweep in its order, and tables of all of them.
+
+    Args:
+        folder: the sweep's directory.
+    """
+
+    folder: Folder
+
+    @property
+    def path(self) -> Path:
+        """The sweep's directory."""
+        return self.folder.path
+
+    @cached_property
+    def values(self) -> pd.DataFrame:
+        """What the sweep varies: one row per run, by the runs' names."""
+        entries = self.folder.entries
+        return pd.DataFrame([dict(entry.values) for entry in entries], index=[entry.name for entry in entries])
+
+    def __len__(self) -> int:
+        return len(self.folder.entries)
+
+    @overload
+    def __getitem__(self, index: int) -> RunDirectory: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[RunDirectory]: ...
+
+    def __getitem__(self, index: int | slice) -> RunDirectory | list[RunDirectory]:
+        entries = self.folder.entries[index]
+        if isinstance(entries, tuple):
+            return [RunDirectory(self.folder.run(entry)) for entry in entries]
+        return RunDirectory(self.folder.run(entries))
+
+    def table(self, *, by: str | Sequence[str] | None = None, frames: bool = False) -> pd.DataFrame:
+        """All measures of the runs that have begun, with what the sweep varies as columns.
+
+        Args:
+            by: columns, such as variables of the sweep, whose values make a group: then one row per group and phase,
+                means over its runs with "… SE […]", the standard error from run to run.
+            frames: one row per frame; else one per run and phase.
+
+        Raises:
+            InputError: no run has frames yet, there is no such column, or groups of frames are asked for.
+        """
+        if by is not None and frames:
+            msg = "by: averages over phases of runs; leave frames out"
+            raise InputError(msg)
+        table = measured([self.path], frames=frames)
+        return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
 
 def run(scene: Scene | Path | str, out: Path | str, *, threads: int = 1, resume: bool = False) -> RunDirectory:
@@ -86,22 +168,47 @@ def read(directory: Path | str) -> RunDirectory:
     return found
 
 
-def sweep(file: Path | str, out: Path | str, *, jobs: int | None = None) -> Sequence[RunDirectory]:
-    """Expand a sweep file into its directory and run what is missing, on this machine.
+def read_sweep(directory: Path | str) -> SweepDirectory:
+    """A sweep's or a study's directory, its runs done or not.
+
+    Raises:
+        InputError: it is none.
+    """
+    return SweepDirectory(open_folder(Path(directory)))
+
+
+def sweep(
+    what: Scene | Path | str,
+    out: Path | str,
+    *,
+    vary: Mapping[str, Sequence[Any]] | None = None,
+    jobs: int | None = None,
+) -> SweepDirectory:
+    """Run many scenes into one directory on this machine, or what is missing of them.
 
     Args:
-        file: the sweep file.
+        what: a sweep file; or, with `vary`, a scene or the file of one.
         out: the sweep's directory; taken up where it holds this sweep already.
+        vary: keys of the scene, dots for nesting, and the values that each takes: every combination is run. The last
+            word of a key is the variable's name: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} gives
+            columns `aspect_ratio` and `seed`.
         jobs: runs at once; by default one per core.
 
     Returns:
         The runs, in the sweep's order.
 
     Raises:
-        InputError: the sweep is not valid, or the directory holds something else.
+        InputError: a scene or the sweep is not valid, or the directory holds something else.
         RunError: a run failed.
     """
-    again = shlex.join(["smarticles", "sweep", str(file), "--out", str(out), "--submit", "local"])
-    folder = make_folder(Path(file), Path(out), again)
+    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
+        if vary is None and isinstance(what, Scene):
+            msg = "vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}"
+            raise InputError(msg)
+        file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
+        # The scenes of a sweep without a file are in its directory, and `resume` needs no more.
+        words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
+        again = shlex.join(["smarticles", *words])
+        folder = make_folder(file, Path(out), again)
     complete(folder, jobs=jobs, command=again)
-    return [RunDirectory(folder.run(entry)) for entry in folder.entries]
+    return SweepDirectory(folder)

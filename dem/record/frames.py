@@ -15,6 +15,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.errors import InputError
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
@@ -45,7 +46,7 @@ class FrameWriter:
         name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
-        write_text(self.folder / names.collection(self.noun), self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames only, of the given times [s]; later files are removed."""
@@ -53,7 +54,7 @@ class FrameWriter:
         kept = {self.folder / names.member(self.noun, k) for k in range(len(self.times))}
         for path in set((self.folder / names.folder(self.noun)).glob("*.vtu")) - kept:
             path.unlink()
-        write_text(self.folder / names.collection(self.noun), self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def _collection(self) -> str:
         rows = [
@@ -97,6 +98,19 @@ class FrameSequence(Sequence[Frame]):
         if isinstance(index, slice):
             return FrameSequence(self.times[index], self.paths[index])
         return read_frame(self.paths[index])
+
+    def nearest(self, time: float) -> int:
+        """Index of the frame nearest to a time [s].
+
+        Raises:
+            InputError: The time is before the first or after the last frame.
+        """
+        first, last = float(self.times[0]), float(self.times[-1])
+        slack = 1e-9 * max(abs(first), abs(last), 1.0)
+        if not first - slack <= time <= last + slack:
+            msg = f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s"
+            raise InputError(msg)
+        return int(np.argmin(np.abs(self.times - time)))
 
     def in_phase(self, phase: int) -> FrameSequence:
         """The frames of one phase, found by bisection: phases follow each other in time.

@@ -43,6 +43,10 @@ def parse_scene(data: Any, *, source: str) -> Scene:
     if "template" in data and "points" in data:
         msg = f"{source}: is a sweep file, which makes many scenes; give it to `smarticles sweep`"
         raise InputError(msg)
+    if "schema_version" not in data:
+        # A scene made in Python is of this version; a file says of which it is.
+        msg = f"{source}: schema_version: missing; it has no default"
+        raise InputError(msg)
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
         msg = f"{source}: schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
@@ -110,6 +114,8 @@ def scene_hash(scene: Scene) -> str:
 def json_schema() -> dict[str, Any]:
     """JSON schema of the scene file, for editors."""
     schema = Scene.model_json_schema()
+    schema["required"].insert(0, "schema_version")
+    del schema["properties"]["schema_version"]["default"]
     # The file may name a fidelity, or give its base and some knobs; the model that pydantic describes has them all.
     fidelity = schema["properties"]["fidelity"]
     mapping = {"$ref": fidelity.pop("$ref")}

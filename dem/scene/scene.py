@@ -42,7 +42,7 @@ _LEAST_GRAVITY = 1e-6  # m/s²; of a tenth of a micron of rock, and motors that 
 class Scene(Part):
     """One run: everything that decides its result."""
 
-    schema_version: Literal[1] = Field(..., description="version of this format [1]")
+    schema_version: Literal[1] = Field(1, description="version of this format [1]")
     engine: Literal["yade", "links"] = Field("yade", description="what computes it: yade, sphere chains on YADE")
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")

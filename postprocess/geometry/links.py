@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 
@@ -71,6 +72,51 @@ def bounding_spheres(
     centres = vertices.mean(axis=1)
     radii = np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
     return centres, radii
+
+
+def close_pairs(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of smarticles whose bounding spheres overlap: only they can touch, or pass through each other.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+
+    Returns:
+        (P,) the lower and (P,) the higher index of each pair.
+    """
+    if len(vertices) < 2:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    centres, radii = bounding_spheres(vertices)
+    pairs = cKDTree(centres).query_pairs(2 * radii.max(), output_type="ndarray")
+    distance = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1)
+    i, j = pairs[distance < radii[pairs].sum(axis=1)].astype(np.int64).T
+    return i, j
+
+
+def swept_axes(vertices: NDArray[np.float64], diameter: float) -> NDArray[np.float64]:
+    """What a sphere is swept along where engines see a smarticle: tips pulled in by the radius, hinges as they are.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        diameter: Of the sphere [m].
+
+    Returns:
+        (N, 4, 3) [m]; a barb shorter than the radius shrinks to its hinge, a smarticle without barbs is pulled in at
+        the ends of its middle link.
+
+    Source:
+        `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along the same axes.
+    """
+    axes = vertices.copy()
+    lengths = link_lengths(vertices)
+    for tip, hinge, other, link in ((0, 1, 2, 0), (3, 2, 1, 2)):
+        length = lengths[:, link, None]
+        bare = length <= 0
+        axes[:, tip] -= np.minimum(diameter / 2 / np.where(bare, 1.0, length), 1.0) * (axes[:, tip] - axes[:, hinge])
+        inwards = vertices[:, other] - vertices[:, hinge]
+        ends = vertices[:, hinge] + diameter / 2 * inwards / np.maximum(lengths[:, 1, None], 1e-300)
+        axes[:, hinge] = np.where(bare, ends, axes[:, hinge])
+        axes[:, tip] = np.where(bare, ends, axes[:, tip])
+    return axes
 
 
 def plane_frames(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import Voronoi
+from scipy.spatial import QhullError, Voronoi
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
@@ -96,7 +96,11 @@ def local_packing(
     points, owners = points[kept], owners[kept]
     band = 2 * float(bounding_spheres(vertices)[1].max())
     images = _mirrored(points, container, lid, band)
-    cells = _cell_volumes(np.concatenate([points, images]))[: len(points)]
+    try:
+        cells = _cell_volumes(np.concatenate([points, images]))[: len(points)]
+    except QhullError:
+        msg = f"{len(vertices)} smarticles, flat or alone, do not part the container into cells: the pile is too thin"
+        raise UndefinedMeasureError(msg) from None
     volumes = np.zeros(len(vertices))
     np.add.at(volumes, owners, cells)
     total = float(volumes[interior].sum())

@@ -1,4 +1,4 @@
-"""Share of a region that the true boxes of the links fill."""
+"""What the true boxes of the links fill: points of a fine grid inside them, and the share of a region."""
 
 from __future__ import annotations
 
@@ -54,6 +54,42 @@ def solid_fraction(
         InputError: Bad vertices or sizes.
         UndefinedMeasureError: No material in the region.
     """
+    points, pitch = solid_points(
+        vertices,
+        thickness_normal=thickness_normal,
+        thickness_in_plane=thickness_in_plane,
+        pitch=pitch,
+        region=region,
+    )
+    if len(points) == 0:
+        msg = "no material in the inner region of the pile: the pile is too low or too thin there"
+        raise UndefinedMeasureError(msg)
+    return float(len(points) * pitch**3 / region.volume)
+
+
+def solid_points(
+    vertices: ArrayLike,
+    *,
+    thickness_normal: float,
+    thickness_in_plane: float,
+    pitch: float | None = None,
+    region: Region | None = None,
+) -> tuple[NDArray[np.float64], float]:
+    """Points of a cubic grid that lie inside a link's box, each once; a point stands for the cube of the pitch.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        thickness_normal: t1, along the normal of the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m].
+        pitch: Spacing of the points [m]; half the smaller thickness if not given.
+        region: Only points inside it; all if not given.
+
+    Returns:
+        The points (n, 3) [m], and their pitch [m].
+
+    Raises:
+        InputError: Bad vertices or sizes.
+    """
     vertices = checked_vertices(vertices)
     sizes = (thickness_normal, thickness_in_plane)
     pitch = min(sizes) / 2 if pitch is None else pitch
@@ -64,15 +100,13 @@ def solid_fraction(
         )
         raise InputError(msg)
     turn = _odd_rotation()
-    pieces = _Pieces.cut(vertices, thickness_normal, thickness_in_plane).near(region)
+    pieces = _Pieces.cut(vertices, thickness_normal, thickness_in_plane)
+    if region is not None:
+        pieces = pieces.near(region)
     found = [np.empty((0, 3), dtype=np.int64)]
     for indices in pieces.grid_points(turn, pitch):
-        found.append(indices[region.contains(pitch * indices @ turn)])
-    count = _count_distinct(np.concatenate(found))
-    if count == 0:
-        msg = "no material in the inner region of the pile: the pile is too low or too thin there"
-        raise UndefinedMeasureError(msg)
-    return float(count * pitch**3 / region.volume)
+        found.append(indices if region is None else indices[region.contains(pitch * indices @ turn)])
+    return pitch * _distinct(np.concatenate(found)) @ turn, pitch
 
 
 @dataclass(frozen=True)
@@ -156,10 +190,13 @@ def _odd_rotation() -> NDArray[np.float64]:
     )
 
 
-def _count_distinct(indices: NDArray[np.int64]) -> int:
+def _distinct(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, 3), each of (n, 3) indices once."""
     if len(indices) == 0:
-        return 0
+        return indices
     # One number per grid point sorts much faster than rows of three.
-    indices = indices - indices.min(axis=0)
-    keys = np.ravel_multi_index(tuple(indices.T), tuple(indices.max(axis=0) + 1))
-    return len(np.unique(keys))
+    low = indices.min(axis=0)
+    shape = tuple(indices.max(axis=0) - low + 1)
+    keys = np.unique(np.ravel_multi_index(tuple((indices - low).T), shape))
+    distinct: NDArray[np.int64] = np.stack(np.unravel_index(keys, shape), axis=1) + low
+    return distinct

@@ -1,7 +1,8 @@
-"""Which smarticles hang together: connected parts of the graphs of contact and of entanglement."""
+"""Which smarticles hang together: connected parts of the graphs of contact and of entanglement, and what they span."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,10 +10,14 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices
-from postprocess.measures.contacts import contact_pairs
+from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, touching_pairs
 from postprocess.measures.entanglement import crossing_pairs
+from postprocess.measures.heights import material_height
+from postprocess.measures.registry import FrameMeasure, Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -71,6 +76,74 @@ def entanglement_clusters(vertices: ArrayLike) -> Clusters:
     return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
+def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
+    """Smarticles joined by contact as the engine sees them, see `contacts.touching_pairs`.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        diameter: Of the sphere that sweeps the links [m], `RunManifest.sphere_diameter`.
+
+    Returns:
+        The clusters.
+
+    Raises:
+        InputError: Bad vertices or diameter.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    pairs = touching_pairs(vertices, diameter)
+    return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+
+
+def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, floor_z: float) -> bool:
+    """Whether one cluster reaches from the floor to the top of the pile.
+
+    The top is where 95 % of the links' material lie below; alone on top there may be one smarticle.
+
+    Args:
+        clusters: Of the smarticles of a frame.
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        diameter: Of the sphere that sweeps the links [m].
+        floor_z: Height of the floor [m].
+
+    Raises:
+        InputError: Bad vertices.
+
+    Source:
+        Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
+        opposite faces.
+    """
+    vertices = checked_vertices(vertices)
+    top = floor_z + material_height(vertices, floor_z=floor_z)
+    low = clusters.labels[on_floor(vertices, diameter=diameter, floor_z=floor_z)]
+    high = clusters.labels[vertices[..., 2].max(axis=1) >= top]
+    return bool(np.isin(low, high).any())
+
+
+def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wall_radius: float) -> bool:
+    """Whether one cluster reaches from wall to wall: no half of the round wall has all its contacts with the wall.
+
+    Args:
+        clusters: Of the smarticles of a frame.
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        diameter: Of the sphere that sweeps the links [m].
+        wall_radius: Of the wall about the axis x = y = 0 [m].
+
+    Raises:
+        InputError: Bad vertices.
+
+    Source:
+        As `spans_height`; a round wall has no opposite faces, and what touches it on one side alone is not wedged.
+    """
+    vertices = checked_vertices(vertices)
+    smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
+    azimuth = np.arctan2(vertices[smarticle, vertex, 1], vertices[smarticle, vertex, 0])
+    for label in np.unique(clusters.labels[smarticle]):
+        around = np.sort(azimuth[clusters.labels[smarticle] == label])
+        if np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi:
+            return True
+    return False
+
+
 def _clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Clusters:
     if count == 0:
         msg = "a cluster needs at least 1 smarticle: got 0"
@@ -82,3 +155,36 @@ def _clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Cluster
     ranks = np.empty_like(order)
     ranks[order] = np.arange(len(order))
     return Clusters(labels=ranks[found].astype(np.int64), sizes=sizes[order].astype(np.int64))
+
+
+def _spans_of(clusters: Clusters, frame: Frame, run: RunManifest) -> tuple[float, float, float]:
+    vertices, diameter = frame.vertices, run.sphere_diameter
+    height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
+    # After its wall is gone a pile has nothing to span from.
+    walled = run.walled(frame.phase)
+    width = walled and spans_width(clusters, vertices, diameter=diameter, wall_radius=run.container_radius)
+    return clusters.largest, float(height), float(width) if walled else math.nan
+
+
+def _in_one_cylinder(run: RunManifest) -> bool:
+    return not run.planar and run.container_tiers == 1
+
+
+MEASURES = tuple(
+    FrameMeasure(
+        name=f"{name} graph",
+        place=55,
+        quantities=(
+            Quantity(f"{name} graph largest share", "-"),
+            Quantity(f"{name} graph spans height", "-"),
+            Quantity(f"{name} graph spans width", "-"),
+        ),
+        take=take,
+        told_of=_in_one_cylinder,
+        costly=True,
+    )
+    for name, take in (
+        ("contact", lambda f, run: _spans_of(touching_clusters(f.vertices, run.sphere_diameter), f, run)),
+        ("crossing", lambda f, run: _spans_of(entanglement_clusters(f.vertices), f, run)),
+    )
+)

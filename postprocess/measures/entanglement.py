@@ -14,12 +14,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
-from postprocess.geometry.links import bounding_spheres, checked_vertices, link_lengths, plane_frames
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -44,6 +43,22 @@ class CrossingPairs(NamedTuple):
     i: NDArray[np.int64]
     j: NDArray[np.int64]
     links: NDArray[np.int64]
+
+
+class LinkPassages(NamedTuple):
+    """Links that pass through smarticles, one by one.
+
+    Attributes:
+        i: (P,) int64, the smarticle passed through.
+        j: (P,) int64, the smarticle that passes.
+        link: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2.
+        point: (P, 3) [m], where it meets the plane of i.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    link: NDArray[np.int64]
+    point: NDArray[np.float64]
 
 
 class LinkedPairs(NamedTuple):
@@ -144,6 +159,30 @@ def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
     return CrossingPairs(*_sorted_nonzero(i, j, links))
 
 
+def link_passages(vertices: ArrayLike) -> LinkPassages:
+    """The passages that `link_crossings` counts, each with its place.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+
+    Returns:
+        One entry per passing link, sorted by i, then j, then link.
+
+    Raises:
+        InputError: Bad vertices.
+    """
+    vertices = checked_vertices(vertices)
+    i, j = _close_pairs(vertices, has_plane(vertices))
+    pair, link = np.nonzero(_signed_crossings(vertices, i, j, closed=False))
+    order = np.lexsort((link, j[pair], i[pair]))
+    i, j, link = i[pair][order], j[pair][order], link[order]
+    normal, centre = plane_frames(vertices)[i, 2], vertices[i].mean(axis=1)
+    start, end = vertices[j, link], vertices[j, link + 1]
+    below, above = (np.einsum("pc,pc->p", ends - centre, normal) for ends in (start, end))
+    share = below / (below - above)
+    return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
+
+
 def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
     """Linking numbers of smarticles closed across their mouths, a topological cross-check.
 
@@ -195,13 +234,8 @@ def _close_pairs(
     vertices: NDArray[np.float64], planes: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
-    if len(vertices) < 2:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    centres, radii = bounding_spheres(vertices)
-    pairs = cKDTree(centres).query_pairs(2 * radii.max(), output_type="ndarray")
-    distance = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1)
-    pairs = pairs[distance < radii[pairs].sum(axis=1)]
-    i, j = np.concatenate([pairs, pairs[:, ::-1]]).astype(np.int64).T
+    low, high = close_pairs(vertices)
+    i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 
@@ -284,7 +318,10 @@ MEASURES = (
     FrameMeasure(
         name="entanglement",
         place=40,
-        quantities=(Quantity("crossings mean", "-"), Quantity("planes", "-")),
+        quantities=(
+            Quantity("crossings mean", "-", Shown(heading="⟨N⟩", place=20, form=".2f")),
+            Quantity("planes", "-"),
+        ),
         take=_entanglement_of,
         told_of=in_space,
     ),

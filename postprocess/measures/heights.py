@@ -13,7 +13,7 @@ from dem.record.manifest import RunManifest
 from dem.record.packing import second_highest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 from postprocess.statistics.bisection import least_reaching
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ MEASURES = (
         name="heights",
         place=30,
         quantities=(
-            Quantity("com height", "m"),
+            Quantity("com height", "m", Shown(heading="z [mm]", place=30, form=".2f", factor=1e3)),
             Quantity("second-highest com height", "m"),
             Quantity(f"top {_PERCENTILE:g} % height", "m"),
         ),

@@ -22,7 +22,7 @@ from postprocess.geometry.region import Region, inner_region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import solid_fraction
 from postprocess.measures.heights import heights, material_height
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -181,11 +181,17 @@ def _packing(definition: str, frame: Frame, run: RunManifest) -> tuple[float]:
     return (packing_of(frame, run, definition=definition),)
 
 
+# That which is compared with experiments first, with its error and without its name.
+_SHOWN = {
+    name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
+    for place, name in enumerate(DEFINITIONS)
+}
+
 MEASURES = tuple(
     FrameMeasure(
         name=f"phi {definition}",
         place=70,
-        quantities=(Quantity(f"phi {definition}", "-"),),
+        quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
         take=partial(_packing, definition),
         told_of=in_space,
         definition=definition,

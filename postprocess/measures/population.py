@@ -7,7 +7,7 @@ import numpy as np
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
 
 def escaped(frame: Frame, run: RunManifest) -> int:
@@ -21,7 +21,7 @@ MEASURES = (
     FrameMeasure(
         name="smarticles",
         place=10,
-        quantities=(Quantity("smarticles", "-"),),
+        quantities=(Quantity("smarticles", "-", Shown(heading="smarticles", place=0, form=".4g")),),
         take=lambda frame, _: (frame.count,),
     ),
     FrameMeasure(

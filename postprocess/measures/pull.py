@@ -16,7 +16,7 @@ import numpy as np
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import Series
-from postprocess.measures.registry import PhaseMeasure, Quantity
+from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 from postprocess.scene_file import Settings, read_phases, read_scene
 
 if TYPE_CHECKING:
@@ -215,11 +215,11 @@ MEASURES = (
         name="pull of a hook",
         phase=PULL,
         quantities=(
-            Quantity("hook peak force over n W_s", "-"),
+            Quantity("hook peak force over n W_s", "-", Shown(heading="peak F/nW", place=40, form=".3f")),
             Quantity("hook peak time", "s"),
             Quantity("hook peak raised", "m"),
             Quantity("lower hook force at the peak over n W_s", "-"),
-            Quantity("hook work", "J"),
+            Quantity("hook work", "J", Shown(heading="hook work [mJ]", place=41, form=".3g", factor=1e3)),
             Quantity("hook free time", "s"),
             Quantity("hook load at the end", "smarticles"),
             Quantity("hook raised at the end", "m"),

@@ -20,6 +20,25 @@ from dem.record.series import Series
 _PACKAGE = __name__.rpartition(".")[0]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """How a short table for a person has a column; most columns are for CSV alone.
+
+    Attributes:
+        heading: With the unit that it is shown in.
+        place: Among the others: lower ones come first.
+        form: Format of the number.
+        factor: From SI to the unit of the heading [1].
+        with_error: Whether its standard error stands beside.
+    """
+
+    heading: str
+    place: int
+    form: str
+    factor: float = 1.0
+    with_error: bool = False
+
+
 @dataclass(frozen=True)
 class Quantity:
     """One column of a table.
@@ -27,6 +46,7 @@ class Quantity:
     Attributes:
         label: What it is called.
         unit: SI, or "-" for a pure number, "degree", "smarticles".
+        shown: How a short table has it; None: not at all.
 
     Example:
         >>> Quantity("com height", "m").header
@@ -35,6 +55,7 @@ class Quantity:
 
     label: str
     unit: str
+    shown: Shown | None = None
 
     @property
     def header(self) -> str:
@@ -53,7 +74,8 @@ class FrameMeasure:
         take: The values of a frame of a run, one per column; NaN where they have no meaning in this frame.
         told_of: Whether a run has it at all; else its tables have no such columns.
         definition: Where several measures define one quantity, by what name this one is chosen.
-        costly: Whether it takes tenths of a second per frame or more.
+        costly: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables
+            have it of the last frame of a phase, unless asked for at every frame.
     """
 
     name: str
@@ -117,6 +139,12 @@ def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
             msg = f"measures share a {kind}: {', '.join(sorted(repeated))}"
             raise ValueError(msg)
     return measures
+
+
+def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
+    """What short tables have, in their order."""
+    found = [(one, one.shown) for measure in registered() for one in measure.quantities if one.shown is not None]
+    return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 
 def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:

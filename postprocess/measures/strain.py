@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import Series, read_series
-from postprocess.measures.registry import PhaseMeasure, Quantity
+from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
 Array = NDArray[np.float64]
 
@@ -25,9 +25,15 @@ STRAIN = "strain"
 """Type of the phase."""
 
 _MEANINGS = {
-    Quantity("peak force", "N"): "largest force of the pulled string, means over 1 ms",
-    Quantity("strain at the peak", "-"): "strain where it is reached",
-    Quantity("strain at fracture", "-"): "largest strain while the force is a fifth of the peak or more",
+    Quantity(
+        "peak force", "N", Shown(heading="peak F [N]", place=50, form=".3f")
+    ): "largest force of the pulled string, means over 1 ms",
+    Quantity(
+        "strain at the peak", "-", Shown(heading="strain at it", place=51, form=".3f")
+    ): "strain where it is reached",
+    Quantity(
+        "strain at fracture", "-", Shown(heading="at fracture", place=53, form=".3f")
+    ): "largest strain while the force is a fifth of the peak or more",
     Quantity(
         "stiffness at the start", "N"
     ): "slope of force against strain, from 20 % to 80 % of the force at the first maximum",
@@ -35,11 +41,13 @@ _MEANINGS = {
         "second over first slope", "-"
     ): "the same for the upper half of these forces over that for the lower half: 1 for a straight line",
     Quantity(
-        "strain at the yield drop", "-"
+        "strain at the yield drop", "-", Shown(heading="at yield", place=52, form=".3f")
     ): "strain at the first maximum that is followed by a loss of a tenth of the "
     "force or more, and by more strain of 0.05 at least before the fracture; empty without any",
     Quantity("force lost at the yield drop", "-"): "share of the force that is lost there",
-    Quantity("widening", "-"): "largest width of the chain before the fracture over the width at the start, less 1",
+    Quantity(
+        "widening", "-", Shown(heading="widening", place=54, form=".3f")
+    ): "largest width of the chain before the fracture over the width at the start, less 1",
     Quantity("widening at the first maximum", "-"): "the same at the first maximum of the force",
     Quantity(
         "greatest force on a wall", "N"

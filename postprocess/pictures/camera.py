@@ -32,7 +32,9 @@ FIELD_OF_VIEW = 22.0
 
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000
 _FILL = 0.97  # share of the panel that the pile and its container may take
-_PANEL = (0.87, 0.885)  # width and height as shares of the picture, from its lower left corner
+# In units, see `Look.unit`: width of the colour bar with its labels, height of caption and of the scale bar's strip.
+_BAR, _CAPTION, _FOOT = 13.0, 11.5, 4.5
+_LEAST_UNIT = 4.4  # pixel: smaller text cannot be read
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +67,23 @@ class Look:
 
     @property
     def panel(self) -> tuple[int, int]:
-        """Width and height of the three-dimensional part [pixel]."""
-        return round(self.size[0] * _PANEL[0]), round(self.size[1] * _PANEL[1])
+        """Width and height of the three-dimensional part [pixel]: without caption, scale bar and colour bar, if any.
+
+        The width is even, so that films of several runs are as wide as `.mp4` wants them.
+        """
+        width, height = self.size
+        bar = 0.0 if self.colouring.kind == "name" else _BAR
+        return 2 * int((width - bar * self.unit) / 2), round(height - _CAPTION * self.unit) - self.foot
+
+    @property
+    def foot(self) -> int:
+        """Height of the strip below it [pixel]."""
+        return round(_FOOT * self.unit)
+
+    @property
+    def unit(self) -> float:
+        """What text is measured by: a hundredth of the picture's shorter side, or what can just be read [pixel]."""
+        return max(min(self.size) / 100, _LEAST_UNIT)
 
     @property
     def axes(self) -> NDArray[np.float64]:
@@ -88,6 +105,9 @@ def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surrounding
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
     if run.planar:
         thick = run.thickness_in_plane * MILLIMETRE
+        if surroundings.strings is not None:
+            strings = surroundings.strings.lines(frame).reshape(-1, 3)
+            points = np.concatenate([points, (strings - [0.0, 0.0, frame.floor_z]) * MILLIMETRE])
         return np.concatenate([points - thick, points + thick, channel(points, run).reshape(-1, 3)])
     if surroundings.hooks is not None:
         # The upper one may be above the pile.
@@ -135,6 +155,12 @@ def circle(radius: float, z: float, points: int = 181) -> NDArray[np.float64]:
     """(points, 3): a level circle about the axis, in the unit of its radius."""
     angle = np.linspace(0, 2 * math.pi, points)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(points, z)], axis=1)
+
+
+def millimetres_per_pixel(position: NDArray[np.float64], focus: NDArray[np.float64], height: int) -> float:
+    """How long a pixel is at the distance of the focal point, in a picture of a height [pixel]."""
+    distance = float(np.linalg.norm(np.asarray(position) - np.asarray(focus)))
+    return 2 * distance * math.tan(math.radians(FIELD_OF_VIEW / 2)) / height
 
 
 def fitted_camera(

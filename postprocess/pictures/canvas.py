@@ -1,7 +1,7 @@
-"""The canvas of a picture: container, lights and smarticles, drawn by VTK. The only module that imports PyVista.
+"""The canvas of a picture: container, lights and smarticles, drawn by VTK. The only module here that imports PyVista.
 
-The three-dimensional part is drawn at twice its size and scaled down; caption and colour bar are
-set by matplotlib around it. No display is needed: VTK falls back to EGL.
+The three-dimensional part is drawn at twice its size and scaled down; what stands around it is set by
+`postprocess.pictures.page`. No display is needed: VTK falls back to EGL.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -22,14 +22,18 @@ from PIL import Image
 from dem.errors import InputError, RunError
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
-from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
-from postprocess.measures.entanglement import entanglement
-from postprocess.measures.packing import packing_fraction
-from postprocess.pictures.camera import FIELD_OF_VIEW, MILLIMETRE, Look, channel, circle, fitted_camera, wall_corners
-from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.camera import (
+    FIELD_OF_VIEW,
+    MILLIMETRE,
+    Look,
+    channel,
+    circle,
+    fitted_camera,
+    millimetres_per_pixel,
+    wall_corners,
+)
 from postprocess.pictures.surroundings import DrawnHooks, Surroundings
-from postprocess.report import figures
 
 with warnings.catch_warnings():
     # PyVista imports pyplot: see postprocess.report.figures.
@@ -43,6 +47,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 _OVERSAMPLING = 2
+_FIXTURE = "#b3261e"  # of hooks and strings
 
 # Corners of a box (along, in plane, normal) and its faces, seen from outside.
 _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
@@ -90,23 +95,36 @@ def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_pla
 
 
 class Canvas:
-    """Container, camera and lights of one picture or film; draws frame after frame."""
+    """Container, camera and lights of one picture or film; draws frame after frame.
+
+    Args:
+        run: The run.
+        look: Size and direction.
+        surroundings: What is drawn besides smarticles; None: nothing.
+        extent: (n, 3) [mm], what the camera has in view.
+        axes: (3, 3) rows: right, up and forward from the camera; those of the look if not given.
+        quick: Whether to draw as films are: without the shade in corners, which takes most of the time of a still.
+    """
 
     def __init__(
         self,
         run: RunManifest,
         look: Look,
-        surroundings: Surroundings,
+        surroundings: Surroundings | None,
         extent: NDArray[np.float64],
-        span: tuple[float, float],
+        *,
+        axes: NDArray[np.float64] | None = None,
+        quick: bool = False,
     ) -> None:
         self._run = run
         self._look = look
+        self._axes = look.axes if axes is None else axes
         self._surroundings = surroundings
-        self._scale = ColourScale.of(look.colouring, *span)
+        self._quick = quick
         self._wall: list[Any] = []  # what goes away with the container
         self._ghost: Any = None  # what is left of it then
         self._hooks: list[Any] = []  # the lower and the upper one
+        self._boxes: pv.PolyData | None = None
         _check_graphics()
         with _quiet_vtk():
             width, height = look.panel
@@ -115,7 +133,9 @@ class Canvas:
                 window_size=[_OVERSAMPLING * width, _OVERSAMPLING * height],
                 lighting="none",
             )
-            self._build(extent)
+            # Drawn larger and scaled down, edges are smooth already.
+            self._plotter.disable_anti_aliasing()
+            self._pixel = self._build(extent)
 
     def __enter__(self) -> Self:
         return self
@@ -128,51 +148,79 @@ class Canvas:
     ) -> None:
         self._plotter.close()
 
-    def picture(self, frame: Frame, values: NDArray[Any]) -> Image.Image:
-        """One finished picture of a frame coloured by one value per smarticle."""
+    @property
+    def pixel(self) -> float:
+        """How long a pixel of the panel is at half depth [mm]."""
+        return self._pixel
+
+    def panel(self, frame: Frame, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The three-dimensional part of a picture.
+
+        Args:
+            frame: What to draw.
+            colours: (N, 3) of each smarticle, or (N, 3, 3) of each of its links, 0 to 255.
+
+        Returns:
+            (height, width, 3) of `Look.panel`.
+        """
+        colours = colours if colours.ndim == 3 else np.repeat(colours[:, None], 3, axis=1)
+        with _quiet_vtk():
+            self._set_boxes(frame, colours)
+            self._move(frame)
+            self._plotter.render()
+            pixels = self._plotter.screenshot(return_img=True)
+        return np.asarray(Image.fromarray(pixels).reduce(_OVERSAMPLING))
+
+    def add_plane(self, corners: NDArray[np.float64], colour: str) -> None:
+        """Adds a flat see-through patch with corners (n, 3) [mm]."""
+        patch = pv.PolyData.from_regular_faces(corners, [list(range(len(corners)))])
+        self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, render=False)
+
+    def _set_boxes(self, frame: Frame, colours: NDArray[np.uint8]) -> None:
+        """Puts the boxes where they are in a frame; builds them anew only where there are more or fewer."""
         boxes = link_boxes(
             frame.vertices - [0.0, 0.0, frame.floor_z],
             thickness_normal=self._run.thickness_normal,
             thickness_in_plane=self._run.thickness_in_plane,
         )
         boxes.points *= MILLIMETRE
-        boxes.cell_data["colour"] = self._scale.colours(values[boxes.cell_data["smarticle"]])
-        with _quiet_vtk():
-            self._plotter.add_mesh(
-                boxes,
-                scalars="colour",
-                rgb=True,
-                name="smarticles",
-                ambient=0.22,
-                diffuse=0.85,
-                specular=0.12,
-                specular_power=20,
-                show_edges=True,
-                edge_color="#101418",
-                edge_opacity=0.55,
-                line_width=0.5 * _OVERSAMPLING,
-                reset_camera=False,
-                render=False,
-            )
-            self._move(frame)
-            self._plotter.render()
-            pixels = self._plotter.screenshot(return_img=True)
-        panel = Image.fromarray(pixels).resize(self._look.panel, Image.Resampling.LANCZOS)
-        return self._composed(np.asarray(panel), self._caption(frame))
+        boxes.cell_data["colour"] = colours[boxes.cell_data["smarticle"], boxes.cell_data["link"]]
+        if self._boxes is not None and self._boxes.n_cells == boxes.n_cells:
+            self._boxes.points = boxes.points
+            self._boxes.cell_data["colour"] = boxes.cell_data["colour"]
+            return
+        self._boxes = boxes
+        self._plotter.add_mesh(
+            boxes,
+            scalars="colour",
+            rgb=True,
+            name="smarticles",
+            ambient=0.22,
+            diffuse=0.85,
+            specular=0.12,
+            specular_power=20,
+            show_edges=True,
+            edge_color="#101418",
+            edge_opacity=0.55,
+            line_width=0.5 * _OVERSAMPLING,
+            reset_camera=False,
+            render=False,
+        )
 
-    def _build(self, extent: NDArray[np.float64]) -> None:
-        plotter, axes = self._plotter, self._look.axes
-        radius = self._run.container_radius * MILLIMETRE
+    def _build(self, extent: NDArray[np.float64]) -> float:
+        """Builds all but smarticles; returns how long a pixel is [mm]."""
+        plotter, axes, around = self._plotter, self._axes, self._surroundings
         plotter.set_background("white")
-        if self._run.planar:
-            for wall in channel(extent, self._run):
-                self._add_outline(pv.MultipleLines(wall))
-        else:
-            self._add_container(radius, float(extent[:, 2].max()))
-        if self._surroundings.hooks is not None:
-            mesh = _cross(self._surroundings.hooks)
-            look = {"color": "#b3261e", "ambient": 0.25, "diffuse": 0.8, "render": False}
-            self._hooks = [plotter.add_mesh(mesh, **look) for _ in range(2)]
+        if around is not None:
+            if self._run.planar:
+                for wall in channel(extent, self._run):
+                    self._add_outline(pv.MultipleLines(wall))
+            else:
+                self._add_container(around, self._run.container_radius * MILLIMETRE, float(extent[:, 2].max()))
+            if around.hooks is not None:
+                mesh = _cross(around.hooks)
+                look = {"color": _FIXTURE, "ambient": 0.25, "diffuse": 0.8, "render": False}
+                self._hooks = [plotter.add_mesh(mesh, **look) for _ in range(2)]
         width, height = self._look.panel
         position, focus = fitted_camera(extent, axes, width / height)
         self._light(position, focus)
@@ -182,33 +230,53 @@ class Canvas:
         camera.focal_point = tuple(focus)
         camera.up = tuple(axes[1])
         distance = float(np.linalg.norm(position - focus))
-        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + radius
+        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + self._run.container_radius * MILLIMETRE
         camera.clipping_range = (max(distance - reach, distance / 1000), distance + reach)
-        plotter.enable_ssao(
-            radius=0.6 * self._run.middle_length * MILLIMETRE,
-            bias=0.4 * self._run.thickness_in_plane * MILLIMETRE,
-            kernel_size=64,
-            blur=True,
-        )
+        if not self._quick:
+            plotter.enable_ssao(
+                radius=0.6 * self._run.middle_length * MILLIMETRE,
+                bias=0.4 * self._run.thickness_in_plane * MILLIMETRE,
+                kernel_size=64,
+                blur=True,
+            )
+        return millimetres_per_pixel(position, focus, height)
 
     def _move(self, frame: Frame) -> None:
-        """Puts walls and hooks where they are in a frame."""
+        """Puts walls, hooks and strings where they are in a frame."""
+        around = self._surroundings
+        if around is None:
+            return
         top = float(frame.vertices[..., 2].max()) - frame.floor_z
-        raised = self._surroundings.raised(frame.time, frame.phase, top)
+        raised = around.raised(frame.time, frame.phase, top)
         for part in self._wall:
             part.visibility = raised is not None
             part.position = (0.0, 0.0, MILLIMETRE * (raised or 0.0))
         if self._ghost is not None:
             self._ghost.visibility = raised is None
-        if self._surroundings.hooks is not None:
-            for hook, height in zip(self._hooks, self._surroundings.hooks.heights(frame.time), strict=True):
+        if around.hooks is not None:
+            for hook, height in zip(self._hooks, around.hooks.heights(frame.time), strict=True):
                 hook.position = (0.0, 0.0, MILLIMETRE * height)
+        if around.strings is not None:
+            self._tie((around.strings.lines(frame) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE)
 
-    def _add_container(self, radius: float, top: float) -> None:
-        plotter, forward = self._plotter, self._look.axes[2]
+    def _tie(self, strings: NDArray[np.float64]) -> None:
+        """Draws strings (n, 2, 3) [mm] as tubes at half height of the links, with a knot at either end."""
+        self._plotter.remove_actor("strings", render=False)
+        if not len(strings):
+            return
+        # A string has no thickness in the simulation: here one that is seen.
+        thick = max(0.06 * self._run.thickness_in_plane * MILLIMETRE, self._pixel)
+        lifted = strings + np.array([0.0, 0.0, self._run.thickness_normal * MILLIMETRE])
+        tubes = [pv.Line(*ends).tube(radius=thick) for ends in lifted]
+        knots = [pv.Sphere(radius=3 * thick, center=end) for ends in lifted for end in ends]
+        mesh = tubes[0].append_polydata(*tubes[1:], *knots)
+        self._plotter.add_mesh(mesh, name="strings", color=_FIXTURE, lighting=False, reset_camera=False, render=False)
+
+    def _add_container(self, around: Surroundings, radius: float, top: float) -> None:
+        plotter, forward = self._plotter, self._axes[2]
         floor = pv.Disc(inner=0, outer=radius, c_res=180)
         plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
-        corners = wall_corners(top, self._run, self._surroundings)
+        corners = wall_corners(top, self._run, around)
         rims = _back_rims(corners, forward)
         if rims is None:
             for outer, height in corners[1:]:
@@ -219,7 +287,7 @@ class Canvas:
             plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
             self._add_outline(outline),
         ]
-        if self._surroundings.removed is not None:
+        if around.removed is not None:
             self._ghost = self._add_outline(outline, opacity=0.3)
         self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
 
@@ -234,7 +302,7 @@ class Canvas:
         )
 
     def _light(self, position: NDArray[np.float64], focus: NDArray[np.float64]) -> None:
-        right, up, forward = self._look.axes
+        right, up, forward = self._axes
         distance = float(np.linalg.norm(position - focus))
         for side, rise, strength in ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25)):
             source = focus + distance * (side * right + rise * up - forward)
@@ -246,50 +314,6 @@ class Canvas:
                     light_type="scene light",
                 )
             )
-
-    def _caption(self, frame: Frame) -> tuple[str, str, str]:
-        run = self._run
-        count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
-        phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
-        title = run.name, f"l/w = {run.aspect_ratio:g}   N = {count}   t = {frame.time:.3f} s ({phase})"
-        if run.planar:
-            return (*title, "")  # neither packing nor crossings have a meaning there
-        packing = "φ undefined"
-        with suppress(UndefinedMeasureError):
-            if run.fills_cylinder(frame.phase):
-                phi = packing_fraction(
-                    frame.vertices,
-                    radius=run.container_radius,
-                    solid_volume=run.solid_volume,
-                    floor_z=frame.floor_z,
-                )
-                packing = f"φ = {phi.value:.3f} (definition {phi.definition})"
-        mean = entanglement(frame.vertices).mean
-        crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "⟨N⟩ undefined"
-        return (*title, f"{packing}   {crossings}")
-
-    def _composed(self, panel: NDArray[np.uint8], caption: tuple[str, str, str]) -> Image.Image:
-        """The drawn panel with its caption and colour bar."""
-        width, height = self._look.size
-        unit = min(width, height) / 100  # pixel; text scales with the picture
-        with figures.style():
-            figure = figures.blank_figure(width / 72, height / 72, dpi=72)
-            figure.figimage(panel, xo=0, yo=0, origin="upper")
-            rows = ((2.0, 2.4, "bold", figures.BLACK), (5.4, 1.85, "normal", figures.GREY))
-            for text, (below, points, weight, colour) in zip((caption[0], "\n".join(caption[1:])), rows, strict=True):
-                figure.text(
-                    2.6 * unit / width,
-                    1 - below * unit / height,
-                    text,
-                    fontsize=points * unit,
-                    weight=weight,
-                    color=colour,
-                    va="top",
-                    linespacing=1.35,
-                    parse_math=False,
-                )
-            self._scale.draw(figure, self._look.colouring.label, unit)
-            return Image.fromarray(figures.pixels(figure))
 
 
 def _back_rims(corners: Sequence[tuple[float, float]], forward: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from textwrap import wrap
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
+from matplotlib.ticker import FuncFormatter
 
 from dem.record.frame import Frame
 from postprocess.geometry.links import centres_of_mass, link_lengths
@@ -20,6 +22,9 @@ from postprocess.report import figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,20 +101,51 @@ class ColourScale:
         colours: NDArray[np.uint8] = self._mappable.to_rgba(values, bytes=True)[:, :3]
         return colours
 
-    def draw(self, figure: Figure, label: str, unit: float) -> None:
-        """Draws the bar to the right of the panel, unless the colours only tell identity."""
+    @property
+    def keys(self) -> NDArray[np.uint8]:
+        """(n, 3) colours, 0 to 255, by which the bar is read; none where the colours only tell identity."""
+        if self._mappable is None:
+            return np.empty((0, 3), dtype=np.uint8)
+        if self._ticks:
+            return self.colours(np.array(self._ticks))
+        colours: NDArray[np.uint8] = np.round(255 * self._mappable.cmap(np.linspace(0, 1, 48))[:, :3]).astype(np.uint8)
+        return colours
+
+    def draw(self, figure: Figure, label: str, unit: float, *, right: float = 0.0) -> None:
+        """Draws the bar at the right edge, unless the colours only tell identity.
+
+        Args:
+            figure: Where to.
+            label: What the colours mean.
+            unit: What text is measured by [pixel].
+            right: What to leave free at the edge [pixel].
+        """
         if self._mappable is None:
             return
+        width, whole = (side * figure.dpi for side in figure.get_size_inches())
         height = min(0.055 * len(self._ticks), 0.46) if self._ticks else 0.46
-        axes = figure.add_axes((0.885, 0.47 - height / 2, 0.024, height))
+        axes = figure.add_axes((1 - (11.5 * unit + right) / width, 0.47 - height / 2, 2.4 * unit / width, height))
         bar = figure.colorbar(self._mappable, cax=axes)
         bar.minorticks_off()
         bar.outline.set_linewidth(0.08 * unit)
         axes.tick_params(labelsize=1.8 * unit, length=0.7 * unit, width=0.12 * unit)
-        bar.set_label(label, fontsize=1.9 * unit)
+        if not self._ticks:
+            power = _power(self._mappable.get_clim())
+            bar.formatter = FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}")
+            label = label.replace("[", f"[10{str(power).translate(_RAISED)} ") if power else label
+        # Broken where it is longer than the picture is high.
+        lines = wrap(label, max(12, int(0.8 * whole / (0.62 * 1.9 * unit))))
+        bar.set_label("\n".join(lines), fontsize=1.9 * unit, labelpad=0.9 * unit, parse_math=False)
         if self._ticks:
             bar.set_ticks(list(self._ticks), labels=list(self._labels))
             axes.tick_params(length=0)
+
+
+def _power(ends: tuple[float | None, float | None]) -> int:
+    """The power of ten by which the numbers of a bar are divided, so that they are short; 0 for handy ones."""
+    largest = max(abs(end or 0.0) for end in ends)
+    power = math.floor(math.log10(largest)) if largest > 0 else 0
+    return 0 if -1 <= power <= 3 else power
 
 
 def _identity_colours(identifiers: NDArray[Any]) -> NDArray[np.uint8]:

@@ -1,50 +1,64 @@
-"""Pictures and films of a run, off-screen: what is drawn, and where to. How is in `postprocess.pictures.canvas`."""
+"""Pictures and films of runs, off-screen: what is drawn, and where to. How is in `postprocess.pictures.canvas`."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Literal
 
 import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
-from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import RunManifest, read_run
 from postprocess.pictures import film
-from postprocess.pictures.camera import Look, extent
+from postprocess.pictures.camera import Look
 from postprocess.pictures.canvas import Canvas
-from postprocess.pictures.surroundings import read_surroundings
+from postprocess.pictures.captions import caption_of
+from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.focus import focused
+from postprocess.pictures.moments import MOST, RATE, Moments
+from postprocess.pictures.page import Page, page_size
+from postprocess.pictures.shot import Shot, Span, common_times, span_of
 from postprocess.report import figures
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Limits = Span | Literal["run"] | None
+"""Ends of the scale of colours: given, of all frames of the runs, or of what is shown."""
 
-_MOST_FILM_FRAMES = 150
+Track = Callable[[Iterable[int], int], Iterable[int]]
+"""Follows the pictures of a film, of which there are so many."""
 
 
 def render_run(
     directory: Path | str,
     *,
+    compare: Sequence[Path | str] = (),
     output: Path | str | None = None,
     time: float | None = None,
     color_by: str | None = None,
+    limits: Limits = None,
+    smarticle: int | None = None,
     size: tuple[int, int] = (1200, 1200),
     view: str | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Draws one frame of a run: every link as its real box, in a container cut open in front, with its hooks.
+    """Draws one frame of a run: every link as its real box, in a container cut open in front, with hooks and strings.
 
     A cylinder is drawn up to a little above the pile, a mould of tiers as it is. A wall that is being lifted is where
-    it is then; of one that was taken away its outline is left, faint.
+    it is then; of one that was taken away its outline is left, faint. A bar tells how long a millimetre is half way
+    between the nearest and the farthest point.
 
     Args:
         directory: A run directory with at least one frame; the run need not be done.
+        compare: Further runs, drawn beside it at the same time, from the same distance and in the same colours.
         output: File to write, `.png`; `render.png` in the run directory if not given.
-        time: Simulated time [s], the nearest frame is taken; the last one if not given.
+        time: Simulated time [s], the nearest frame is taken; the last one that all runs have if not given.
         color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
-        size: Width and height [pixel].
+        limits: Ends of the scale of colours; those of this picture if not given.
+        smarticle: Number of a smarticle: only it and those that pass through its plane are drawn, looked at through
+            its mouth.
+        size: Width and height of the picture of one run [pixel].
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         overwrite: Whether an existing file may be replaced.
 
@@ -53,7 +67,7 @@ def render_run(
 
     Raises:
         InputError: No frame, unknown colouring or view, a time before the first or after the last
-            frame, a bad size, or an output that exists.
+            frame, a bad size, bad limits, no such smarticle, or an output that exists.
         RunError: This machine lacks the libraries to draw without a display.
 
     Example:
@@ -61,16 +75,21 @@ def render_run(
         'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",))
-    run = read_run(directory)
-    look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
-    frames = read_frames(directory)
-    frame = frames[_frame_at(frames, time)]
+    shots = [Shot.of(path) for path in (directory, *compare)]
+    if time is None and compare:
+        time = float(common_times(shots)[-1])
+    indices = [[shot.frame_at(time)] for shot in shots]
+    look = _look(shots, color_by, size, view)
     # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
     figures.refuse_to_overwrite(output, overwrite=overwrite)
-    values = look.colouring.values(frame)
-    around = read_surroundings(run)
-    with Canvas(run, look, around, extent(frame, run, look, around), _span(values)) as canvas:
-        image = canvas.picture(frame, values)
+    if smarticle is not None:
+        if compare or color_by is not None or view is not None:
+            msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
+            raise InputError(msg)
+        image = focused(shots[0], indices[0][0], smarticle, size)
+    else:
+        with _Set(shots, indices, look, limits, quick=False) as scenery:
+            image = scenery.picture([frames[0] for frames in indices])
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
@@ -80,25 +99,39 @@ def render_film(
     directory: Path | str,
     output: Path | str | None = None,
     *,
+    compare: Sequence[Path | str] = (),
     color_by: str | None = None,
+    limits: Limits = None,
     size: tuple[int, int] = (720, 720),
     view: str | None = None,
-    frames_per_second: float = 15.0,
-    most_frames: int = _MOST_FILM_FRAMES,
+    frames_per_second: float = RATE,
+    start: float | None = None,
+    end: float | None = None,
+    every: float | None = None,
+    most_frames: int = MOST,
+    track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Draws a film of a run with one camera and one scale of colours throughout.
 
+    Its pictures are at equal distances in simulated time, each the nearest recorded frame, so that it plays at one
+    speed, which its caption tells.
+
     Args:
         directory: A run directory with at least two frames.
-        output: File to write: `.gif` or `.webp`, which need nothing further, or `.mp4`, which
-            needs the packages imageio and imageio-ffmpeg; `film.gif` in the run directory if not
-            given.
+        output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg;
+            `film.gif` in the run directory if not given.
+        compare: Further runs, as in `render_run`; the film shows the times that all have come to.
         color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
-        size: Width and height [pixel]; for `.mp4` even numbers.
+        limits: Ends of the scale of colours; those of the film if not given.
+        size: Width and height of the picture of one run [pixel]; for `.mp4` even numbers.
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         frames_per_second: Of the film.
-        most_frames: Longer runs are thinned evenly to so many frames.
+        start: Simulated time at which it begins [s]; that of the first frame if not given.
+        end: Simulated time at which it ends [s]; that of the last frame if not given.
+        every: Simulated time from one picture to the next [s]; if not given, that between frames.
+        most_frames: Unless `every` is given, longer runs are thinned evenly to so many pictures.
+        track: Follows the drawing, see `Track`.
         overwrite: Whether an existing file may be replaced.
 
     Returns:
@@ -106,50 +139,108 @@ def render_film(
 
     Raises:
         InputError: Fewer than two frames, a kind of file that cannot be written here, an output
-            that exists, or as in `render_run`.
+            that exists, times that make no film, or as in `render_run`.
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS)
-    run = read_run(directory)
-    look = Look.checked(color_by=color_by or _usual_colour(run), size=size, view=view or _usual_view(run))
-    if not (math.isfinite(frames_per_second) and frames_per_second > 0 and most_frames >= 2):
-        msg = (
-            "a film needs frames_per_second above 0 1/s and most_frames of at least 2: "
-            f"got {frames_per_second} 1/s, {most_frames}"
-        )
+    if most_frames < 2:
+        msg = f"a film needs most_frames of at least 2: got {most_frames}; leave it out for {MOST}"
         raise InputError(msg)
-    film.check_film(output, size)
-    frames = read_frames(directory)
-    if len(frames) < 2:
-        msg = f"{directory}: a film needs at least 2 frames: got {len(frames)}; draw a picture (.png)"
-        raise InputError(msg)
+    shots = [Shot.of(path) for path in (directory, *compare)]
+    look = _look(shots, color_by, size, view)
+    film.check_film(output, page_size(look, len(shots)))
+    moments = Moments.chosen(
+        common_times(shots), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
+    )
+    indices = [moments.indices(shot.frames.times).tolist() for shot in shots]
     figures.refuse_to_overwrite(output, overwrite=overwrite)
-    shown = np.unique(np.linspace(0, len(frames) - 1, most_frames).round().astype(int))
-    around = read_surroundings(run)
-    extents, values = [], []
-    for index in shown:
-        frame = frames[int(index)]
-        extents.append(extent(frame, run, look, around))
-        values.append(look.colouring.values(frame))
-
+    numbers = range(len(moments.times))
     with (
-        Canvas(run, look, around, np.concatenate(extents), _span(np.concatenate(values))) as canvas,
+        _Set(shots, indices, look, limits, quick=True) as scenery,
         figures.whole_file(output, overwrite=overwrite) as temporary,
     ):
 
         def picture(number: int) -> Image.Image:
-            return canvas.picture(frames[int(shown[number])], values[number])
+            return scenery.picture([frames[number] for frames in indices], pace=moments.pace)
 
-        samples = [picture(number) for number in sorted({0, len(shown) // 3, 2 * len(shown) // 3, len(shown) - 1})]
-        film.write_film(temporary, map(picture, range(len(shown))), frames_per_second, samples)
+        last = numbers[-1]
+        sampled = sorted({0, last // 3, 2 * last // 3, last}) if output.suffix == ".gif" else []
+        film.write_film(
+            temporary,
+            map(picture, numbers if track is None else track(numbers, len(numbers))),
+            count=len(numbers),
+            rate=moments.rate,
+            samples=[picture(number) for number in sampled],
+            keys=scenery.scale.keys,
+        )
     return output
 
 
-def _usual_colour(run: RunManifest) -> str:
-    return "id" if run.planar else "crossings"
+class _Set:
+    """Runs side by side under one camera, in one scale of colours.
+
+    Args:
+        shots: The runs.
+        indices: Of the frames of each that are to be shown.
+        look: Of each.
+        limits: Ends of the scale.
+        quick: See `Canvas`.
+    """
+
+    def __init__(
+        self, shots: Sequence[Shot], indices: Sequence[Sequence[int]], look: Look, limits: Limits, *, quick: bool
+    ) -> None:
+        self._shots = shots
+        self._look = look
+        pairs = list(zip(shots, indices, strict=True))
+        self._values = [dict(zip(frames, shot.values(frames, look), strict=True)) for shot, frames in pairs]
+        self.scale = ColourScale.of(look.colouring, *self._span(limits))
+        extents = [shot.extent(frames, look) for shot, frames in pairs]
+        self._stack = ExitStack()
+        with ExitStack() as stack:
+            self._canvases = [
+                stack.enter_context(Canvas(shot.run, look, shot.around, np.concatenate(extents), quick=quick))
+                for shot in shots
+            ]
+            self._stack = stack.pop_all()
+        self._page = Page(look, self.scale, self._canvases[0].pixel, columns=len(shots))
+
+    def __enter__(self) -> _Set:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def _span(self, limits: Limits) -> Span:
+        if isinstance(limits, tuple):
+            low, high = limits
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                msg = f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}"
+                raise InputError(msg)
+            return low, high
+        if limits == "run":
+            return span_of(
+                values for shot in self._shots for values in shot.values(range(len(shot.frames)), self._look)
+            )
+        return span_of(values for of_run in self._values for values in of_run.values())
+
+    def picture(self, indices: Sequence[int], *, pace: str = "") -> Image.Image:
+        """One picture of a frame of each run."""
+        panels, captions = [], []
+        for shot, canvas, values, index in zip(self._shots, self._canvases, self._values, indices, strict=True):
+            frame = shot.frames[index]
+            panels.append(canvas.panel(frame, self.scale.colours(values[index])))
+            captions.append(caption_of(frame, shot.run, pace=pace))
+        return self._page.picture(panels, captions)
 
 
-def _usual_view(run: RunManifest) -> str:
-    return "top" if run.planar else "front"
+def _look(shots: Sequence[Shot], color_by: str | None, size: tuple[int, int], view: str | None) -> Look:
+    planar = shots[0].run.planar
+    if any(shot.run.planar != planar for shot in shots):
+        msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
+        raise InputError(msg)
+    return Look.checked(
+        color_by=color_by or ("id" if planar else "crossings"), size=size, view=view or ("top" if planar else "front")
+    )
 
 
 def _checked_output(
@@ -163,19 +254,3 @@ def _checked_output(
         msg = f"{path}: the output must end in {' or '.join(kinds)}: got '{path.suffix}'"
         raise InputError(msg)
     return path
-
-
-def _frame_at(frames: FrameSequence, time: float | None) -> int:
-    """Index of the frame nearest to a time [s]; the last one for None."""
-    if time is None:
-        return len(frames) - 1
-    first, last = float(frames.times[0]), float(frames.times[-1])
-    slack = 1e-9 * max(abs(first), abs(last), 1.0)
-    if not first - slack <= time <= last + slack:
-        msg = f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s"
-        raise InputError(msg)
-    return int(np.argmin(np.abs(frames.times - time)))
-
-
-def _span(values: NDArray[Any]) -> tuple[float, float]:
-    return float(values.min()), float(values.max())

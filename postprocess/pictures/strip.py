@@ -1,4 +1,4 @@
-"""Pictures of several runs at several times in one: a row for each run, under one camera each."""
+"""Pictures of several runs at several times in one: a row for each run, all from the same distance."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from dem.record.frame import Frame
-from dem.record.frames import read_frames
-from dem.record.manifest import read_run
-from postprocess.pictures.camera import Look, extent
-from postprocess.pictures.surroundings import read_surroundings
+from postprocess.pictures.camera import Look
+from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.page import draw_scale_bar
+from postprocess.pictures.shot import Shot
 from postprocess.report import figures
 
 _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
 _GAP = 6  # pixel
+_FOOT = 28  # height of the scale bar's strip [pixel]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,8 @@ class Row:
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
     """Draws a picture of each run at each of its times, and writes them as one.
 
-    A smarticle has the same colour in all pictures of a run.
+    A smarticle has the same colour in all pictures of a run. All pictures share one scale, which a bar below the first
+    of the last row tells.
 
     Args:
         rows: The runs, from above.
@@ -53,13 +54,15 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
         InputError: A run has no frames.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    pictures = [_pictures(row) for row in rows]
+    pictures, pixel = _pictures(rows)
     width, height = pictures[0][0].size
-    across, down = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
+    across, below = len(columns) * (width + _GAP), len(rows) * (height + _GAP)
+    down = below + _FOOT
     canvas = Image.new("RGB", (across, down), "white")
     for i, line in enumerate(pictures):
         for k, picture in enumerate(line):
             canvas.paste(picture, (k * (width + _GAP), i * (height + _GAP)))
+    draw_scale_bar(canvas, (_GAP, below + _FOOT / 2), pixel, room=width, unit=_FOOT / 4)
     with figures.style():
         scale = 2 * figures.COLUMN_WIDTH / across
         figure = figures.blank_figure(2 * figures.COLUMN_WIDTH + 0.3, down * scale)
@@ -78,15 +81,27 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
     return output
 
 
-def _pictures(row: Row) -> list[Image.Image]:
+def _pictures(rows: Sequence[Row]) -> tuple[list[list[Image.Image]], float]:
+    """Pictures of each run, all of one size without empty rows, and how long a pixel is at mid-depth [mm]."""
     from postprocess.pictures.canvas import Canvas  # noqa: PLC0415  (imports PyVista)
 
-    run, frames = read_run(row.directory), read_frames(row.directory)
-    shown: list[Frame] = [frames[int(np.argmin(np.abs(frames.times - time)))] for time in row.times]
     look = Look.checked(color_by="id", size=_SIZE, view="front")
-    around = read_surroundings(run)
-    extents = np.concatenate([extent(frame, run, look, around) for frame in shown])
-    width, height = look.panel
-    below = (0, _SIZE[1] - height, width, _SIZE[1])
-    with Canvas(run, look, around, extents, (0.0, 1.0)) as canvas:
-        return [canvas.picture(frame, look.colouring.values(frame)).crop(below) for frame in shown]
+    shots = [Shot.of(row.directory) for row in rows]
+    shown = [
+        [int(np.argmin(np.abs(shot.frames.times - time))) for time in row.times]
+        for shot, row in zip(shots, rows, strict=True)
+    ]
+    extents = [shot.extent(indices, look) for shot, indices in zip(shots, shown, strict=True)]
+    scale, pictures, pixel = ColourScale.of(look.colouring, 0.0, 1.0), [], 1.0
+    for shot, indices in zip(shots, shown, strict=True):
+        with Canvas(shot.run, look, shot.around, np.concatenate(extents)) as canvas:
+            values = shot.values(indices, look)
+            panels = [
+                canvas.panel(shot.frames[index], scale.colours(of_frame))
+                for index, of_frame in zip(indices, values, strict=True)
+            ]
+            pictures.append(panels)
+            pixel = canvas.pixel
+    drawn = np.flatnonzero((np.array(pictures) < 255).any(axis=(0, 1, 3, 4)))
+    part = slice(max(drawn[0] - _GAP, 0), drawn[-1] + _GAP)
+    return [[Image.fromarray(panel[part]) for panel in panels] for panels in pictures], pixel

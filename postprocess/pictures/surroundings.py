@@ -1,4 +1,4 @@
-"""What does not give way to smarticles, for pictures: hooks and walls, where they are at a time."""
+"""What does not give way to smarticles, for pictures: hooks, walls and strings, where they are at a time."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dem.record.manifest import RunManifest
 from dem.record.names import SERIES
 from dem.record.series import Series, read_series
 from postprocess.measures.mould import read_tiers
+from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.scene_file import Settings, read_scene
 
 if TYPE_CHECKING:
@@ -82,12 +83,14 @@ class Surroundings:
         removed: Index of the phase that takes the wall away; None if none does.
         lift: How it is lifted; None if it goes at once.
         hooks: None in scenes without.
+        strings: Of a strain test; None in scenes without.
     """
 
     tiers: tuple[tuple[float, float], ...] = ()
     removed: int | None = None
     lift: Lift | None = None
     hooks: DrawnHooks | None = field(default=None, repr=False)
+    strings: ChainStrings | None = field(default=None, repr=False)
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -128,6 +131,7 @@ def read_surroundings(run: RunManifest) -> Surroundings:
         removed=removed,
         lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
         hooks=None if hooks is None else DrawnHooks.of(hooks, series),
+        strings=read_strings(run) if run.planar else None,
     )
 
 

@@ -13,33 +13,17 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.layout import Cell, columns
+from smarticles.measuring import grouped, measured, sources
 from smarticles.parsing import Commands, add_json, add_overwrite
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
-# What a person wants to see first: heading, column of the table, format, factor to the heading's unit.
-_SHOWN = (
-    ("phase", "phase type", "", 1.0),
-    ("t [s]", "time [s]", ".2f", 1.0),
-    ("smarticles", "smarticles [-]", ".4g", 1.0),
-    ("φ", f"phi {_COMPARED} [-]", ".4f", 1.0),
-    ("± SE", f"phi {_COMPARED} SE [-]", ".4f", 1.0),
-    ("top-percentile", "phi top-percentile [-]", ".4f", 1.0),
-    ("voxel", "phi voxel [-]", ".4f", 1.0),
-    ("voronoi", "phi voronoi [-]", ".4f", 1.0),
-    ("⟨N⟩", "crossings mean [-]", ".2f", 1.0),
-    ("z [mm]", "com height [m]", ".2f", 1e3),
-    ("peak F/nW", "hook peak force over n W_s [-]", ".3f", 1.0),
-    ("hook work [mJ]", "hook work [J]", ".3g", 1e3),
-    ("peak F [N]", "peak force [N]", ".3f", 1.0),
-    ("strain at it", "strain at the peak [-]", ".3f", 1.0),
-    ("at yield", "strain at the yield drop [-]", ".3f", 1.0),
-    ("at fracture", "strain at fracture [-]", ".3f", 1.0),
-    ("widening", "widening [-]", ".3f", 1.0),
-)
+# What every row says of itself: heading, column of the table, format, factor to the heading's unit.
+_SAID = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Of single frames only: averaged over the last ones they would say nothing.
 _SHOWN_PER_FRAME = (
     ("F [N]", "pulled string force x [N]", ".3f", 1.0),
@@ -58,42 +42,32 @@ def add(commands: Commands) -> None:
 Reads VTK frames and HDF5 series of runs that are done, failed or still going on. One row per phase,
 averaged over its last frames, with standard errors (SE). φ is given by several definitions, each
 named in its column. A phase that pulls a hook or strains a chain has its forces. Of a sweep's
-directory, all runs that have frames are measured.""",
+directory, all runs that have frames are measured, and what the sweep varies stands in columns of
+its own in CSV and JSON. --by averages over the runs that are alike in a variable, such as seeds.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
   smarticles measure runs/a --frames --table frames.csv     one row per frame
   smarticles measure runs/a --json
+  smarticles measure friction --table runs.csv              of a sweep: its variables are columns
+  smarticles measure friction --by friction                 means ± SE over the runs of each value
+  smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
     measure.add_argument("--table", type=Path, metavar="FILE.csv", help="write all columns as CSV")
     measure.add_argument("--frames", action="store_true", help="one row per frame, not per phase")
+    measure.add_argument(
+        "--by", metavar="NAME,…", help="means over the runs that have the same values of these columns, with their SE"
+    )
+    measure.add_argument(
+        "--profile",
+        type=Path,
+        metavar="FILE.csv",
+        help="write φ(r, z), rings and layers at the end of each phase, as CSV",
+    )
     add_overwrite(measure)
     add_json(measure)
-
-
-def run_directories(directories: Sequence[Path]) -> list[Path]:
-    """Run directories among, or inside, the given ones: a sweep stands for its runs with frames.
-
-    Raises:
-        InputError: a sweep has no run with frames yet.
-    """
-    from templates.sweep.folder import MANIFEST, open_folder  # noqa: PLC0415
-
-    found: list[Path] = []
-    for directory in directories:
-        if not (directory / MANIFEST).is_file():
-            found.append(directory)
-            continue
-        folder = open_folder(directory)
-        runs = [folder.run(entry) for entry in folder.entries]
-        begun = [run for run in runs if (run / "frames.pvd").is_file()]
-        if not begun:
-            msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
-            raise InputError(msg)
-        found += begun
-    return found
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:
@@ -102,32 +76,66 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
     from dem.record.manifest import read_run  # noqa: PLC0415
     from dem.record.series import lost_series  # noqa: PLC0415
-    from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
+    from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
-    if output is not None and output.exists() and not arguments.overwrite:
-        # Said before measuring, not after.
-        msg = f"--table {output}: exists; choose another name or give --overwrite"
+    profile: Path | None = arguments.profile
+    for option, path in (("--table", output), ("--profile", profile)):
+        if path is not None and path.exists() and not arguments.overwrite:
+            # Said before measuring, not after.
+            msg = f"{option} {path}: exists; choose another name or give --overwrite"
+            raise InputError(msg)
+    if output is not None and output == profile:
+        msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
-    measure = measure_run if arguments.frames else summarise_run
-    directories = run_directories(arguments.directories)
+    by = _groups(arguments)
+    directories = list(sources(arguments.directories))
     for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
-    table = pd.concat([measure(directory) for directory in directories], ignore_index=True)
+    table = measured(arguments.directories, frames=arguments.frames)
+    if by:
+        try:
+            table = grouped(table, by)
+        except InputError as error:
+            msg = f"--by {arguments.by}: {error}"
+            raise InputError(msg) from None
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
+    if profile is not None:
+        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
+        write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))
         return 0
     shown = _shown(table, per_frame=arguments.frames)
-    print(_table(table, shown))
-    print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames))
-    for note in _notes(table):
+    print(_grouped_table(table, by, shown) if by else _table(table, shown))
+    print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by))
+    for note in () if by else _notes(table):
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
+    if profile is not None:
+        print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
+
+
+def _groups(arguments: argparse.Namespace) -> list[str]:
+    """Columns that --by names.
+
+    Raises:
+        InputError: it names none, or frames are wanted one by one.
+    """
+    if arguments.by is None:
+        return []
+    names = [name.strip() for name in arguments.by.split(",") if name.strip()]
+    if not names:
+        msg = f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep"
+        raise InputError(msg)
+    if arguments.frames:
+        msg = f"--by {arguments.by}: averages over phases of runs; leave --frames out"
+        raise InputError(msg)
+    return names
 
 
 _Shown = tuple[str, str, str, float]
@@ -135,7 +143,15 @@ _Shown = tuple[str, str, str, float]
 
 def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Shown]:
     """The columns worth showing: of those that a person wants to see, the ones with a value in any row."""
-    wanted = _SHOWN + (_SHOWN_PER_FRAME if per_frame else ())
+    from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
+    from postprocess.statistics.points import marked  # noqa: PLC0415
+
+    wanted = list(_SAID)
+    for quantity, shown in shown_quantities():
+        wanted.append((shown.heading, quantity.header, shown.form, shown.factor))
+        if shown.with_error:
+            wanted.append(("± SE", marked(quantity.header, "SE"), shown.form, shown.factor))
+    wanted += _SHOWN_PER_FRAME if per_frame else ()
     return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
 
 
@@ -174,13 +190,23 @@ def _table(table: pd.DataFrame, shown: Sequence[_Shown]) -> str:
     return "\n".join(told)
 
 
+def _grouped_table(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Shown]) -> str:
+    """The columns to be shown of each group."""
+    named = [*by, _RUNS]
+    rows = [
+        [*row[: len(named)], *(_cell(value, e[2], e[3]) for value, e in zip(row[len(named) :], shown, strict=True))]
+        for row in table[[*named, *(entry[1] for entry in shown)]].values.tolist()
+    ]
+    return columns([*by, "runs", *(entry[0] for entry in shown)], rows)
+
+
 def _cell(value: object, form: str, factor: float) -> Cell | str:
     if not isinstance(value, float | int):
         return str(value)
     return Cell(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 
-def _legend(shown: Container[str], *, per_frame: bool) -> str:
+def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
     """What the columns that are shown mean, and over what they are averaged."""
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
@@ -188,6 +214,8 @@ def _legend(shown: Container[str], *, per_frame: bool) -> str:
     from postprocess.measures.table import LAST_FRAMES  # noqa: PLC0415
 
     averaged = f"means over the last {LAST_FRAMES} frames of each phase, SE: their standard error"
+    if by:
+        averaged = f"means over runs of their means over the last {LAST_FRAMES} frames, SE: standard error over runs"
     lines = ["one row per frame" if per_frame else averaged]
     if f"phi {_COMPARED} [-]" in shown:
         costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)

@@ -1,16 +1,22 @@
-"""render: a picture or a film of a run."""
+"""render: a picture or a film of a run, or of several beside each other."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_overwrite, positive_int
+from smarticles.parsing import Commands, add_overwrite, positive_number
 
 _PICTURE_SUFFIX = ".png"
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
+# Options of one kind alone, by their names in the parsed arguments: of films, and of pictures.
+_OF_FILMS = {"fps": "--fps", "start": "--from", "end": "--to", "every": "--every"}
+_OF_PICTURES = {"time": "--time", "smarticle": "--smarticle"}
 
 
 def add(commands: Commands) -> None:
@@ -20,26 +26,58 @@ def add(commands: Commands) -> None:
         render_run,
         summary="draw a picture or a film of a run",
         text="""
-Draws the true boxes of all smarticles in a cylinder that is cut open in front. Needs no display.
-The end of the output's name decides: .png is a picture; .gif, .webp and .mp4 are films.""",
+Draws the true boxes of all smarticles in a cylinder that is cut open in front, with hooks, strings and a
+bar for the scale. Needs no display. The end of the output's name decides: .png is a picture; .gif, .webp
+and .mp4 are films, which play at one speed and tell it.""",
         examples="""\
   smarticles render runs/a                                   last frame, runs/a/render.png
   smarticles render runs/a --time 1.5 --color-by speed --output shaken.png
-  smarticles render runs/a --output film.gif
+  smarticles render runs/a --output film.mp4 --from 1 --to 3 --fps 25
+  smarticles render runs/a --compare runs/b --output both.png
+  smarticles render runs/a --smarticle 17 --output hooked.png
 """,
     )
     render.add_argument("directory", type=Path, metavar="DIR", help="run directory")
     render.add_argument("--output", type=Path, metavar="FILE", help="default: DIR/render.png")
-    render.add_argument("--time", type=float, metavar="S", help="simulated time [s]; default: end")
+    render.add_argument(
+        "--compare",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="DIR",
+        help="draw these runs beside it, at the same time, of the same size, in the same colours",
+    )
+    render.add_argument("--time", type=float, metavar="S", help="simulated time of a picture [s]; default: end")
     render.add_argument(
         "--color-by",
         metavar="WHAT",
         help="crossings (default; links of others through its plane), contacts, height, speed, id (default of motion "
         "in a plane)",
     )
+    render.add_argument(
+        "--clim",
+        type=_limits,
+        metavar="LOW:HIGH",
+        help="ends of the scale of colours, or run: those of all frames of the run; default: of what is shown",
+    )
     render.add_argument("--view", metavar="VIEW", help="front (default; of motion in a plane: top), oblique, top")
     render.add_argument(
-        "--size", type=positive_int, metavar="PIXELS", help="width and height; default: 1200, of a film 720"
+        "--smarticle", type=int, metavar="ID", help="only this one and those that pass through its plane"
+    )
+    render.add_argument(
+        "--size",
+        type=_size,
+        metavar="PIXELS",
+        help="width and height, or WIDTHxHEIGHT, of the picture of one run; default: 1200, of a film 720",
+    )
+    render.add_argument("--fps", type=positive_number, metavar="N", help="pictures per second of a film; default: 15")
+    render.add_argument("--from", dest="start", type=float, metavar="S", help="simulated time a film begins at [s]")
+    render.add_argument("--to", dest="end", type=float, metavar="S", help="simulated time a film ends at [s]")
+    render.add_argument(
+        "--every",
+        type=positive_number,
+        metavar="S",
+        help="simulated time from one picture of a film to the next [s]; default: every frame, of many some 150",
     )
     add_overwrite(render)
 
@@ -52,23 +90,82 @@ def render_run(arguments: argparse.Namespace) -> int:
         kinds = f"{_PICTURE_SUFFIX} for a picture, {', '.join(_FILM_SUFFIXES)} for a film"
         msg = f"--output {output}: {output.suffix!r} is no kind of file that is drawn here; end the name in {kinds}"
         raise InputError(msg)
-    if film and arguments.time is not None:
-        msg = f"--time {arguments.time:g}: a film shows all times; leave it out, or write .png"
-        raise InputError(msg)
+    _refuse_what_has_no_meaning(arguments, film=film)
     from postprocess.pictures import render  # noqa: PLC0415  (imports PyVista)
 
-    look: dict[str, Any] = {"color_by": arguments.color_by, "view": arguments.view}
+    look: dict[str, Any] = {
+        "color_by": arguments.color_by,
+        "view": arguments.view,
+        "limits": arguments.clim,
+        "compare": arguments.compare,
+        "overwrite": arguments.overwrite,
+    }
     if arguments.size is not None:
-        look["size"] = (arguments.size, arguments.size)
+        look["size"] = arguments.size
     if film:
-        written = render.render_film(arguments.directory, output, overwrite=arguments.overwrite, **look)
+        if arguments.fps is not None:
+            look["frames_per_second"] = arguments.fps
+        written = render.render_film(
+            arguments.directory,
+            output,
+            start=arguments.start,
+            end=arguments.end,
+            every=arguments.every,
+            track=_track if sys.stderr.isatty() else None,
+            **look,
+        )
     else:
         written = render.render_run(
-            arguments.directory,
-            output=output,
-            time=arguments.time,
-            overwrite=arguments.overwrite,
-            **look,
+            arguments.directory, output=output, time=arguments.time, smarticle=arguments.smarticle, **look
         )
     print(written)
     return 0
+
+
+def _refuse_what_has_no_meaning(arguments: argparse.Namespace, *, film: bool) -> None:
+    for name, option in (_OF_PICTURES if film else _OF_FILMS).items():
+        value = getattr(arguments, name)
+        if value is None:
+            continue
+        if film:
+            why = "a film shows all times" if name == "time" else "is drawn alone, in a picture"
+            msg = f"{option} {value:g}: {why}; leave it out, or write .png"
+        else:
+            msg = f"{option} {value:g}: a picture shows one time; use --time, or write a film: --output film.gif"
+        raise InputError(msg)
+
+
+def _track(numbers: Iterable[int], count: int) -> Iterable[int]:
+    """A bar on the terminal, gone when the film is done."""
+    from rich.console import Console  # noqa: PLC0415  (costs a tenth of a second)
+    from rich.progress import track  # noqa: PLC0415
+
+    return track(numbers, "drawing", total=count, console=Console(stderr=True), transient=True)
+
+
+def _limits(text: str) -> tuple[float, float] | str:
+    """Two numbers in order, or run."""
+    if text == "run":
+        return text
+    low, _, high = text.partition(":")
+    try:
+        limits = float(low), float(high)
+    except ValueError:
+        limits = math.nan, math.nan
+    if not -math.inf < limits[0] < limits[1] < math.inf:
+        msg = f"must be LOW:HIGH, two numbers in order, or run: got {text!r}"
+        raise argparse.ArgumentTypeError(msg)
+    return limits
+
+
+def _size(text: str) -> tuple[int, int]:
+    """One side of a square, or two."""
+    width, _, height = text.partition("x")
+    try:
+        size = int(width), int(height or width)
+    except ValueError:
+        size = 0, 0
+    if min(size) < 1:
+        msg = f"must be a number of pixels from 1, or two as in 1280x720: got {text!r}"
+        raise argparse.ArgumentTypeError(msg)
+    return size

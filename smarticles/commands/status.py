@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dem.errors import InputError
 from smarticles.layout import columns
-from smarticles.parsing import Commands, add_json
+from smarticles.parsing import Commands, add_json, positive_number
 
 if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
 
+_GOING_ON = ("running", "queued")
 _ENDED_EARLY = ("failed", "interrupted", "stopped")
 
 
@@ -30,42 +34,111 @@ run came, `checkpoint s` from where it would go on.""",
         examples="""\
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
+  smarticles status friction --watch               again and again, until nothing runs
   smarticles status friction --json | jq .counts
 """,
     )
     status.add_argument("directory", type=Path, metavar="DIR", help="of a sweep, a study or a run")
+    status.add_argument(
+        "--watch",
+        nargs="?",
+        type=positive_number,
+        const=2.0,
+        metavar="S",
+        help="look again every S seconds (2) until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
+    )
     add_json(status)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Look:
+    """What was seen of a directory at one moment."""
+
+    name: str
+    runs: list[RunStatus]
+    queue: dict[str, object] | None
+
+    @property
+    def counts(self) -> dict[str, int]:
+        from templates.sweep.folder import count_states  # noqa: PLC0415
+
+        return count_states(self.runs)
+
+    @property
+    def goes_on(self) -> bool:
+        return any(run.state in _GOING_ON for run in self.runs)
+
+    def to_text(self) -> str:
+        lines = [_status_table(self.runs)]
+        if self.queue is not None and self.queue["error"]:
+            lines.append(f"{self.queue['error']}; the states are those of the run directories alone")
+        counted = ", ".join(f"{n} {state}" for state, n in self.counts.items())
+        return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counted}"])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "counts": self.counts,
+            "queue": self.queue,
+            "runs": [run.to_dict() for run in self.runs],
+        }
 
 
 def show_status(arguments: argparse.Namespace) -> int:
     """`smarticles status`."""
-    from dem.record.rundir import in_use  # noqa: PLC0415
-    from templates.sweep.folder import MANIFEST, count_states, open_folder, run_status  # noqa: PLC0415
-
     directory: Path = arguments.directory
-    queue: dict[str, object] | None = None
-    if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
-        runs = [run_status(directory, active=in_use(directory))]
-        name = directory.name
-    else:
-        folder = open_folder(directory)
-        runs, name = folder.status(), folder.name
-        runs, queue = _with_queue(runs, directory)
-    counts = count_states(runs)
     if arguments.json:
-        content: Mapping[str, object] = {
-            "directory": str(directory),
-            "name": name,
-            "counts": counts,
-            "queue": queue,
-            "runs": [run.to_dict() for run in runs],
-        }
-        print(json.dumps(content, indent=2, ensure_ascii=False))
+        if arguments.watch is not None:
+            msg = "--watch: is for a person; leave it out with --json"
+            raise InputError(msg)
+        print(json.dumps({"directory": str(directory), **_look(directory).to_dict()}, indent=2, ensure_ascii=False))
         return 0
-    print(_status_table(runs))
-    if queue is not None and queue["error"]:
-        print(f"{queue['error']}; the states are those of the run directories alone")
-    print(f"{name}: {len(runs)} runs, " + ", ".join(f"{n} {state}" for state, n in counts.items()))
+    if arguments.watch is None:
+        print(_look(directory).to_text())
+        return 0
+    return _watch(directory, arguments.watch)
+
+
+def _look(directory: Path) -> _Look:
+    from dem.record.rundir import in_use  # noqa: PLC0415
+    from templates.sweep.folder import MANIFEST, open_folder, run_status  # noqa: PLC0415
+
+    if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
+        return _Look(name=directory.name, runs=[run_status(directory, active=in_use(directory))], queue=None)
+    folder = open_folder(directory)
+    runs, queue = _with_queue(folder.status(), directory)
+    return _Look(name=folder.name, runs=runs, queue=queue)
+
+
+def _watch(directory: Path, every: float) -> int:
+    """Look again and again until nothing goes on; a terminal shows the newest look, a pipe those that differ."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.live import Live  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    console = Console(soft_wrap=True)
+    look = _look(directory)
+    try:
+        if not console.is_terminal:
+            told = ""
+            while True:
+                if (text := look.to_text()) != told:
+                    print(text, flush=True)
+                told = text
+                if not look.goes_on:
+                    return 0
+                time.sleep(every)
+                look = _look(directory)
+        # Text, not markup: names of runs are data. What does not fit is cut while it is live, and whole at the end.
+        with Live(Text(look.to_text()), console=console, auto_refresh=False, vertical_overflow="ellipsis") as live:
+            while look.goes_on:
+                time.sleep(every)
+                look = _look(directory)
+                live.update(Text(look.to_text()), refresh=True)
+            live.vertical_overflow = "visible"
+    except KeyboardInterrupt:
+        # The way in which a watch ends; the runs are other processes.
+        return 0
     return 0
 
 

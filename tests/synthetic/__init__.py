@@ -74,6 +74,7 @@ class SyntheticRun:
             "internal-oscillation": self.oscillate_time,
             "pull-hook": 2.0,
             "remove-container": 2.0,
+            "arrange": 1.0,
             "strain": 3.0,
         }
 

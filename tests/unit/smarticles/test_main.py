@@ -18,8 +18,8 @@ from smarticles.main import build_parser, guarded
 from smarticles.stopping import orderly_stop
 
 COMMANDS = {
-    "run", "plan", "schema", "doctor", "measure", "render", "sweep", "status", "resume", "study", "accuracy",
-    "verify",
+    "run", "plan", "schema", "doctor", "measure", "render", "view", "export", "sweep", "status", "resume", "study",
+    "accuracy", "verify", "init", "compare", "report",
 }  # fmt: skip
 
 
@@ -63,10 +63,10 @@ def test_version(smarticles: Smarticles) -> None:
 @pytest.mark.parametrize(
     ("words", "wrong", "way_out"),
     [
-        ([], "command", "known: run, plan, "),
+        ([], "command", "known: init, schema, run, plan, "),
         (["stduy"], "COMMAND: 'stduy'", "'study'"),
-        (["xyzzy"], "COMMAND: 'xyzzy'", "known: run, plan, "),
-        (["--colour"], "--colour", "known: "),
+        (["xyzzy"], "COMMAND: 'xyzzy'", "known: init, schema, run, plan, "),
+        (["--frobnicate"], "--frobnicate", "known: "),
         (["run"], "SCENE.yaml, --out", ""),
         (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "--sett", "'--set'"),
         (["run", "s.yaml", "--out", "d", "more"], "'more'", ""),

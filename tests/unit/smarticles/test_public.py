@@ -13,6 +13,11 @@ from command_cases import WriteRun
 import smarticles
 from dem.errors import InputError, RunError
 from dem.scene.reading import parse_scene
+from dem.setting.fidelity import fidelities
+from smarticles.scene_sweep import write_sweep
+from smarticles.sweeps import make_folder
+from templates.sweep.expand import expand
+from templates.sweep.sweep_file import load_sweep
 
 HEAVY = (
     "dem",
@@ -62,7 +67,7 @@ def test_every_name_is_there_and_the_stub_tells_the_same() -> None:
 
 
 def test_an_unknown_name_is_refused_and_the_known_ones_are_named() -> None:
-    with pytest.raises(AttributeError, match=r"'nothing'; known: .*load_scene, measures, read, run, sweep"):
+    with pytest.raises(AttributeError, match=r"'nothing'; known: .*load_scene, measures, read, read_sweep, run, sweep"):
         _ = smarticles.nothing  # type: ignore[attr-defined]
 
 
@@ -92,3 +97,89 @@ def test_a_directory_that_holds_something_else_is_left_alone(tmp_path: Path) -> 
     with pytest.raises((InputError, RunError), match=r"yade|--out "):
         smarticles.run(scene, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_series_is_a_table_with_a_column_per_component(write_run: WriteRun, tmp_path: Path) -> None:
+    found = smarticles.read(write_run(tmp_path / "run", phases=("deposit", "relax", "shape-change", "relax")))
+    table = found.recorded()
+    assert list(table.columns[:2]) == ["time_s", "phase"]
+    assert {"angle_rad barb 1", "angle_rad barb 2"} <= {*table.columns}
+    assert table["com_height_m"].tolist() == found.series["com_height_m"].tolist()
+
+
+def test_a_table_of_a_run_has_a_row_per_phase_or_frame(write_run: WriteRun, tmp_path: Path) -> None:
+    found = smarticles.read(write_run(tmp_path / "run"))
+    assert found.table()["phase type"].tolist() == ["deposit", "relax", "shake", "relax"]
+    assert len(found.table(frames=True)) == len(found.frames) == 16
+
+
+# -- sweeps ------------------------------------------------------------------------------------------------------------
+
+
+def scene_of(**changes: object) -> smarticles.Scene:
+    return smarticles.Scene(seed=1, count=5, phases=[{"type": "deposit"}], **changes)
+
+
+@pytest.fixture
+def swept(tmp_path: Path, write_run: WriteRun) -> smarticles.SweepDirectory:
+    """Two aspect ratios, two seeds each; φ in the shaken phase 0.12 and 0.14, 0.2 and 0.3."""
+    file = write_sweep(scene_of(), {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]}, tmp_path)
+    folder = make_folder(file, tmp_path / "out", "test")
+    packing = dict(zip((entry.name for entry in folder.entries), (0.12, 0.14, 0.2, 0.3), strict=True))
+    for entry in folder.entries:
+        known = {"aspect_ratio": entry.values["aspect_ratio"], "seed": entry.values["seed"], "frames_per_phase": 1}
+        write_run(folder.run(entry), packing=(0.1, 0.1, packing[entry.name], 0.1), **known)
+    return smarticles.read_sweep(tmp_path / "out")
+
+
+def test_a_sweep_is_its_runs_in_order(swept: smarticles.SweepDirectory) -> None:
+    assert swept.values.to_dict("list") == {"aspect_ratio": [0.4, 0.4, 0.7, 0.7], "seed": [1, 2, 1, 2]}
+    assert [run.manifest.seed for run in swept] == [1, 2, 1, 2]
+    assert [run.path.name for run in swept[2:]] == ["aspect_ratio0.7_seed1", "aspect_ratio0.7_seed2"]
+
+
+def test_a_table_of_a_sweep_has_what_it_varies(swept: smarticles.SweepDirectory) -> None:
+    table = swept.table()
+    assert list(table.columns[:3]) == ["run", "aspect_ratio", "seed"]
+    assert list(table.columns).count("seed") == 1
+    assert table["aspect_ratio"].tolist() == [0.4] * 8 + [0.7] * 8
+
+
+def test_groups_have_means_and_standard_errors_over_runs(swept: smarticles.SweepDirectory) -> None:
+    means = swept.table(by="aspect_ratio")
+    shaken = means[means["phase type"] == "shake"].set_index("aspect_ratio")
+    phi, error = "phi second-highest-com [-]", "phi second-highest-com SE [-]"
+    # Frames of a made-up run have 1.002 times their φ; the error of two values is half their difference.
+    assert shaken[phi].tolist() == pytest.approx([0.13 * 1.002, 0.25 * 1.002], rel=1e-9)
+    assert shaken[error].tolist() == pytest.approx([0.01 * 1.002, 0.05 * 1.002], rel=1e-9)
+    assert shaken["runs [-]"].tolist() == [2, 2]
+
+
+def test_an_unknown_group_is_refused_and_the_nearest_named(swept: smarticles.SweepDirectory) -> None:
+    with pytest.raises(InputError, match="'aspect_ration' is no column of these runs; did you mean 'aspect_ratio'"):
+        swept.table(by="aspect_ration")
+
+
+def test_what_follows_from_a_scene_follows_anew_where_it_varies(tmp_path: Path) -> None:
+    file = write_sweep(scene_of(fidelity="draft"), {"engine": ["yade", "links"]}, tmp_path)
+    scenes = [point.scene for point in expand(load_sweep(file))]
+    assert [scene.engine for scene in scenes] == ["yade", "links"]
+    for scene in scenes:
+        named = fidelities(scene.engine)["draft"]
+        assert named.items() <= scene.fidelity.model_dump().items()
+    assert fidelities("yade")["draft"] != fidelities("links")["draft"]
+
+
+def test_a_scene_that_a_template_would_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds '\{\{', which a template would take for its own"):
+        write_sweep(scene_of(name="{{ 7 * 7 }}"), {"count": [1, 2]}, tmp_path)
+
+
+def test_keys_that_end_alike_keep_all_their_words(tmp_path: Path) -> None:
+    waits = [{"type": "deposit"}, {"type": "relax"}, {"type": "relax"}]
+    scene = smarticles.Scene(seed=1, count=5, phases=waits)
+    vary = {"phases.1.duration_s": [0.1, 0.2], "phases.2.duration_s": [0.3], "contact.restitution": [0.5]}
+    points = expand(load_sweep(write_sweep(scene, vary, tmp_path)))
+    assert [*points[0].values] == ["phases_1_duration_s", "phases_2_duration_s", "restitution"]
+    assert [[phase.duration_s for phase in point.scene.phases[1:]] for point in points] == [[0.1, 0.3], [0.2, 0.3]]
+    assert points[0].scene.contact.restitution == 0.5

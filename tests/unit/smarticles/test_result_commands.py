@@ -64,6 +64,26 @@ def test_measure_does_not_overwrite_unless_told(tmp_path: Path, write_run: Write
     assert table.read_text(encoding="utf-8").startswith("run,")
 
 
+def test_measure_writes_a_profile_of_each_run_beside_the_table(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    profile = tmp_path / "profile.csv"
+    said = smarticles("measure", *runs, "--profile", profile)
+    assert said.status == 0
+    with profile.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert said.out.splitlines()[-1] == f"{profile}: φ(r, z), {len(rows)} rows"
+    assert {row["run"] for row in rows} == {str(run) for run in runs}
+    assert {row["phase type"] for row in rows} == {"deposit", "relax", "shake"}
+    assert len({row["inner radius [m]"] for row in rows}) == 6
+    assert max(float(row["phi voxel [-]"]) for row in rows) > 0.01
+    again = smarticles("measure", runs[0], "--profile", profile)
+    assert (again.status, "exists" in again.err) == (2, True)
+    both = smarticles("measure", runs[0], "--profile", tmp_path / "x.csv", "--table", tmp_path / "x.csv")
+    assert (both.status, "is the file of --table too" in both.err) == (2, True)
+
+
 def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     said = smarticles("measure", run, "--frames", "--json")
@@ -89,6 +109,39 @@ def test_measure_takes_the_runs_of_a_sweep(
     write_run(out / "runs" / "n6")
     rows = json.loads(smarticles("measure", out, "--json").out)
     assert {row["run"] for row in rows} == {str(out / "runs" / "n6")}
+
+
+def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out, table = tmp_path / "out", tmp_path / "table.csv"
+    sweep_file.write_text(sweep_file.read_text().replace("grid: {count: [5, 6]}", "grid: {count: [5, 6], kind: [a]}"))
+    smarticles("sweep", sweep_file, "--out", out)
+    for name, count, last in (("n5", 5, 0.12), ("n6", 6, 0.14)):
+        write_run(out / "runs" / name, count=count, packing=(0.1, 0.1, last, last))
+    smarticles("measure", out, "--table", table)
+    with table.open(encoding="utf-8") as file:
+        assert [(row["kind"], row["count"]) for row in csv.DictReader(file)] == [("a", "5")] * 4 + [("a", "6")] * 4
+    said = smarticles("measure", out, "--by", "kind")
+    lines = said.out.splitlines()
+    assert lines[0].split()[:3] == ["kind", "runs", "phase"]
+    assert [line.split()[:3] for line in lines[1:5]] == [
+        ["a", "2", kind] for kind in ("deposit", "relax", "shake", "relax")
+    ]
+    # Of 0.12 and 0.14: their mean, and half their difference.
+    assert lines[3].split()[5:7] == ["0.1300", "0.0100"]
+    assert "standard error over runs" in said.out
+
+
+def test_measure_refuses_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    said = smarticles("measure", run, "--by", "seeed")
+    assert (said.status, said.err) == (
+        2,
+        "smarticles: error: --by seeed: 'seeed' is no column of these runs; did you mean 'seed'?\n",
+    )
+    assert "leave --frames out" in smarticles("measure", run, "--by", "seed", "--frames").err
+    assert "names no column" in smarticles("measure", run, "--by", ",").err
 
 
 def test_measure_of_nothing_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
@@ -199,6 +252,54 @@ def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles:
     again = smarticles("render", run, "--output", picture)
     assert again.status == 2
     assert "--overwrite" in again.err or "exists" in again.err
+
+
+def test_render_draws_a_film_of_a_part_in_fixed_colours(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run, film = write_run(tmp_path / "a", phases=("deposit",) * 3, frames_per_phase=4), tmp_path / "film.webp"
+    words = ("--size", "320x240", "--from", "0.5", "--to", "2", "--every", "0.5", "--fps", "20", "--clim", "0:5")
+    said = smarticles("render", run, "--output", film, *words)
+    # Not a word of progress where nobody looks.
+    assert (said.status, said.out, said.err) == (0, f"{film}\n", "")
+    with Image.open(film) as images:
+        assert (images.n_frames, images.size) == (4, (320, 240))
+        images.seek(1)
+        images.load()
+        assert images.info["duration"] == 50
+
+
+def test_render_draws_runs_beside_each_other_and_one_smarticle(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    both, alone = tmp_path / "both.png", tmp_path / "alone.png"
+    assert smarticles("render", runs[0], "--compare", runs[1], "--output", both, "--size", "300").status == 0
+    with Image.open(both) as image:
+        assert image.height == 300
+        assert 500 < image.width < 600  # one colour bar for both
+    assert smarticles("render", runs[0], "--smarticle", "3", "--output", alone, "--size", "300").status == 0
+    said = smarticles("render", runs[0], "--smarticle", "99", "--output", tmp_path / "c.png")
+    assert (said.status, "smarticle 99: there are 0 to 11 at 22 s" in said.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--fps", "10"), "--fps 10: a picture shows one time; use --time, or write a film: --output film.gif"),
+        (("--from", "1"), "--from 1: a picture shows one time"),
+        (("--smarticle", "1", "--output", "a.gif"), "--smarticle 1: is drawn alone, in a picture; leave it out"),
+        (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
+        (("--clim", "all"), "must be LOW:HIGH, two numbers in order, or run: got 'all'"),
+        (("--size", "12y3"), "must be a number of pixels from 1, or two as in 1280x720: got '12y3'"),
+    ],
+)
+def test_render_says_what_has_no_meaning(
+    tmp_path: Path, smarticles: Smarticles, words: tuple[str, ...], message: str
+) -> None:
+    said = smarticles("render", tmp_path, *words)
+    assert said.status == 2
+    assert message in said.err
 
 
 def test_render_help_names_all_it_can_do(smarticles: Smarticles) -> None:

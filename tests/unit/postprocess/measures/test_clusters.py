@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from dem.errors import InputError
+from postprocess import measure_run
 from postprocess.errors import UndefinedMeasureError
-from postprocess.measures.clusters import contact_clusters, entanglement_clusters
+from postprocess.measures.clusters import (
+    contact_clusters,
+    entanglement_clusters,
+    spans_height,
+    spans_width,
+    touching_clusters,
+)
 
 D = 1e-3
 
@@ -54,3 +61,74 @@ def test_nothing_has_no_cluster(shape):
         contact_clusters(np.empty((0, 4, 3)), D)
     with pytest.raises(InputError, match="distance must be above 0 m"):
         contact_clusters([shape()], 0.0)
+
+
+# -- what they span --------------------------------------------------------------------------------------------------
+
+
+def upright(at, low=0.0, long=0.02):
+    """Straight smarticles that stand at (n, 2) places [m], from a height on [m]."""
+    at = np.asarray(at, dtype=float)
+    heights = low + long * np.array([0, 0.3, 0.7, 1.0])
+    return np.concatenate(
+        [np.broadcast_to(at[:, None], (len(at), 4, 2)), np.broadcast_to(heights[:, None], (len(at), 4, 1))], axis=2
+    )
+
+
+def test_a_stack_spans_the_height_until_one_is_missing():
+    ladder = np.concatenate([upright([[k * D / 2, 0]], low=0.015 * k) for k in range(5)])
+    clusters = touching_clusters(ladder, D)
+    assert clusters.sizes.tolist() == [5]
+    assert spans_height(clusters, ladder, diameter=D, floor_z=0.0)
+    broken = ladder[[0, 1, 3, 4]]
+    clusters = touching_clusters(broken, D)
+    assert clusters.sizes.tolist() == [2, 2]
+    assert not spans_height(clusters, broken, diameter=D, floor_z=0.0)
+    # Hanging in the air it spans nothing.
+    assert not spans_height(touching_clusters(ladder, D), ladder, diameter=D, floor_z=-0.01)
+
+
+def spokes(angles, start=0.0, end=0.03):
+    """Straight smarticles from a distance from the axis to another, at angles [degree]."""
+    along = np.radians(angles)[:, None, None] + np.array([0, np.pi / 2, 0])
+    outwards = np.cos(np.stack([along[..., 0], along[..., 0] - np.pi / 2, np.full_like(along[..., 0], np.pi / 2)], -1))
+    return outwards * (start + (end - start) * np.array([0, 0.3, 0.7, 1.0]))[:, None]
+
+
+@pytest.mark.parametrize(
+    ("angles", "start", "spans"),
+    [
+        ([0, 120, 240], 0.0, True),
+        ([0, 110, 220, 230], 0.0, True),
+        # All on one half of the wall, or on its two ends.
+        ([0, 60, 120], 0.0, False),
+        ([0, 90, 180], 0.0, False),
+        # Around the wall, but of three clusters.
+        ([0, 120, 240], 0.003, False),
+    ],
+)
+def test_a_cluster_spans_the_width_where_no_half_of_the_wall_has_all_its_ends(angles, start, spans):
+    star = spokes(angles, start)
+    clusters = touching_clusters(star, D)
+    assert len(clusters.sizes) == (1 if start == 0 else 3)
+    assert spans_width(clusters, star, diameter=D, wall_radius=0.03) is spans
+    # The same star without the wall.
+    assert not spans_width(clusters, star, diameter=D, wall_radius=0.032)
+
+
+def test_touching_is_between_what_spheres_sweep_and_not_between_tips(shape):
+    """A sphere at the end of a link stays inside its tip: a tip that points at another link a radius away is apart."""
+    line = shape(0.01, 0.7, (0.0, 0.0))
+    across = line[:, [1, 0, 2]] + [0, 0.012 + 0.9 * D, 0]
+    assert contact_clusters([line, across], D).largest == 1
+    assert touching_clusters([line, across], D).largest == 0.5
+    assert touching_clusters([line, across - [0, 0.45 * D, 0]], D).largest == 1
+
+
+def test_tables_tell_what_the_graphs_span(make_run):
+    table = measure_run(make_run(), costly="every-frame")
+    for name in ("contact", "crossing"):
+        assert table[f"{name} graph largest share [-]"].between(0, 1, inclusive="right").all()
+        assert table[f"{name} graph spans height [-]"].isin([0.0, 1.0]).all()
+    cheap = measure_run(make_run(), costly="never")
+    assert cheap["contact graph spans width [-]"].isna().all()

@@ -3,8 +3,9 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from dem.errors import InputError
-from postprocess import contact_pairs, neighbours_in_contact
-from postprocess.measures.contacts import segment_distances
+from postprocess import contact_pairs, measure_run, neighbours_in_contact
+from postprocess.geometry.links import swept_axes
+from postprocess.measures.contacts import segment_distances, without_support
 
 
 def oracle_distance(p0, p1, q0, q1):
@@ -74,3 +75,50 @@ def test_few_smarticles(shape):
 def test_bad_distance(shape, distance):
     with pytest.raises(InputError, match="distance must be above 0 m"):
         contact_pairs([shape()], distance)
+
+
+# -- touching nothing ------------------------------------------------------------------------------------------------
+
+
+def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
+    line, d = shape(0.01, 0.7, (0.0, 0.0)), 1e-3
+    places = np.array([[0, 0, 0.5 * d], [0, 0, 0.6 * d], [0.0075, 0, 0.01], [0.0077, 0, 0.01], [0, 0, 0.01]])
+    pile = line + places[:, None]
+    told = {"diameter": d, "floor_z": 0.0}
+    # A tip is 12 mm from the middle: it touches a wall of 20 mm where the middle is 8 mm, less what facets take, out.
+    assert without_support(pile, [0] * 5, wall_radius=0.02, **told).tolist() == [False, True, True, True, True]
+    assert without_support(pile, [0] * 5, wall_radius=0.0195, **told).tolist() == [False, True, False, False, True]
+    assert without_support(pile, [0] * 5, wall_radius=None, **told).tolist() == [False, True, True, True, True]
+    # Lower than the floor it touches it as well; one neighbour is enough.
+    assert not without_support(pile - np.array([0, 0, 0.1]), [0] * 5, wall_radius=None, **told).any()
+    assert without_support(pile, [0, 1, 0, 2, 0], wall_radius=None, **told).tolist() == [
+        False,
+        False,
+        True,
+        False,
+        True,
+    ]
+
+
+def test_tables_have_the_spread_of_the_contacts_and_the_rattlers(make_run):
+    """The frames of the fixture tell 0 to 5 contacts of six smarticles."""
+    run = make_run()
+    row = measure_run(run, costly="never").iloc[2]
+    assert row["contacts SD [-]"] == pytest.approx(np.std(np.arange(6)))
+    assert row["contacts most [-]"] == 5
+    assert row["without contact [-]"] == pytest.approx(1 / 6)
+    # The one without a contact hangs in the air.
+    assert row["rattlers [-]"] == pytest.approx(1 / 6)
+
+
+def test_swept_axes_end_a_radius_before_the_tips(shape):
+    u = shape(0.01, 0.7)
+    axes = swept_axes(u[None], 1e-3)[0]
+    assert np.linalg.norm(axes[[0, 3]] - u[[0, 3]], axis=1) == pytest.approx(0.5e-3)
+    assert np.linalg.norm(np.diff(axes, axis=0), axis=1) == pytest.approx([6.5e-3, 10e-3, 6.5e-3])
+    # A barb shorter than the radius is inside the sphere at its hinge; a bar without barbs ends before its ends.
+    short = shape(0.01, 0.04)
+    assert np.array_equal(swept_axes(short[None], 1e-3)[0], short[[1, 1, 2, 2]])
+    bar = swept_axes(shape(0.01, 0.0)[None], 1e-3)[0]
+    assert np.ptp(bar[:, 0]) == pytest.approx(9e-3)
+    assert np.ptp(swept_axes(shape(0.01, 0.7, (0.0, 0.0))[None], 1e-3)[0][:, 0]) == pytest.approx(23e-3)

@@ -1,8 +1,6 @@
 """Pictures are judged by their pixels; a scene is small and so is its picture."""
 
 import ctypes
-import itertools
-import sys
 
 import numpy as np
 import pytest
@@ -12,11 +10,10 @@ from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, wri
 from dem.errors import InputError, RunError
 from dem.record.frames import read_frames
 from dem.record.manifest import read_run
-from postprocess.pictures import film
 from postprocess.pictures.camera import VIEWS, Look, extent, fitted_camera
 from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
-from postprocess.pictures.render import render_film, render_run
+from postprocess.pictures.render import render_run
 from postprocess.pictures.surroundings import read_surroundings
 from postprocess.report import figures
 
@@ -41,9 +38,10 @@ def pixels(path):
 
 
 def panel(image):
-    """The three-dimensional part: below the caption, left of the colour bar."""
+    """The three-dimensional part: below the caption, left of the colour bar, above the scale bar."""
     height, width, _ = image.shape
-    return image[round(0.12 * height) :, : round(0.86 * width)]
+    unit = max(min(height, width) / 100, 4.4)
+    return image[round(12 * unit) : round(height - 5 * unit), : round(width - 14 * unit)]
 
 
 def coloured(image):
@@ -231,45 +229,6 @@ def test_missing_graphics_are_an_error_and_no_crash(run, tmp_path, monkeypatch):
     monkeypatch.setattr(ctypes, "CDLL", refuse)
     with pytest.raises(RunError, match=r"no display and no libEGL\.so\.1; apt-get install libegl1"):
         render_run(run, output=tmp_path / "a.png", size=SIZE)
-
-
-# Films
-
-
-@pytest.mark.parametrize("suffix", [".gif", ".webp"])
-def test_film_moves(run, tmp_path, suffix):
-    path = render_film(run, tmp_path / f"film{suffix}", size=SIZE, most_frames=4, color_by="height")
-    with Image.open(path) as images:
-        assert images.n_frames == 4
-        pictures = []
-        for index in range(4):
-            images.seek(index)
-            pictures.append(panel(np.asarray(images.convert("RGB")).astype(int)))
-    for before, after in itertools.pairwise(pictures):
-        moved = (np.abs(before - after).max(axis=2) > 30).mean()
-        assert 0.001 < moved < 0.5
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_film_needs_two_frames(tmp_path):
-    run = single_run(tmp_path / "a", u_shape(W)[None])
-    with pytest.raises(InputError, match="a film needs at least 2 frames: got 1"):
-        render_film(run, tmp_path / "a.gif", size=SIZE)
-
-
-def test_mp4_without_imageio_is_refused_before_drawing(run, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "imageio.v2", None)
-    with pytest.raises(InputError, match=r"\.mp4 needs the package .*, or choose \.gif"):
-        render_film(run, tmp_path / "a.mp4", size=SIZE)
-    with pytest.raises(InputError, match=r"size must be even for \.mp4: got 241 x 240 pixels"):
-        film.check_film(tmp_path / "a.mp4", (241, 240))
-
-
-def test_failed_film_leaves_nothing_behind(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(film, "write_film", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        render_film(run, tmp_path / "a.gif", size=SIZE, most_frames=2)
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 # Scales

@@ -1,0 +1,1 @@
+"""True bodies of runs with their fields, as files for other programs."""

@@ -1,0 +1,106 @@
+"""Whether smarticles lie alike: the nematic order of their middle links."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import checked_vertices
+from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NematicOrder:
+    """Order of directions without a head.
+
+    Attributes:
+        tensor: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace.
+        order: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of
+            N random directions in space not 0 but about 0.8 / N^½.
+        director: (3,) the unit vector of S, upwards.
+    """
+
+    tensor: NDArray[np.float64] = field(repr=False)
+    order: float
+    director: NDArray[np.float64]
+
+    @property
+    def polar_angle(self) -> float:
+        """Angle of the director from the vertical [rad], 0 to π/2."""
+        return math.acos(min(abs(float(self.director[2])), 1.0))
+
+    @property
+    def upright(self) -> float:
+        """Q_zz = ⟨(3 cos²θ - 1) / 2⟩ [-], θ from the vertical: 1 all upright, -1/2 all level, 0 at random."""
+        return float(self.tensor[2, 2])
+
+
+def nematic_order(directions: ArrayLike) -> NematicOrder:
+    """Order of directions.
+
+    Args:
+        directions: (N, 3), of any length above 0.
+
+    Returns:
+        Q, its largest eigenvalue and its director.
+
+    Raises:
+        InputError: Not (N, 3) finite vectors with a length.
+        UndefinedMeasureError: There is none.
+
+    Source:
+        Eppenga & Frenkel, Mol. Phys. 52, 1303 (1984): the largest eigenvalue of Q, and its bias of order N^-½. Agrees
+        with `freud.order.Nematic` (3.4.0) to 2e-7, which is single precision.
+
+    Example:
+        >>> nematic_order([[0, 0, 2.0], [0, 0, -1.0]]).order
+        1.0
+    """
+    directions = np.asarray(directions, dtype=np.float64)
+    if directions.ndim != 2 or directions.shape[1] != 3 or not np.all(np.isfinite(directions)):
+        msg = f"directions must be (N, 3) finite numbers: got an array of shape {directions.shape}"
+        raise InputError(msg)
+    if len(directions) == 0:
+        msg = "a nematic order needs at least 1 direction: got 0"
+        raise UndefinedMeasureError(msg)
+    lengths = np.linalg.norm(directions, axis=1)
+    if not np.all(lengths > 0):
+        msg = f"direction {int(np.argmin(lengths))} has no length; leave it out"
+        raise InputError(msg)
+    unit = directions / lengths[:, None]
+    tensor = 1.5 * unit.T @ unit / len(unit) - 0.5 * np.eye(3)
+    values, vectors = np.linalg.eigh(tensor)
+    director = vectors[:, -1]
+    return NematicOrder(
+        tensor=tensor, order=float(values[-1]), director=-director if director[2] < 0 else director.copy()
+    )
+
+
+def _nematic_of(frame: Frame, _: RunManifest) -> tuple[float, float, float]:
+    order = nematic_order(np.diff(checked_vertices(frame.vertices), axis=1)[:, 1])
+    return order.order, math.degrees(order.polar_angle), order.upright
+
+
+MEASURES = (
+    FrameMeasure(
+        name="nematic order",
+        place=46,
+        quantities=(
+            Quantity("nematic order", "-"),
+            Quantity("director from vertical", "degree"),
+            Quantity("upright order", "-"),
+        ),
+        take=_nematic_of,
+        told_of=in_space,
+    ),
+)

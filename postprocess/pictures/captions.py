@@ -1,0 +1,57 @@
+"""What is said above a picture: which run, which time, and the two numbers that `smarticles measure` gives of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.measures.entanglement import entanglement
+from postprocess.measures.packing import packing_of
+
+DEFINITION = "second-highest-com"
+"""Definition of the packing fraction that pictures tell, as the first column of `smarticles measure`."""
+
+
+@dataclass(frozen=True)
+class Caption:
+    """A title, and lines below it."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+def caption_of(frame: Frame, run: RunManifest, *, pace: str = "") -> Caption:
+    """The caption of a frame.
+
+    Args:
+        frame: One of the run's frames.
+        run: The run.
+        pace: How fast a film plays; empty for a picture.
+    """
+    count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
+    phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
+    when = f"t = {frame.time:.3f} s ({phase})"
+    lines = [f"l/w = {run.aspect_ratio:g}   N = {count}   {when}"]
+    if pace:
+        lines[0] += f"   {pace}"
+    if not run.planar:  # neither packing nor crossings have a meaning there
+        mean = entanglement(frame.vertices).mean
+        crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
+        lines.append(f"{packing_text(frame, run)}   {crossings}")
+    return Caption(run.name, tuple(lines))
+
+
+def packing_text(frame: Frame, run: RunManifest) -> str:
+    """φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
+    value = packing_of(frame, run, definition=DEFINITION)
+    if math.isfinite(value):
+        return f"φ = {value:.4f} ({DEFINITION})"
+    if run.container_tiers > 1:
+        return f"no φ: a mould of {run.container_tiers} tiers"
+    if not run.walled(frame.phase):
+        return "no φ: the wall is gone"
+    if frame.count < 2:
+        return "no φ: fewer than 2 smarticles"
+    return "no φ: the pile has no height"

@@ -1,0 +1,88 @@
+"""One run before the camera: its frames, what stands around them, and what its colours tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from dem.errors import InputError
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import RunManifest, read_run
+from postprocess.pictures.camera import Look, extent
+from postprocess.pictures.surroundings import Surroundings, read_surroundings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Span = tuple[float, float]
+"""Least and largest value of a scale of colours."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shot:
+    """A run to be drawn."""
+
+    run: RunManifest
+    frames: FrameSequence = field(repr=False)
+    around: Surroundings = field(repr=False)
+
+    @classmethod
+    def of(cls, directory: Path | str) -> Self:
+        """A shot of a run directory.
+
+        Raises:
+            InputError: Something of it is missing or damaged.
+        """
+        run = read_run(directory)
+        return cls(run=run, frames=read_frames(directory), around=read_surroundings(run))
+
+    def extent(self, indices: Iterable[int], look: Look) -> NDArray[np.float64]:
+        """(n, 3) [mm], what the camera must have in view to show some frames."""
+        return np.concatenate([extent(self.frames[int(i)], self.run, look, self.around) for i in indices])
+
+    def values(self, indices: Iterable[int], look: Look) -> list[NDArray[Any]]:
+        """What the colours of some frames tell, (N,) each."""
+        return [look.colouring.values(self.frames[int(i)]) for i in indices]
+
+    def frame_at(self, time: float | None) -> int:
+        """Index of the frame nearest to a time [s]; the last one for None.
+
+        Raises:
+            InputError: The time is before the first frame or after the last one.
+        """
+        if time is None:
+            return len(self.frames) - 1
+        first, last = float(self.frames.times[0]), float(self.frames.times[-1])
+        slack = 1e-9 * max(abs(first), abs(last), 1.0)
+        if not first - slack <= time <= last + slack:
+            msg = f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s"
+            raise InputError(msg)
+        return int(np.argmin(np.abs(self.frames.times - time)))
+
+
+def common_times(shots: Sequence[Shot]) -> NDArray[np.float64]:
+    """Times of the frames that all runs have come to: those of the one with the fewest [s].
+
+    Raises:
+        InputError: There is no time at which all have frames.
+    """
+    low = max(float(shot.frames.times[0]) for shot in shots)
+    high = min(float(shot.frames.times[-1]) for shot in shots)
+    if low > high:
+        spans = ", ".join(
+            f"{shot.run.directory} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots
+        )
+        msg = f"the runs have no time in common: {spans}; compare runs that overlap in time"
+        raise InputError(msg)
+    inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]
+    return min(inside, key=len)
+
+
+def span_of(values: Iterable[NDArray[Any]]) -> Span:
+    """Least and largest of all values."""
+    joined = np.concatenate(list(values))
+    return float(joined.min()), float(joined.max())

@@ -1,0 +1,247 @@
+"""The page and its server: controls, what they do, and the address that only this user has."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from trame.app import get_server
+from trame.ui.html import DivLayout
+from trame.widgets import client, html
+from trame.widgets import vtk as vtk_widgets
+from vtkmodules.vtkCommonCore import vtkLogger
+
+from dem.errors import InputError
+from postprocess.view.guard import HOST, address, new_token, protect
+from postprocess.view.run_view import RunView, colour_names
+
+_LOOK_EVERY = 1.0  # s, for new frames
+_FILM_STEP = 0.12  # s between frames while it plays
+_CLOSED_FOR = 5  # s without a window until the server ends; a page that is loaded anew comes back sooner
+
+_STYLE = """
+html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #1a1a1a; background: #fff; }
+.page { display: grid; grid-template: auto 1fr auto / 1fr auto; height: 100vh; }
+.page header, .page footer { grid-column: 1 / 3; padding: 8px 12px; display: flex; flex-wrap: wrap; gap: 6px 16px;
+  align-items: center; background: #f4f4f2; }
+.page header b { overflow-wrap: anywhere; }
+.page main { position: relative; min-width: 0; min-height: 0; }
+.page aside { width: 250px; padding: 10px 12px; overflow: auto; background: #fafaf8; }
+.page input[type=range] { flex: 1; min-width: 120px; }
+.page dl { margin: 0; } .page dt { font-size: 12px; color: #55595e; margin-top: 6px; }
+.page dd { margin: 0; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+.key { display: flex; align-items: center; gap: 8px; }
+.key i { width: 18px; height: 16px; display: inline-block; }
+.fault { color: #b3261e; }
+@media (max-width: 640px) { .page { grid-template: auto 1fr auto auto / 1fr; }
+  .page header, .page footer { grid-column: 1; } .page aside { width: auto; max-height: 30vh; } }
+"""
+
+
+class Viewer:
+    """One run in one page, and the server of that page.
+
+    Args:
+        view: The run.
+        port: To listen on; 0: any that is free.
+        opened: Called with the address once the server listens.
+    """
+
+    def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:
+        self._view = view
+        self._port = port
+        self._opened = opened
+        self._token = new_token()
+        self._web: Any = None
+        self._server: Any = get_server(f"smarticles-{id(self)}", client_type="vue3")
+        self._state = self._server.state
+        self._canvas: Any = None
+        self._stopping: asyncio.Future[None] | None = None
+        self._fill_state()
+        self._connect()
+        self._lay_out()
+
+    def serve(self) -> None:
+        """Serve until the window is closed."""
+        # The library reads the arguments of the process unless it is given some.
+        os.environ["TRAME_ARGS"] = f"--server --host {HOST} --authKey={self._token} --nosignalhandlers"
+        os.environ["WSLINK_READY_MSG"] = ""
+        try:
+            asyncio.run(self._run())
+        except OSError as error:
+            cause = os.strerror(error.errno or 0)
+            msg = f"--port {self._port}: cannot listen there ({cause}); leave it out, or choose another"
+            raise InputError(msg) from None
+
+    async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        # A signal that interrupts VTK anywhere would end in a crash; this waits for it, and closes the windows.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if threading.current_thread() is threading.main_thread():
+                loop.add_signal_handler(number, self._stop)
+        watch = asyncio.create_task(self._watch())
+        try:
+            await self._server.start(
+                exec_mode="coroutine", port=self._port, host=HOST, timeout=0, show_connection_info=False,
+                open_browser=False, disable_logging=True,
+            )  # fmt: skip
+        finally:
+            watch.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await watch
+
+    def _stop(self) -> None:
+        if self._stopping is None and self._web is not None:
+            self._stopping = asyncio.ensure_future(self._server.stop())
+
+    def _fill_state(self) -> None:
+        view, state = self._view, self._state
+        # All texts of the run are values, shown as they are: none becomes part of the page's code.
+        state.trame__title = "smarticles"
+        state.run_name = view.run.name
+        state.fields = colour_names(view.fields)
+        state.field = view.field.name
+        state.index, state.last = view.index, len(view.frames) - 1
+        state.playing, state.following = False, not view.ended
+        state.fault = ""
+        self._tell()
+        view.look()
+
+    def _connect(self) -> None:
+        state, controller = self._state, self._server.controller
+        state.change("index")(self._on_index)
+        state.change("field")(self._on_field)
+        state.change("playing")(self._on_playing)
+        controller.add("on_server_bind")(self._bind)
+        controller.add("on_server_ready")(lambda **_: self._opened(address(self._server.port, self._token)))
+        controller.add("on_client_connected")(self._shorten)
+
+    def _bind(self, web: Any) -> None:
+        self._web = web
+        protect(web.app, self._token)
+
+    def _shorten(self, **_: Any) -> None:
+        self._web.config["timeout"] = _CLOSED_FOR
+
+    def _lay_out(self) -> None:
+        with DivLayout(self._server, classes="page"):
+            client.Style(_STYLE)
+            with html.Header():
+                html.B("{{ run_name }}")
+                html.Span("{{ caption }}")
+                with html.Label("colour by "), html.Select(v_model=("field",), id="field"):
+                    html.Option("{{ entry.title }}", v_for="entry in fields", key="entry.name", value=("entry.name",))
+                html.Span("{{ fault }}", v_if="fault", classes="fault", role="alert")
+            with html.Main():
+                self._canvas = vtk_widgets.VtkLocalView(
+                    self._view.window.vtk,
+                    picking_modes=("['click']",),
+                    click=(self._on_click, "[$event]"),
+                )
+            with html.Aside():
+                with html.Div(v_for="(entry, k) in legend", key="k", classes="key"):
+                    html.I(style=("{ background: entry.colour }",))
+                    html.Span("{{ entry.label }}")
+                html.P("click on a smarticle to see its fields", v_if="!told.length")
+                with html.Dl(v_if="told.length", id="told"), html.Template(v_for="entry in told", key="entry.name"):
+                    html.Dt("{{ entry.name }}", title=("entry.meaning",))
+                    html.Dd("{{ entry.value }} {{ entry.unit == '-' ? '' : entry.unit }}")
+            with html.Footer():
+                html.Button("{{ playing ? 'stop' : 'play' }}", click="playing = !playing", id="play")
+                html.Input(
+                    type="range", min=0, max=("last",), step=1, v_model_number=("index",), id="time",
+                    aria_label="frame",
+                )  # fmt: skip
+                html.Span("{{ clock }}", id="clock")
+                with html.Label(v_if="growing"):
+                    html.Input(type="checkbox", v_model=("following",), id="follow")
+                    html.Span(" follow the run")
+
+    def _tell(self) -> None:
+        """What the page says of the frame shown."""
+        view, state = self._view, self._state
+        frame = view.frame
+        view.draw()
+        state.caption = f"N = {frame.count} of {view.run.count}, {view.phase}"
+        state.clock = f"t = {frame.time:.4g} s, frame {view.index} of {len(view.frames) - 1}"
+        state.legend = view.legend()
+        state.told = view.told()
+        state.growing = not view.ended
+
+    def _redraw(self) -> None:
+        self._tell()
+        self._canvas.update()
+
+    def _on_index(self, index: Any, **_: Any) -> None:
+        wanted = int(index)
+        if wanted == self._view.index:
+            return
+        try:
+            self._view.go_to(wanted)
+            self._state.fault = ""
+        except InputError as error:
+            self._state.fault = str(error)
+            return
+        self._redraw()
+
+    def _on_field(self, field: str, **_: Any) -> None:
+        if field == self._view.field.name:
+            return
+        self._view.colour_by(field)
+        self._redraw()
+
+    def _on_click(self, event: Any) -> None:
+        ray = np.asarray((event or {}).get("ray", ()), dtype=np.float64)
+        if ray.shape == (2, 3) and np.isfinite(ray).all():
+            self._view.pick_along(ray)
+        else:
+            self._view.pick = None
+        self._redraw()
+
+    def _on_playing(self, playing: bool, **_: Any) -> None:
+        if playing:
+            asyncio.create_task(self._play())  # noqa: RUF006 - it ends by itself
+
+    async def _play(self) -> None:
+        while self._state.playing:
+            with self._state as state:
+                state.index = (self._view.index + 1) % len(self._view.frames)
+            await asyncio.sleep(_FILM_STEP)
+
+    async def _watch(self) -> None:
+        """New frames of a run that goes on."""
+        while True:
+            await asyncio.sleep(_LOOK_EVERY)
+            try:
+                grown = self._view.grow()
+            except InputError:  # just being rewritten, or gone: what was read stays
+                continue
+            with self._state as state:
+                state.growing = not self._view.ended
+                if grown:
+                    state.last = len(self._view.frames) - 1
+                    if state.following:
+                        state.index = state.last
+
+
+def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
+    """Serves a page of a run, until its window is closed.
+
+    Args:
+        directory: A run directory with at least one frame; the run may still go on.
+        port: To listen on, on this machine alone; 0: any that is free.
+        opened: Called with the address once the server listens.
+
+    Raises:
+        InputError: There is no frame, or it is damaged; or the port is taken.
+    """
+    # Says that there is no display, which nothing here needs.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    Viewer(RunView(directory), port=port, opened=opened).serve()

@@ -1,0 +1,96 @@
+"""export: true bodies of a run as files for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from smarticles.parsing import Commands
+
+_FORMATS = ("vtp", "stl", "obj", "gltf", "glb")
+
+# One line each; tests hold this table against `postprocess.export`, which is slow to import.
+_FIELDS = """\
+  smarticle_id [-]                     number of the smarticle, the same in all frames
+  link [-]                             0 barb 1, 1 middle link, 2 barb 2
+  speed_m_per_s [m/s]                  of the centre of mass
+  height_m [m]                         of the centre of mass above the floor
+  velocity_m_per_s [m/s]               vector, of the link's centre
+  angular_velocity_rad_per_s [rad/s]   vector, of the link
+  contacts [-]                         other smarticles that it touches
+  crossings [-]                        links of others through its plane; their mean is ⟨N⟩
+  contact_cluster [-]                  number of its cluster by contact, 0 the largest
+  entanglement_cluster [-]             the same by entanglement
+  local_packing_fraction [-]           its volume over that of its Voronoi cell; takes most of the time
+  angle_rad [rad]                      of a barb; this and the next of scenes that actuate
+  motor_torque_N_m [N m]               of the motor at the barb's hinge
+  motor_work_J [J]                     of that motor since the start
+  halted [-]                           1 where that motor is halted"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    export = commands.add(
+        "export",
+        export_run,
+        summary="write true bodies of a run for ParaView, Blender, printers",
+        text=f"""
+Boxes of all links, wall, tiers, floor, hooks and strings where they are at a time, in metres.
+vtp: a folder for ParaView, all fields below in it; open it with `paraview --script=show_in_paraview.py`
+there, or open the .pvd files. gltf, glb: y upwards, colours by one field, every field that has a value
+everywhere as an attribute; Blender opens it. obj: colours. stl: shape alone. A file that exists is
+never replaced.
+
+bodies: smarticles, wall, floor, hooks, strings; crossings with --with crossings: a point and a
+direction where a link passes through another smarticle's plane.
+
+fields, of each box:
+{_FIELDS}""",
+        examples="""\
+  smarticles export runs/a --to glb                        last frame, runs/a/export.glb
+  smarticles export runs/a --to vtp --all --with crossings   runs/a/export-vtp, for ParaView
+  smarticles export runs/a --to stl --time 1.5 --without wall,floor --output pile.stl
+""",
+    )
+    export.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join(_FORMATS))
+    export.add_argument("--output", type=Path, metavar="PATH", help="default: DIR/export.FORMAT or DIR/export-FORMAT")
+    export.add_argument("--time", type=float, metavar="S", help="simulated time [s], nearest frame; default: end")
+    export.add_argument("--all", action="store_true", help="all frames: a folder of numbered files")
+    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings")
+    export.add_argument(
+        "--without", dest="unwanted", type=_names, default=(), metavar="WHAT,…", help="bodies or fields to leave out"
+    )
+    export.add_argument(
+        "--color-by", metavar="FIELD", help="of obj, gltf and glb; default: crossings, in a plane smarticle_id"
+    )
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def export_run(arguments: argparse.Namespace) -> int:
+    """`smarticles export`."""
+    from postprocess.export import export  # noqa: PLC0415  (imports PyVista)
+
+    watched = sys.stderr.isatty()
+
+    def tell(done: int, number: int) -> None:
+        if watched and number > 1:
+            print(f"\rframe {done} of {number}", end="\n" if done == number else "", file=sys.stderr, flush=True)
+
+    written = export.export_run(
+        arguments.directory,
+        to=arguments.to,
+        output=arguments.output,
+        time=arguments.time,
+        every_frame=arguments.all,
+        wanted=arguments.wanted,
+        unwanted=arguments.unwanted,
+        color_by=arguments.color_by,
+        tell=tell,
+    )
+    print(written)
+    return 0

@@ -1,0 +1,30 @@
+"""Commented scenes to begin with, one file per kind; `smarticles init` writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dem.errors import InputError, nearest
+
+KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain")
+"""In the order in which they are told: the first one is written unless another is asked for."""
+
+
+def starter(kind: str) -> str:
+    """The text of a scene.
+
+    Args:
+        kind: one of `KINDS`.
+
+    Raises:
+        InputError: there is no such kind.
+    """
+    if kind not in KINDS:
+        msg = f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}"
+        raise InputError(msg)
+    return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")
+
+
+def about(kind: str) -> str:
+    """What a scene does, in one line."""
+    return starter(kind).partition("\n")[0].removeprefix("# ")

@@ -1,0 +1,174 @@
+"""True bodies: sizes and places of what is known exactly."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_manifest, write_run
+from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
+
+from dem.errors import InputError
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
+from postprocess.export.bodies import KINDS, Bodies, checked_kinds, solid
+from postprocess.export.fields import fields_of
+from postprocess.measures.entanglement import link_crossings, link_passages
+
+ALL = checked_kinds(["crossings"], [])
+FLOOR = -0.003
+TIERS = ((RADIUS, 0.006), (0.018, 0.008), (0.0125, 0.06))  # radius and height
+
+
+def bodies_at(directory, index=-1, kinds=ALL):
+    run, frames = read_run(directory), read_frames(directory)
+    bodies = Bodies.read(run, kinds, fields_of(run))
+    bodies.hold(frames)
+    return bodies.at(frames[index])
+
+
+def changed(directory, **keys):
+    path = directory / "scene.yaml"
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | keys))
+    return directory
+
+
+def removing(directory):
+    """The same run, whose last phase takes the wall away."""
+    for name in ("run.json", "done.json"):
+        content = json.loads((directory / name).read_text())
+        content["phases"][-1]["type"] = "remove-container"
+        (directory / name).write_text(json.dumps(content))
+    return directory
+
+
+@pytest.fixture
+def pile(tmp_path):
+    return write_run(tmp_path / "pile", SyntheticRun(frames_per_phase=1, floor_z=FLOOR))
+
+
+@pytest.fixture
+def hooked(tmp_path):
+    run = SyntheticRun(phases=AFTER_REST, packing=(0.1,) * 3, frames_per_phase=2, floor_z=FLOOR)
+    return write_hooked_run(tmp_path / "hooked", run, np.zeros_like)
+
+
+def test_boxes_of_one_smarticle_have_its_volume_and_place(tmp_path):
+    directory = write_run(tmp_path, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
+    vertices = u_shape(0.7 * W) + np.array([0.001, 0.002, 0.003])
+    write_frame(directory / "frames/frame_000000.vtu", vertices[None], time=0.5, phase=0)
+    mesh = bodies_at(directory)["smarticles"]
+    # Boxes end at the hinges' axes, where they overlap: together t1 t2 (w + 2l), which is what a smarticle weighs.
+    assert mesh.triangulate().volume * 1e9 == pytest.approx(1e9 * T1 * T2 * W * 2.4, rel=1e-6)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    assert mesh.bounds[::2] == pytest.approx(low - [T2 / 2, T2 / 2, T1 / 2], abs=1e-8)
+    assert mesh.bounds[1::2] == pytest.approx(high + np.array([T2 / 2, 0.0, T1 / 2]), abs=1e-8)
+
+
+def test_wall_and_floor_are_the_container(pile):
+    found = bodies_at(pile)
+    wall, floor = found["wall"], found["floor"]
+    assert wall.bounds[:4] == pytest.approx((-RADIUS, RADIUS, -RADIUS, RADIUS), rel=1e-3)
+    assert wall.bounds[4] == pytest.approx(FLOOR)
+    tops = [frame.vertices[..., 2].max() for frame in read_frames(pile)]
+    assert wall.bounds[5] == pytest.approx(max(tops) + W)
+    assert np.unique(np.asarray(floor.points)[:, 2]) == pytest.approx([FLOOR], abs=1e-8)
+    assert np.hypot(*np.asarray(floor.points)[:, :2].T).max() == pytest.approx(RADIUS)
+
+
+def test_wall_has_the_height_that_the_scene_gives(pile):
+    wall = bodies_at(changed(pile, container={"radius_m": RADIUS, "height_m": 0.2}))["wall"]
+    assert wall.bounds[5] - wall.bounds[4] == pytest.approx(0.2)
+
+
+def test_a_wall_stays_while_the_floor_moves_alone(pile):
+    changed(pile, phases=[{"type": "relax"}, {"type": "relax"}, {"type": "shake", "moves": "floor"}, {"type": "relax"}])
+    assert bodies_at(pile, 2)["wall"].bounds[4] == pytest.approx(0.0)
+    assert bodies_at(pile, 2)["floor"].bounds[4] == pytest.approx(FLOOR)
+    assert bodies_at(pile, 3)["wall"].bounds[4] == pytest.approx(FLOOR)
+
+
+def test_tiers_are_steps_with_ceilings(pile):
+    tiers = [{"radius_m": radius, "height_m": height} for radius, height in TIERS]
+    wall = bodies_at(changed(pile, container={"tiers": tiers}))["wall"]
+    points = np.asarray(wall.points)
+    corners = {
+        (round(radius, 6), round(z - FLOOR, 6))
+        for radius, z in zip(np.hypot(*points[:, :2].T).tolist(), points[:, 2].tolist(), strict=True)
+    }
+    assert corners == {
+        (RADIUS, 0.0), (RADIUS, 0.006), (0.018, 0.006), (0.018, 0.014), (0.0125, 0.014), (0.0125, 0.074),
+    }  # fmt: skip
+    # Cylinders and the two rings that close the steps, not cones between them.
+    rings = np.pi * (RADIUS**2 - 0.018**2 + 0.018**2 - 0.0125**2)
+    sides = 2 * np.pi * sum(radius * height for radius, height in TIERS)
+    assert wall.area == pytest.approx(rings + sides, rel=2e-3)
+
+
+def test_a_wall_that_is_taken_away_is_gone_and_the_floor_holds_the_pile(pile):
+    removing(changed(pile, phases=[{"type": "relax"}] * 3 + [{"type": "remove-container", "speed_m_per_s": None}]))
+    far = read_frames(pile)[-1].vertices + np.array([0.05, 0.0, 0.0])
+    write_frame(pile / "frames/frame_000003.vtu", far, time=22.0, phase=3, floor_z=FLOOR)
+    assert "wall" in bodies_at(pile, 2)
+    found = bodies_at(pile, 3)
+    assert "wall" not in found
+    assert found["floor"].bounds[1] >= far[..., 0].max()
+
+
+def test_hooks_are_crosses_at_their_heights(hooked):
+    frame = read_frames(hooked)[-1]
+    mesh = bodies_at(hooked)["hooks"]
+    lower, upper = (mesh.extract_cells(np.flatnonzero(mesh.cell_data["hook"] == k)) for k in (0, 1))
+    raised = SPEED * 2.0  # w per second, for the 2 s of the phase
+    assert frame.time == pytest.approx(3.5)
+    for cross, height in ((lower, LOWER), (upper, UPPER + raised)):
+        assert cross.bounds[:4] == pytest.approx((-W / 2, W / 2, -W / 2, W / 2))
+        assert cross.bounds[4:] == pytest.approx((FLOOR + height - 2.5e-4, FLOOR + height + 2.5e-4), abs=2e-5)
+
+
+def test_a_plane_has_two_walls_and_no_floor(tmp_path):
+    run = SyntheticRun(frames_per_phase=1, count=2)
+    write_manifest(write_run(tmp_path, run), run, planar=True, channel_width=0.08)
+    found = bodies_at(tmp_path)
+    assert set(found) == {"smarticles", "wall"}
+    assert sorted({round(y, 6) for y in np.asarray(found["wall"].points)[:, 1].tolist()}) == [-0.04, 0.04]
+    assert found["wall"].bounds[5] - found["wall"].bounds[4] == pytest.approx(T1)
+    names = found["smarticles"].cell_data.keys()
+    assert not {"crossings", "entanglement_cluster", "local_packing_fraction"} & set(names)
+
+
+def test_crossings_are_where_links_pass(tmp_path):
+    directory = write_run(tmp_path, SyntheticRun(count=2, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
+    first = u_shape(0.7 * W)
+    # Its middle link passes upwards through the first one's mouth.
+    second = np.array([[0.0, 0.01, -0.004], [0.001, 0.0, -0.004], [0.001, 0.0, 0.006], [0.0, 0.01, 0.006]])
+    write_frame(directory / "frames/frame_000000.vtu", np.array([first, second]), time=0.5, phase=0)
+    mesh = bodies_at(directory)["crossings"]
+    assert np.asarray(mesh.points) == pytest.approx(np.array([[0.001, 0.0, 0.0]]), abs=1e-8)
+    assert mesh.point_data["direction"] == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
+    told = [int(mesh.point_data[name][0]) for name in ("smarticle_id", "passing_id", "passing_link")]
+    assert told == [0, 1, 1]
+    arrow = solid("crossings", mesh, read_run(directory))
+    assert arrow.bounds[4:] == pytest.approx((-W / 6, W / 6), rel=1e-3)
+
+
+def test_there_are_as_many_passages_as_crossings(scene):
+    vertices = scene(40, 5, box=2.0)
+    found = link_passages(vertices)
+    assert len(found.i) > 50
+    assert np.bincount(found.i, minlength=40).tolist() == link_crossings(vertices).tolist()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_can_be_left_out(hooked, kind):
+    kinds = checked_kinds(["crossings"], [kind])
+    assert kind not in bodies_at(hooked, kinds=kinds)
+
+
+def test_refusals_name_what_is_meant():
+    with pytest.raises(InputError, match=r"'wal' is nothing to export; did you mean 'wall'\?"):
+        checked_kinds([], ["wal"])
+    with pytest.raises(InputError, match="force-chains: frames record how many smarticles touch, and no force"):
+        checked_kinds(["force-chains"], [])
+    with pytest.raises(InputError, match="nothing is left to export"):
+        checked_kinds([], list(KINDS))

@@ -1,0 +1,123 @@
+"""What bodies carry: names, units and values."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import RADIUS, SyntheticRun, mesh_of, u_shape, write_manifest, write_run
+
+from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.frames import FrameWriter, read_frames
+from dem.record.manifest import read_run
+from postprocess.export.colours import colour_field, linear, painted, scale
+from postprocess.export.fields import BY_NAME, FIELDS, checked_field, fields_of, link_values
+from postprocess.measures.clusters import entanglement_clusters
+from postprocess.measures.entanglement import link_crossings
+from smarticles.main import main
+
+
+@pytest.fixture
+def pile(tmp_path):
+    return write_run(tmp_path, SyntheticRun(count=60, frames_per_phase=1, floor_z=-0.003))
+
+
+def values(directory, name):
+    frame: Frame = read_frames(directory)[-1]
+    return frame, link_values(BY_NAME[name], frame, read_run(directory))
+
+
+def test_names_end_in_their_units():
+    endings = {"m": "_m", "m/s": "_m_per_s", "rad/s": "_rad_per_s", "rad": "_rad", "N m": "_N_m", "J": "_J", "-": ""}
+    assert all(field.name.endswith(endings[field.unit]) for field in FIELDS)
+    assert len(BY_NAME) == len(FIELDS)
+
+
+def test_help_has_the_whole_table(capsys):
+    assert main(["export", "--help"]) == 0
+    told = [line.split("]")[0] + "]" for line in capsys.readouterr().out.splitlines() if "]  " in line]
+    assert [line.strip() for line in told if line.startswith("  ") and "[-h]" not in line] == [
+        f"{field.name} [{field.unit}]" for field in FIELDS
+    ]
+
+
+def test_values_are_those_of_the_measures(pile):
+    frame, crossings = values(pile, "crossings")
+    assert crossings.tolist() == np.repeat(link_crossings(frame.vertices)[:, None], 3, axis=1).tolist()
+    assert crossings.max() > 0
+    _, cluster = values(pile, "entanglement_cluster")
+    assert cluster[:, 0].tolist() == entanglement_clusters(frame.vertices).labels.tolist()
+    _, height = values(pile, "height_m")
+    assert np.sort(height[:, 0])[-1] == pytest.approx(SyntheticRun(count=60).height(0.132), rel=0.01)
+    assert values(pile, "contacts")[1][:, 0].tolist() == frame.contacts.tolist()
+
+
+def test_cells_of_local_packing_fill_the_container(pile):
+    frame, local = values(pile, "local_packing_fraction")
+    assert np.isfinite(local).all()
+    solid = read_run(pile).solid_volume
+    top = frame.vertices[..., 2].max() - frame.floor_z
+    # The wall is a polygon around the circle, and the lid half a spacing above the highest point.
+    assert (solid / local[:, 0]).sum() == pytest.approx(np.pi * RADIUS**2 * top, rel=0.15)
+    assert (solid / local[:, 0]).sum() > np.pi * RADIUS**2 * top
+
+
+def test_local_packing_has_no_value_without_a_wall(pile):
+    for name in ("run.json", "done.json"):
+        content = json.loads((pile / name).read_text())
+        content["phases"][3]["type"] = "remove-container"
+        (pile / name).write_text(json.dumps(content))
+    assert np.isnan(values(pile, "local_packing_fraction")[1]).all()
+
+
+def test_a_lone_smarticle_has_no_local_packing(tmp_path):
+    """The first frame of a pour: its points and their images lie in one plane."""
+    write_run(tmp_path, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
+    upright = u_shape(0.008)[None][..., [0, 2, 1]] + [0.0, 0.0, 0.003]
+    FrameWriter(tmp_path).write(mesh_of(upright, time=0.5), 0.5)
+    assert np.isnan(values(tmp_path, "local_packing_fraction")[1]).all()
+
+
+def test_actuated_frames_tell_angles_per_link(tmp_path):
+    run = SyntheticRun(count=2, frames_per_phase=1, phases=("relax",), packing=(0.1,))
+    write_run(tmp_path, run)
+    angle = np.array([0.1, np.nan, 0.2, 0.3, np.nan, 0.4])
+    mesh = mesh_of(run.vertices(0.1), time=0.5, extra={"angle_rad": angle})
+    FrameWriter(tmp_path).write(mesh, 0.5)
+    assert values(tmp_path, "angle_rad")[1] == pytest.approx(angle.reshape(2, 3), nan_ok=True)
+    assert values(tmp_path, "motor_work_J")[1] is None
+
+
+def test_runs_in_a_plane_have_fewer_fields(pile):
+    assert "crossings" in {field.name for field in fields_of(read_run(pile))}
+    write_manifest(pile, SyntheticRun(), planar=True)
+    run = read_run(pile)
+    assert "crossings" not in {field.name for field in fields_of(run)}
+    assert colour_field(None, run).name == "smarticle_id"
+    with pytest.raises(InputError, match="this run has no crossings"):
+        colour_field("crossings", run)
+
+
+def test_unknown_field_is_refused():
+    with pytest.raises(InputError, match=r"'crosings' is no field; did you mean 'crossings'\?"):
+        checked_field("crosings")
+
+
+def test_colours_have_grey_for_no_value_and_for_no_crossing():
+    palette = scale(BY_NAME["crossings"], (0.0, 5.0))
+    colours = painted(palette, np.array([0.0, 1.0, 5.0, np.nan]))
+    assert colours[0].tolist() == colours[3].tolist() == [201, 201, 201]
+    assert len({tuple(colour) for colour in colours.tolist()}) == 3
+
+
+def test_linear_colours_are_darker_in_the_middle_alone():
+    """Half the light is 188 of 255 in sRGB."""
+    assert linear(np.array([[0, 188, 255]], dtype=np.uint8)).tolist() == [[0, 128, 255]]
+
+
+def test_the_table_in_the_documentation_is_this_one():
+    text = (Path(__file__).resolve().parents[4] / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    table = text.partition("Cell data of smarticles")[2].partition("Point data of crossings")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| `")]
+    assert rows == [f"| `{field.name}` | {field.unit} | {field.of} | {field.meaning} |" for field in FIELDS]

@@ -1,0 +1,296 @@
+"""Exported files, read by libraries that did not write them: VTK, and for VTK's own the parser of XML beside it."""
+
+import base64
+import json
+import os
+import struct
+import warnings
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+import pyvista as pv
+from synthetic import T1, T2, SyntheticRun, W, u_shape, write_frame, write_run
+from vtkmodules.vtkIOGeometry import vtkGLTFReader
+
+from dem.errors import InputError, RunError
+from dem.record.frames import read_frames
+from postprocess.export.export import FORMATS, export_run
+from postprocess.export.fields import FIELDS
+from postprocess.export.solids import SUFFIXES
+
+HOSTILE = [
+    "<script>alert(1)</script>",
+    '"/><x y="',
+    "a\nv 1 2 3\r\nb",
+    "{{ constructor }}",
+    "../../up",
+    "é∀\u202e",
+    "%s %n",
+]
+
+
+@pytest.fixture
+def pile(tmp_path):
+    return write_run(tmp_path / "pile", SyntheticRun(frames_per_phase=2, floor_z=-0.003))
+
+
+@pytest.fixture
+def single(tmp_path):
+    """One U, flat: its middle link along x, its mouth towards y, its plane at z = 3 mm; nothing passes through it."""
+    directory = tmp_path / "single"
+    write_run(directory, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
+    vertices = u_shape(0.7 * W) + np.array([0.001, 0.002, 0.003])
+    write_frame(directory / "frames/frame_000000.vtu", vertices[None], time=0.5, phase=0)
+    return directory
+
+
+def glb_tree(path):
+    """The JSON part of a binary glTF, read by the book."""
+    content = path.read_bytes()
+    magic, version, length, size, kind = struct.unpack("<4sII I4s", content[:20])
+    assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON")
+    return json.loads(content[20 : 20 + size])
+
+
+def meshes(path):
+    """Parts of a glTF as VTK reads them, by name."""
+    reader = vtkGLTFReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    parts = []
+
+    def walk(block):
+        for number in range(block.n_blocks):
+            part = block[number]
+            if isinstance(part, pv.MultiBlock):
+                walk(part)
+            elif part is not None and part.n_points:
+                parts.append(part)
+
+    walk(pv.wrap(reader.GetOutputDataObject(0)))
+    tree = glb_tree(path) if path.suffix == ".glb" else json.loads(path.read_text())
+    return dict(zip([node["name"] for node in tree["nodes"]], parts, strict=True))
+
+
+# glTF
+
+
+@pytest.mark.parametrize("suffix", ["gltf", "glb"])
+def test_gltf_has_the_boxes_in_metres_with_y_upwards(single, tmp_path, suffix):
+    path = export_run(single, to=suffix, output=tmp_path / f"one.{suffix}")
+    found = meshes(path)
+    assert set(found) == {"smarticles", "wall", "floor"}
+    shape = found["smarticles"].extract_surface(algorithm="dataset_surface").triangulate()
+    assert shape.volume * 1e9 == pytest.approx(1e9 * T1 * T2 * W * 2.4, rel=1e-4)
+    # x stays, y is our z, z is our -y.
+    barb = 0.7 * W
+    low_y = 0.002 - barb**2 / (W + 2 * barb)
+    assert shape.bounds == pytest.approx(
+        (
+            0.001 - W / 2 - T2 / 2, 0.001 + W / 2 + T2 / 2, 0.003 - T1 / 2, 0.003 + T1 / 2,
+            -(low_y + barb), -(low_y - T2 / 2),
+        ),
+        abs=1e-7,
+    )  # fmt: skip
+
+
+def test_gltf_colours_are_the_palettes_as_linear_light(single, tmp_path):
+    path = export_run(single, to="glb", output=tmp_path / "one.glb")
+    colours = np.asarray(meshes(path)["smarticles"].point_data["COLOR_0"])
+    # Nothing passes through it: the grey of no crossing, #c9c9c9, is 0.584 of the light.
+    scaled = colours / (255 if colours.max() > 1 else 1)
+    assert scaled[:, :3] == pytest.approx(np.full((24, 3), 149 / 255), abs=1e-3)
+
+
+def test_gltf_tells_its_run_has_dull_materials_and_fields(pile, tmp_path):
+    tree = glb_tree(export_run(pile, to="glb", output=tmp_path / "pile.glb", color_by="height"))
+    assert tree["asset"]["extras"]["coloured_by"] == "height_m"
+    assert tree["asset"]["extras"]["time_s"] == pytest.approx(read_frames(pile).times[-1])
+    materials = {material["name"]: material for material in tree["materials"]}
+    assert all(material["pbrMetallicRoughness"]["metallicFactor"] == 0 for material in materials.values())
+    assert materials["wall"]["alphaMode"] == "BLEND"
+    shape = next(mesh for mesh in tree["meshes"] if mesh["name"] == "smarticles")
+    attributes = shape["primitives"][0]["attributes"]
+    assert {"_SMARTICLE_ID", "_LINK", "_CROSSINGS", "_HEIGHT_M", "_CONTACTS"} <= set(attributes)
+    for accessor in tree["accessors"]:
+        assert np.isfinite(np.asarray(accessor.get("min", [0]) + accessor.get("max", [0]), dtype=float)).all()
+
+
+def test_gltf_has_no_field_with_holes(pile, tmp_path):
+    """Its numbers must be finite; without a wall there is no local packing."""
+    for name in ("run.json", "done.json"):
+        content = json.loads((pile / name).read_text())
+        content["phases"][3]["type"] = "remove-container"
+        (pile / name).write_text(json.dumps(content))
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    (pile / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in kinds]}))
+    tree = glb_tree(export_run(pile, to="glb", output=tmp_path / "a.glb"))
+    shape = next(mesh for mesh in tree["meshes"] if mesh["name"] == "smarticles")
+    attributes = shape["primitives"][0]["attributes"]
+    assert "_CROSSINGS" in attributes
+    assert "_LOCAL_PACKING_FRACTION" not in attributes
+
+
+def test_gltf_in_one_text_file_holds_its_bytes(single, tmp_path):
+    tree = json.loads(export_run(single, to="gltf", output=tmp_path / "one.gltf").read_text())
+    (buffer,) = tree["buffers"]
+    head, _, data = buffer["uri"].partition(",")
+    assert head.startswith("data:")
+    assert head.endswith("base64")
+    assert len(base64.b64decode(data)) == buffer["byteLength"]
+
+
+# STL and OBJ
+
+
+def test_stl_and_obj_have_the_same_shape(single, tmp_path):
+    for suffix in ("stl", "obj"):
+        path = export_run(single, to=suffix, output=tmp_path / f"one.{suffix}", unwanted=["wall", "floor"])
+        shape = pv.read(path).clean()
+        assert shape.triangulate().volume * 1e9 == pytest.approx(1e9 * T1 * T2 * W * 2.4, rel=1e-4)
+        assert shape.bounds[4:] == pytest.approx((0.003 - T1 / 2, 0.003 + T1 / 2), abs=1e-8)
+
+
+def test_obj_names_its_objects_and_colours_points(single, tmp_path):
+    lines = export_run(single, to="obj", output=tmp_path / "one.obj").read_text().splitlines()
+    assert [line for line in lines if line.startswith("o ")] == ["o smarticles", "o wall", "o floor"]
+    first = next(line.split() for line in lines if line.startswith("v "))
+    assert [float(part) for part in first[4:7]] == pytest.approx([201 / 255] * 3, abs=1e-6)
+
+
+# vtp
+
+
+def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
+    folder = export_run(pile, to="vtp", output=tmp_path / "out", every_frame=True, wanted=["crossings"])
+    frames = read_frames(pile)
+    listed = [entry.attrib for entry in ET.parse(folder / "smarticles.pvd").getroot().iter("DataSet")]
+    assert [float(entry["timestep"]) for entry in listed] == pytest.approx(frames.times.tolist(), rel=1e-8)
+    mesh = pv.read(folder / listed[-1]["file"])
+    assert mesh.n_cells == 12 * 3 * 6
+    rigid = {field.name for field in FIELDS} - {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted"}
+    assert set(mesh.cell_data.keys()) == rigid
+    assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
+    assert {path.name for path in folder.glob("*.pvd")} == {
+        "smarticles.pvd", "wall.pvd", "floor.pvd", "crossings.pvd",
+    }  # fmt: skip
+    assert (folder / "show_in_paraview.py").is_file()
+
+
+def test_fields_can_be_left_out_but_not_who_is_who(pile, tmp_path):
+    folder = export_run(
+        pile, to="vtp", output=tmp_path / "out", unwanted=["local_packing_fraction", "smarticle_id", "link"]
+    )
+    (file,) = (folder / "smarticles").glob("*.vtp")
+    names = pv.read(file).cell_data.keys()
+    assert "local_packing_fraction" not in names
+    assert {"smarticle_id", "link", "crossings"} <= set(names)
+
+
+# All formats
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_names_are_data(tmp_path, name):
+    run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1, name=name))
+    before = sorted(path.name for path in tmp_path.iterdir())
+    for suffix in FORMATS:
+        export_run(run, to=suffix, unwanted=["local_packing_fraction"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+    (file,) = (run / "export-vtp" / "smarticles").glob("*.vtp")
+    assert pv.read(file).field_data["run_name"][0] == name
+    for suffix in ("gltf", "glb"):
+        path = run / f"export.{suffix}"
+        tree = glb_tree(path) if suffix == "glb" else json.loads(path.read_text())
+        assert tree["asset"]["extras"]["run_name"] == name
+    lines = (run / "export.obj").read_text().splitlines()
+    assert not any(line.startswith("v 1 2 3") for line in lines)
+    script = (run / "export-vtp" / "show_in_paraview.py").read_text()
+    assert name not in script
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_all_frames_are_numbered_files(pile, tmp_path, suffix):
+    told = []
+    folder = export_run(
+        pile, to=suffix, output=tmp_path / "out", every_frame=True, tell=lambda *done: told.append(done),
+        unwanted=["local_packing_fraction"],
+    )  # fmt: skip
+    assert sorted(path.name for path in folder.iterdir()) == [f"frame_{k:06d}.{suffix}" for k in range(8)]
+    assert told == [(k + 1, 8) for k in range(8)]
+
+
+def test_one_scale_of_colours_for_all_frames(pile, tmp_path):
+    folder = export_run(pile, to="glb", output=tmp_path / "out", every_frame=True, color_by="height_m")
+    told = [glb_tree(path)["asset"]["extras"] for path in sorted(folder.iterdir())]
+    assert len({(each["least"], each["greatest"]) for each in told}) == 1
+    heights = [frame.vertices[..., 2].max() for frame in read_frames(pile)]
+    assert max(heights) > min(heights)
+
+
+def test_a_time_takes_the_nearest_frame(pile, tmp_path):
+    times = read_frames(pile).times
+    path = export_run(pile, to="glb", output=tmp_path / "a.glb", time=float(times[1]) + 0.01)
+    assert glb_tree(path)["asset"]["extras"]["time_s"] == pytest.approx(times[1])
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"to": "gltff"}, r"--to gltff: no such format; did you mean 'gltf'\?"),
+        ({"to": "glb", "time": 99.0}, "time must be between 0.5 s and 22 s, the run's frames: got 99 s"),
+        ({"to": "glb", "time": float("nan")}, "time must be between"),
+        ({"to": "glb", "time": 1.0, "every_frame": True}, "leave --time or --all out"),
+        ({"to": "glb", "output": "a.stl"}, r"must end in \.glb; got '\.stl'"),
+        ({"to": "glb", "output": "none/a.glb"}, "the folder none does not exist"),
+        ({"to": "glb", "unwanted": ["wals"]}, r"'wals' is nothing to export; did you mean 'wall'"),
+        ({"to": "glb", "color_by": "sped"}, "'sped' is no field"),
+        ({"to": "glb", "color_by": "angle_rad"}, "no frame to export has it"),
+        ({"to": "vtp", "wanted": ["force-chains"]}, "no force between them"),
+    ],
+)
+def test_refusals_are_one_line_and_leave_nothing(pile, asked, message):
+    before = sorted(pile.rglob("*"))
+    with pytest.raises(InputError, match=message) as caught:
+        export_run(pile, **asked)
+    assert "\n" not in str(caught.value)
+    assert sorted(pile.rglob("*")) == before
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_nothing_is_replaced(pile, tmp_path, suffix):
+    target = tmp_path / f"there.{suffix}"
+    target.write_text("mine")
+    with pytest.raises(InputError, match="exists, and exports replace nothing"):
+        export_run(pile, to=suffix, output=target)
+    assert target.read_text() == "mine"
+
+
+def test_a_run_without_frames_is_refused(pile):
+    (pile / "frames.pvd").unlink()
+    with pytest.raises(InputError, match=r"cannot read list of frames .*frames\.pvd"):
+        export_run(pile, to="glb")
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_truncated_frame_is_named_and_leaves_nothing(pile, tmp_path, suffix):
+    frame = pile / "frames/frame_000003.vtu"
+    os.truncate(frame, frame.stat().st_size // 2)
+    with pytest.raises(InputError, match=r"cannot read frame .*frame_000003\.vtu: truncated"):
+        export_run(pile, to=suffix, output=tmp_path / "out", every_frame=True)
+    assert list(tmp_path.iterdir()) == [pile]
+    # The other frames are as good as they were.
+    assert export_run(pile, to=suffix, time=22.0, unwanted=["local_packing_fraction"]).exists()
+
+
+def test_a_disk_that_is_full_is_one_line(pile, mount_disk):
+    disk = mount_disk("16k")
+    with pytest.raises(RunError, match=r"cannot be written \(No space left on device\)"):
+        export_run(pile, to="obj", output=disk / "a.obj")
+    assert list(disk.iterdir()) == []
+
+
+def test_reading_back_warns_of_nothing(pile, tmp_path):
+    with warnings.catch_warnings(action="error"):
+        export_run(pile, to="glb", output=tmp_path / "a.glb", wanted=["crossings"])

@@ -1,0 +1,95 @@
+"""The shipped script in a real ParaView: what it sets up, and the pictures that come of it."""
+
+import itertools
+import json
+import os
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from PIL import Image
+from synthetic import RADIUS, SyntheticRun, write_manifest, write_run
+
+from dem.record.frames import read_frames
+from postprocess.export.export import export_run
+
+PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")
+XVFB = [] if os.environ.get("DISPLAY") or os.environ.get("PVPYTHON") else ["xvfb-run", "--auto-servernum"]
+pytestmark = pytest.mark.skipif(
+    PVPYTHON is None or (bool(XVFB) and shutil.which(XVFB[0]) is None),
+    reason="no pvpython that can draw: apt-get install paraview python3-paraview xvfb, or set PVPYTHON",
+)
+
+# Runs the script as ParaView does, then asks ParaView what there is.
+ASK = """
+import json, runpy, sys
+from paraview import simple
+script, folder, answer = sys.argv[1:4]
+sys.argv = [script, folder, *sys.argv[4:]]
+runpy.run_path(script, run_name="__main__")
+boxes = simple.FindSource("smarticles")
+shown = simple.GetDisplayProperties(boxes)
+told = {"coloured": list(shown.ColorArrayName), "times": list(boxes.TimestepValues)}
+cut = simple.FindSource("wall, cut open")
+if cut is not None:
+    cut.UpdatePipeline()
+    told["cut"] = list(cut.GetDataInformation().GetBounds())
+names = {proxy.SMProxy: name for (name, _), proxy in simple.GetSources().items()}
+view = simple.GetActiveView()
+inputs = [part.Input.SMProxy for part in view.Representations if part.Visibility and hasattr(part, "Input")]
+told["shown"] = sorted(names[proxy] for proxy in inputs)
+json.dump(told, open(answer, "w"))
+"""
+
+
+def shown(folder, tmp_path, *words):
+    """What ParaView tells of an exported folder once the script has run."""
+    (tmp_path / "ask.py").write_text(ASK)
+    answer = tmp_path / "answer.json"
+    command = [*XVFB, PVPYTHON, tmp_path / "ask.py", folder / "show_in_paraview.py", folder, answer, *words]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return json.loads(answer.read_text())
+
+
+def pixels(path):
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path):
+    run = write_run(tmp_path / "run", SyntheticRun(count=40, frames_per_phase=1, packing=(0.05, 0.06, 0.1, 0.1)))
+    folder = export_run(run, to="vtp", every_frame=True, wanted=["crossings"], unwanted=["local_packing_fraction"])
+    film = tmp_path / "film"
+    told = shown(folder, tmp_path, "--film", film)
+    assert told["coloured"] == ["CELLS", "crossings"]
+    assert told["times"] == pytest.approx(read_frames(run).times.tolist())
+    # The half towards the camera, at negative y, is cut away.
+    assert told["cut"][2:4] == pytest.approx((0.0, RADIUS), abs=1e-3 * RADIUS)
+    assert told["shown"] == ["floor", "passages", "smarticles", "time", "wall, cut open"]
+    pictures = [pixels(path) for path in sorted(film.glob("*.png"))]
+    assert len(pictures) == 4
+    coloured = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in pictures]
+    assert min(coloured) > 3000
+    assert all((one != other).any() for one, other in itertools.pairwise(pictures))
+
+
+def test_a_chain_in_a_plane(tmp_path):
+    made = SyntheticRun(count=2, frames_per_phase=1)
+    write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width=0.08)
+    folder = export_run(tmp_path / "run", to="vtp")
+    told = shown(folder, tmp_path, "--picture", tmp_path / "plane.png")
+    assert told["coloured"] == ["CELLS", "smarticle_id"]
+    assert told["shown"] == ["smarticles", "time", "wall"]
+    assert (np.ptp(pixels(tmp_path / "plane.png"), axis=2) > 40).sum() > 500
+
+
+def test_a_folder_without_an_export_is_one_line(tmp_path):
+    run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1))
+    script = export_run(run, to="vtp") / "show_in_paraview.py"
+    alone = shutil.copy(script, tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    command = [*XVFB, PVPYTHON, str(alone), str(tmp_path / "elsewhere")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+    assert done.returncode != 0
+    assert "give the folder that `smarticles export --to vtp` wrote" in done.stderr + done.stdout

@@ -1,0 +1,117 @@
+"""Gauss's integral of polygons whose linking is known, and of open ones against quadrature."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+from scipy.spatial.transform import Rotation
+
+from dem.errors import InputError
+from postprocess import linking_pairs
+from postprocess.measures.linking import gauss_integral, linking
+
+SQUARE = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]])
+THROUGH = SQUARE[:, [0, 2, 1]] + [1.0, 0, 0]
+MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+# Where to.
+AWAY, JUST_ABOVE = np.array([9.0, 0, 0]), np.array([0, 0, 0.01])
+
+
+def quadrature(first, second):
+    """The double integral as it is defined, segment by segment."""
+    total = 0.0
+    for p, u in zip(first, np.diff(first, axis=0), strict=False):
+        for q, v in zip(second, np.diff(second, axis=0), strict=False):
+            normal = np.cross(u, v)
+
+            def density(s, t, *, apart=p - q, u=u, v=v, normal=normal):
+                return apart @ normal / np.linalg.norm(apart + s * u - t * v) ** 3
+
+            total += dblquad(density, 0, 1, 0, 1, epsabs=1e-10)[0]
+    return total / (4 * math.pi)
+
+
+def test_two_linked_squares_are_linked_once():
+    assert gauss_integral(SQUARE, THROUGH) == pytest.approx(-1, abs=1e-14)
+    assert gauss_integral(SQUARE[::-1], THROUGH) == pytest.approx(1, abs=1e-14)
+    assert gauss_integral(SQUARE[::-1], THROUGH[::-1]) == pytest.approx(-1, abs=1e-14)
+
+
+def test_far_apart_or_beside_each_other_they_are_not():
+    assert gauss_integral(SQUARE, THROUGH + AWAY) == pytest.approx(0, abs=1e-14)
+    assert gauss_integral(SQUARE, SQUARE + JUST_ABOVE) == pytest.approx(0, abs=1e-12)
+
+
+def test_wound_twice_counts_twice():
+    angle = np.linspace(0, 4 * np.pi, 81)
+    coil = np.stack([1 + 0.5 * np.cos(angle), 0 * angle, 0.5 * np.sin(angle)], axis=1)
+    assert gauss_integral(SQUARE, coil) == pytest.approx(2 * gauss_integral(SQUARE, THROUGH), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_open_chains_agree_with_quadrature(scene, seed):
+    first, second = scene(2, seed, box=0.8)
+    expected = quadrature(first, second)
+    assert abs(expected) > 1e-3
+    assert gauss_integral(first, second) == pytest.approx(expected, abs=1e-8)
+
+
+def test_a_mirror_turns_the_sign_and_a_motion_nothing(scene):
+    first, second = scene(2, 5, box=0.8)
+    number = gauss_integral(first, second)
+    assert gauss_integral(first * MIRROR, second * MIRROR) == pytest.approx(-number, rel=1e-12)
+    assert gauss_integral(second, first) == pytest.approx(number, rel=1e-12)
+    turn = Rotation.random(rng=np.random.default_rng(1)).as_matrix()
+    moved = [1e-3 * (curve @ turn.T + [3.0, 1, 2]) for curve in (first, second)]
+    assert gauss_integral(*moved) == pytest.approx(number, rel=1e-10)
+
+
+def test_closed_across_their_mouths_smarticles_have_the_whole_numbers_of_linking_pairs(scene):
+    """By solid angles here, by counted passages there."""
+    vertices = scene(40, 0, box=1.2, angles=(90, 90))
+    counted = linking_pairs(vertices)
+    i, j = np.triu_indices(40, k=1)
+    closed = np.concatenate([vertices, vertices[:, :1]], axis=1)
+    number = gauss_integral(closed[i], closed[j])
+    np.testing.assert_allclose(number, number.round(), atol=1e-12)
+    linked = number.round() != 0
+    assert linked.sum() > 50
+    assert np.array_equal(np.stack([i, j])[:, linked], np.stack([counted.i, counted.j]))
+    assert np.array_equal(number[linked].round(), counted.number)
+
+
+def test_of_segments_that_meet_nothing_is_counted():
+    cross = np.array([[[-1.0, 0, 0], [1, 0, 0]], [[0, -1.0, 0], [0, 1, 0]]])
+    assert gauss_integral(cross[0], cross[1]) == 0
+    assert gauss_integral(cross[0], cross[0]) == 0
+    assert gauss_integral(cross[0], cross[1] + AWAY / 30) == 0
+    # Just above and just below it is half of a turn either way.
+    above, below = (gauss_integral(cross[0], cross[1] + [0, 0, side * 1e-9]) for side in (1, -1))
+    assert (above, below) == pytest.approx((-0.5, 0.5), abs=1e-6)
+
+
+def test_all_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
+    vertices = scene(60, 3, box=2.0, angles=(90, 90))
+    near, every = linking(vertices), linking(vertices, far=True)
+    assert len(every.number) == 60 * 59 / 2
+    k = 777
+    assert every.number[k] == pytest.approx(gauss_integral(vertices[every.i[k]], vertices[every.j[k]]))
+    assert every.mean == pytest.approx(2 * np.abs(every.number).sum() / 60)
+    assert every.per_smarticle[7] == pytest.approx(np.abs(every.number[(every.i == 7) | (every.j == 7)]).sum())
+    # Near pairs are some of them, with the same numbers.
+    assert 0 < len(near.number) < len(every.number)
+    assert 0 < near.mean < every.mean
+    told = {(i, j): n for i, j, n in zip(every.i, every.j, every.number, strict=True)}
+    assert all(told[i, j] == n for i, j, n in zip(near.i, near.j, near.number, strict=True))
+    assert math.isnan(linking(np.empty((0, 4, 3))).mean)
+    assert linking(vertices[:1]).mean == 0
+
+
+def test_what_is_no_polygon_is_refused():
+    with pytest.raises(InputError, match=r"2 corners or more: got \(1, 3\)"):
+        gauss_integral(SQUARE[:1], SQUARE)
+    with pytest.raises(InputError, match="polygon"):
+        gauss_integral(SQUARE, SQUARE[:, :2])

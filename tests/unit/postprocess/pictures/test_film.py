@@ -1,0 +1,225 @@
+"""Films: which moments, how long each is shown, which colours, and that they move."""
+
+import itertools
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+from synthetic import SyntheticRun, W, u_shape, write_frame, write_run
+
+from dem.errors import InputError
+from postprocess.pictures import film
+from postprocess.pictures.colouring import COLOURINGS, ColourScale
+from postprocess.pictures.moments import Moments, durations
+from postprocess.pictures.render import render_film
+from postprocess.report import figures
+
+SIZE = (240, 240)
+EVEN = ("deposit", "deposit", "deposit")  # phases of one length: frames at equal distances
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Nine frames, 1/3 s apart, from 1/3 s to 3 s."""
+    packing = (0.1, 0.12, 0.14, 0.14)
+    return write_run(
+        tmp_path_factory.mktemp("runs") / "a", SyntheticRun(frames_per_phase=3, phases=EVEN, packing=packing)
+    )
+
+
+def panel(image):
+    """The three-dimensional part without its rim."""
+    return image[60:210, 5:170]
+
+
+def shown(path):
+    """Pictures (n, height, width, 3) and how long each is shown [ms]."""
+    pictures, times = [], []
+    with Image.open(path) as images:
+        for index in range(images.n_frames):
+            images.seek(index)
+            images.load()
+            pictures.append(np.asarray(images.convert("RGB")).astype(int))
+            times.append(images.info["duration"])
+    return np.array(pictures), times
+
+
+# Moments
+
+
+def test_every_frame_is_shown_at_the_speed_that_is_told():
+    recorded = 0.04 * np.arange(1, 101)
+    moments = Moments.chosen(recorded, rate=25.0)
+    assert moments.indices(recorded).tolist() == list(range(100))
+    assert moments.speed == pytest.approx(0.04 * 25)
+    assert moments.pace == "1 × real time"
+    assert Moments.chosen(recorded, rate=12.5).pace == "0.5 × real time"
+
+
+def test_long_runs_are_thinned_and_play_faster():
+    recorded = 0.04 * np.arange(1, 1001)
+    moments = Moments.chosen(recorded, rate=15.0, most=150)
+    assert 100 < len(moments.times) <= 150
+    assert moments.every == pytest.approx(7 * 0.04)
+    assert moments.pace == "4.2 × real time"
+    steps = np.diff(moments.indices(recorded))
+    assert (steps == 7).all()
+
+
+def test_a_part_of_a_run_at_a_distance_of_ones_own():
+    recorded = 0.1 * np.arange(101)
+    moments = Moments.chosen(recorded, start=2.0, end=4.05, every=0.5, rate=10.0)
+    assert moments.times.tolist() == pytest.approx([2.0, 2.5, 3.0, 3.5, 4.0])
+    assert recorded[moments.indices(recorded)].tolist() == pytest.approx([2.0, 2.5, 3.0, 3.5, 4.0])
+    assert moments.speed == pytest.approx(5.0)
+
+
+def test_frames_at_odd_times_are_shown_nearest_to_theirs():
+    """One that is missing is made up for by its neighbour: the speed stays what it is told to be."""
+    recorded = np.array([0.0, 1.0, 2.0, 2.2, 3.0, 6.0, 7.0])
+    moments = Moments.chosen(recorded, rate=10.0)
+    assert moments.every == 1.0
+    assert recorded[moments.indices(recorded)].tolist() == [0, 1, 2, 3, 3, 6, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"start": 3.0, "end": 2.0}, r"must begin before it ends, within 0 s to 10 s.*: got 3 s to 2 s"),
+        ({"end": 12.0}, r"within 0 s to 10 s, the run's frames: got 0 s to 12 s"),
+        ({"start": float("nan")}, r"got nan s to 10 s"),
+        ({"every": 0.01}, r"every must be 0\.1 s or more, the time between the run's frames: got 0\.01 s"),
+        ({"every": 20.0}, r"every 20 s leaves one picture between 0 s and 10 s"),
+        ({"rate": 0.0}, r"fps must be above 0 and up to 100 pictures per second: got 0"),
+    ],
+)
+def test_times_that_make_no_film_are_named(wrong, message):
+    with pytest.raises(InputError, match=message):
+        Moments.chosen(0.1 * np.arange(101), **wrong)
+
+
+@pytest.mark.parametrize("rate", [15.0, 24.0, 29.97, 7.0])
+@pytest.mark.parametrize("unit", [0.01, 0.001])
+def test_a_film_of_rounded_durations_is_as_long_as_it_should_be(rate, unit):
+    shown_for = durations(1000, rate, unit)
+    assert sum(shown_for) * unit == pytest.approx(1000 / rate, abs=unit / 2)
+    assert max(shown_for) - min(shown_for) <= 1
+
+
+# Colours
+
+
+@pytest.mark.parametrize("kind", ["crossings", "height"])
+def test_a_palette_has_all_steps_of_the_colour_bar(kind):
+    """One bright smarticle among many pale ones keeps its colour."""
+    scale = ColourScale.of(COLOURINGS[kind], 0, 12)
+    image = np.full((300, 300, 3), 255, dtype=np.uint8)
+    image[:150] = np.random.default_rng(0).integers(0, 255, (150, 300, 3))
+    image[200, 200] = scale.keys[-1]
+    sample = Image.fromarray(image)
+    palette = film.Palette.of([sample], scale.keys)
+    bar = np.concatenate([scale.keys, [[255, 255, 255]]]).astype(np.uint8)
+    assert np.array_equal(np.asarray(palette.indexed(Image.fromarray(bar[None])).convert("RGB"))[0], bar)
+    # Other colours come near.
+    said = np.asarray(palette.indexed(sample).convert("RGB")).astype(int)
+    assert np.abs(said - image).mean() < 15
+
+
+def test_each_step_of_the_bar_has_a_colour_of_its_own_in_a_gif(tmp_path):
+    """Two pairs of steps shared one before, where few smarticles had them."""
+    directory = write_run(tmp_path / "a", SyntheticRun(count=14, frames_per_phase=3, phases=EVEN))
+    for number in range(9):
+        flat = u_shape(0.7 * W) + np.random.default_rng(number).uniform(-0.01, 0.01, (14, 1, 3)) * [1, 1, 0.1]
+        path = directory / f"frames/frame_{number:06d}.vtu"
+        write_frame(path, flat, time=(number + 1) / 3, phase=number // 3, contacts=np.arange(14))
+    pictures, _ = shown(render_film(directory, tmp_path / "a.gif", size=SIZE, color_by="contacts"))
+    steps = figures.count_colours(13)
+    expected = np.round(255 * np.array([steps.colours(k)[:3] for k in range(13)])).astype(int)
+    bar = pictures[0][:, -1 - round(12 * 4.4) : -1 - round(10 * 4.4)].reshape(-1, 3)
+    nearest = np.abs(bar[:, None] - expected).max(axis=2)
+    assert ((nearest == 0).sum(axis=0) > 10).all()
+
+
+# Films
+
+
+@pytest.mark.parametrize(("suffix", "unit"), [(".gif", 10), (".webp", 1)])
+def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, unit):
+    path = render_film(run, tmp_path / f"film{suffix}", size=SIZE, color_by="id", frames_per_second=15.0)
+    pictures, times = shown(path)
+    assert len(pictures) == 9
+    for before, after in itertools.pairwise(map(panel, pictures[::3])):
+        moved = (np.abs(before - after).max(axis=2) > 30).mean()
+        assert 0.01 < moved < 0.6
+    # Nine pictures, 1/3 s each, in 0.6 s: 5 × real time, as the caption says.
+    assert sum(times) == pytest.approx(600, abs=unit / 2)
+    assert all(time % unit == 0 for time in times)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_film_shows_the_part_that_is_asked_for(run, tmp_path):
+    whole, _ = shown(render_film(run, tmp_path / "a.webp", size=SIZE, limits=(0.0, 8.0)))
+    told: list[int] = []
+
+    def track(numbers, count):
+        told.append(count)
+        return numbers
+
+    options = {"size": SIZE, "limits": (0.0, 8.0), "start": 1.0, "end": 2.5, "every": 2 / 3, "track": track}
+    part, _ = shown(render_film(run, tmp_path / "b.webp", **options))
+    assert (len(whole), len(part), told) == (9, 3, [3])
+    # The same colours on the bar, of all and of a part.
+    assert np.array_equal(whole[0][60:, 175:], part[0][60:, 175:])
+
+
+def test_film_needs_two_frames(tmp_path):
+    run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(0.1,)))
+    with pytest.raises(InputError, match="a film needs at least 2 frames: got 1"):
+        render_film(run, tmp_path / "a.gif", size=SIZE)
+
+
+def test_failed_film_leaves_nothing_behind(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(film, "write_film", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        render_film(run, tmp_path / "a.gif", size=SIZE, most_frames=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+# MP4
+
+
+def test_mp4_without_an_encoder_is_refused_before_drawing(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InputError, match=r"\.mp4 needs an encoder .*imageio-ffmpeg, or choose \.gif or \.webp"):
+        render_film(run, tmp_path / "a.mp4", size=SIZE)
+    with pytest.raises(InputError, match=r"size must be even for \.mp4: got 241 x 240 pixels"):
+        film.check_film(tmp_path / "a.mp4", (241, 240))
+
+
+def test_mp4_is_what_browsers_play(run, tmp_path):
+    """H.264 with 4:2:0 colours and the index in front, as long as its speed says, with the colours of the picture."""
+    encoder = pytest.importorskip("imageio_ffmpeg", reason="the encoder of .mp4, imageio-ffmpeg, is not installed")
+    path = render_film(run, tmp_path / "a.mp4", size=SIZE, color_by="height", frames_per_second=10.0)
+    program = shutil.which(encoder.get_ffmpeg_exe())
+    told = subprocess.run(
+        [program, "-hide_banner", "-i", str(path)], capture_output=True, text=True, check=False
+    ).stderr
+    assert re.search(r"Video: h264 .*yuv420p.*, 240x240", told)
+    assert re.search(r"Duration: 00:00:00\.90", told)
+    content = path.read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat")
+    raw = subprocess.run(
+        [program, "-loglevel", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+        capture_output=True,
+        check=True,
+    )
+    played = np.frombuffer(raw.stdout, dtype=np.uint8).reshape(-1, 240, 240, 3).astype(int)
+    exact, _ = shown(render_film(run, tmp_path / "a.webp", size=SIZE, color_by="height"))
+    assert len(played) == len(exact) == 9
+    apart = [np.abs(panel(played[4]) - panel(exact[number])).mean() for number in range(0, 9, 2)]
+    assert apart[2] < 6
+    assert apart[2] < 0.7 * min(apart[0], apart[-1])

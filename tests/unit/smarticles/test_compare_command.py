@@ -1,0 +1,102 @@
+"""compare: what differs between two runs or two sweeps."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+from command_cases import Smarticles, WriteRun
+
+PHI = "phi second-highest-com [-]"
+
+
+def told(said_out: str) -> list[str]:
+    return [" ".join(line.split()) for line in said_out.splitlines()]
+
+
+def test_a_run_and_its_copy_are_the_same(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    shutil.copytree(run, tmp_path / "b")
+    said = smarticles("compare", run, tmp_path / "b")
+    assert (said.status, said.err) == (0, "")
+    assert "identical bits: yes, all of the series and 16 frames" in said.out
+    assert {"scene: the same", "versions: the same", "measures: the same"} <= {*said.out.splitlines()}
+
+
+def test_what_differs_is_told_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    one = write_run(tmp_path / "a")
+    other = write_run(tmp_path / "b", packing=(0.1, 0.105, 0.15, 0.132), shake_time=10.0)
+    manifest = json.loads((other / "run.json").read_text())
+    manifest["versions"]["numpy"] = "3"
+    (other / "run.json").write_text(json.dumps(manifest))
+    lines = told(smarticles("compare", one, other).out)
+    assert "phases.2.duration_s 20.0 10.0" in lines
+    assert "numpy 2 3" in lines
+    # φ of a made-up run is what was asked for; its frames scatter by 0.2 % about it.
+    assert any(line.startswith("shake φ 0.1300 0.1500 0.0200 ") for line in lines)
+    assert any("identical bits: no, the series differ from t = " in line for line in lines)
+
+
+def test_a_single_bit_is_seen(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    one = write_run(tmp_path / "a")
+    shutil.copytree(one, tmp_path / "b")
+    with h5py.File(tmp_path / "b" / "series.h5", "a") as file:
+        value = file["com_height_m"][30]
+        file["com_height_m"][30] = math.nextafter(value, 1.0)
+        at = file["time_s"][30]
+    said = smarticles("compare", one, tmp_path / "b", "--json")
+    found = json.loads(said.out)
+    assert found["identical"] is False
+    (bits,) = found["bits"].values()
+    assert bits["differs_at"] == at
+    assert (bits["frames"], bits["compared"]) == (16, 16)
+
+
+def test_json_and_table_have_all_measures_with_the_error_of_the_difference(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    runs = [write_run(tmp_path / name, packing=(0.1, 0.1, phi, 0.1)) for name, phi in (("a", 0.12), ("b", 0.14))]
+    table = tmp_path / "table.csv"
+    found = json.loads(smarticles("compare", *runs, "--json", "--table", table).out)
+    (row,) = [one for one in found["measures"] if one["quantity"] == PHI and one["phase type"] == "shake"]
+    assert row["B - A"] == pytest.approx(0.02, rel=1e-3)
+    single = json.loads(smarticles("measure", *runs, "--json").out)
+    errors = [one["phi second-highest-com SE [-]"] for one in single if one["phase type"] == "shake"]
+    assert row["SE of B - A"] == pytest.approx(math.hypot(*errors))
+    with table.open(encoding="utf-8") as file:
+        assert len(list(csv.DictReader(file))) == len(found["measures"])
+    assert "exists; choose another name" in smarticles("compare", *runs, "--table", table).err
+
+
+def test_sweeps_are_compared_run_by_run_and_group_by_group(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    for name, shift in (("one", 0.0), ("two", 0.02)):
+        smarticles("sweep", sweep_file, "--out", tmp_path / name)
+        write_run(tmp_path / name / "runs" / "n5", count=5)
+        write_run(tmp_path / name / "runs" / "n6", count=6, packing=(0.1, 0.1, 0.12 + shift, 0.1))
+        sweep_file.write_text(sweep_file.read_text().replace("[5, 6]", "[5, 6, 7]"))
+    said = smarticles("compare", tmp_path / "one", tmp_path / "two")
+    lines = told(said.out)
+    assert "only in B: n7" in lines
+    assert "identical bits: 1 of 2 runs that both have" in lines
+    assert any(line.startswith("6 shake φ 0.1200 0.1400 0.0200") for line in lines)
+    assert any(line.startswith("5 shake φ 0.1300 0.1300 0.0000") for line in lines)
+
+
+def test_a_run_is_not_compared_with_a_sweep_nor_with_nothing(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a")
+    smarticles("sweep", sweep_file, "--out", tmp_path / "s")
+    said = smarticles("compare", run, tmp_path / "s")
+    assert (said.status, said.err) == (
+        2,
+        f"smarticles: error: {run} is a run and {tmp_path / 's'} a sweep; give two of a kind\n",
+    )
+    assert "is neither a run directory nor that of a sweep" in smarticles("compare", run, tmp_path).err

@@ -1,0 +1,51 @@
+"""--completion: the script completes words in a real bash."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles
+
+ASK = """
+source {script}
+function=$(complete -p smarticles | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); COMPREPLY=(); $function
+echo "${{COMPREPLY[*]}}"
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ("smarticles compa", "compare"),
+        ("smarticles study fract", "fracture"),
+        ("smarticles run scene.yaml --eng", "--engine"),
+        ("smarticles run scene.yaml --engine l", "links"),
+        ("smarticles init cas", "casting"),
+        ("smarticles run sce", "scene.yaml"),
+    ],
+)
+def test_words_are_completed(words: str, meant: str, tmp_path: Path, smarticles: Smarticles) -> None:
+    script = tmp_path / "completion.bash"
+    script.write_text(smarticles("--completion", "bash").out)
+    (tmp_path / "scene.yaml").touch()
+    ask = ASK.format(script=script, words=words)
+    said = subprocess.run(["bash", "-c", ask], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert (said.stdout.split(), said.stderr) == ([meant], "")
+
+
+def test_the_script_for_zsh_is_one(smarticles: Smarticles) -> None:
+    said = smarticles("--completion", "zsh")
+    assert said.out.startswith("#compdef smarticles\n")
+    if shutil.which("zsh") is None:
+        pytest.skip("zsh is not installed here, so its script is not tried")
+    assert subprocess.run(["zsh", "-n"], input=said.out, text=True, check=False).returncode == 0
+
+
+def test_another_shell_is_refused(smarticles: Smarticles) -> None:
+    said = smarticles("--completion", "fish")
+    assert said.status == 2
+    assert "'fish' is not known" in said.err

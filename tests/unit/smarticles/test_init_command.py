@@ -1,0 +1,53 @@
+"""init: scenes to begin with, each valid, planned without a warning, and never over another file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles
+
+from smarticles.starters import KINDS, about, starter
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_written_is_planned_without_a_warning(kind: str, tmp_path: Path, smarticles: Smarticles) -> None:
+    file = tmp_path / "mine.yaml"
+    said = smarticles("init", kind, "--output", file)
+    assert (said.status, said.err) == (0, "")
+    assert said.out.splitlines()[1] == (f"next: smarticles plan {file}, smarticles run {file} --out runs/mine")
+    planned = smarticles("plan", file)
+    assert planned.status == 0
+    assert "warning" not in planned.out
+    assert planned.out.startswith(f"{kind}: ")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_scene_begins_with_what_it_does_and_comments_its_keys(kind: str) -> None:
+    lines = starter(kind).splitlines()
+    assert lines[0] == f"# {about(kind)}"
+    assert sum("  # " in line for line in lines) >= 5
+
+
+def test_the_help_tells_every_kind(smarticles: Smarticles) -> None:
+    said = smarticles("init", "--help").out
+    assert all(f"  {kind:<10}{about(kind)}" in said for kind in KINDS)
+
+
+def test_nothing_is_overwritten_nor_written_through_a_link(tmp_path: Path, smarticles: Smarticles) -> None:
+    mine = tmp_path / "scene.yaml"
+    mine.write_text("precious")
+    link = tmp_path / "link.yaml"
+    link.symlink_to(tmp_path / "elsewhere.yaml")
+    for place in (mine, link):
+        said = smarticles("init", "--output", place)
+        assert (said.status, said.err) == (2, f"smarticles: error: --output {place}: exists; choose another name\n")
+    assert mine.read_text() == "precious"
+    assert not (tmp_path / "elsewhere.yaml").exists()
+
+
+def test_a_folder_that_is_missing_and_a_kind_that_is_not_known(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("init", "--output", tmp_path / "no" / "scene.yaml")
+    assert said.status == 2
+    assert f"the folder {tmp_path / 'no'} does not exist; make it" in said.err
+    assert "did you mean 'melting'?" in smarticles("init", "meltin").err

@@ -1,0 +1,249 @@
+"""report: what stands on the page of a run, a sweep and a study. How it looks is in `test_report_browser.py`."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from command_cases import Smarticles, WriteRun
+from hostile import NAMES, of_entry, spoil
+from scenes import small
+
+from dem.scene.reading import dump_scene, scene_hash
+from smarticles.reporting.charts import thinned
+from smarticles.reporting.page import Table
+from smarticles.sweeps import make_folder
+from studies.registry import study_file
+
+
+class Read(HTMLParser):
+    """Texts, tags and tables of a page."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.rows: list[list[str]] = []
+        self._inside: list[str] = []
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._inside.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        while self._inside and self._inside.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self._inside:
+            self.text += data
+        if self._inside and self._inside[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+
+    def of(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    def row(self, *first: str) -> list[str]:
+        return next(row for row in self.rows if row[: len(first)] == list(first))
+
+
+@pytest.fixture
+def run(tmp_path: Path, write_run: WriteRun) -> Path:
+    """A run of a scene that this version reads."""
+    directory = write_run(tmp_path / "pile", name="my pile")
+    scene = small({"count": 12, "name": "my pile", "engine": "links", "fidelity": {"base": "draft", "rows": 2}})
+    (directory / "scene.yaml").write_text(dump_scene(scene), encoding="utf-8")
+    return directory
+
+
+def test_the_page_of_a_run_tells_everything(run: Path, smarticles: Smarticles) -> None:
+    (run / "log.txt").write_text("2026-11-22 07:00:00,000 WARNING two hooks\n" * 3 + "2026-11-22 07:00:00 INFO fine\n")
+    said = smarticles("report", run)
+    assert (said.status, said.err) == (0, "")
+    page = Read(run / "report.html")
+    titles = [attributes["id"] for attributes in page.of("section")]
+    assert titles == [
+        "result", "final-state", "against-time", "scene", "effects", "settings-and-their-accuracy", "warnings",
+        "how-to-repeat-it",
+    ]  # fmt: skip
+    # Known: φ before shaking is 0.105, at the end of it 0.130.
+    assert page.row("relax")[2].startswith("0.1050 ± 0.000")
+    assert page.row("shake")[2].startswith("0.1300 ± 0.000")
+    assert page.row("motors", "off")[2] == "no phase actuates"
+    assert page.row("container motion", "on")[2].startswith("phase 2: Γ = 2")
+    assert page.row("rows") == ["rows", "2", "1"]
+    assert page.row("links", "draft")[-1] == "this one"
+    assert "This scene changes rows, which the table does not know of." in page.text
+    assert page.row("warning: two hooks") == ["warning: two hooks", "3 ×"]
+    assert page.row("seed")[1] == "1"
+    assert "smarticles run pile/scene.yaml --out pile-again" in page.text
+    assert str(run.parent) not in (run / "report.html").read_text(encoding="utf-8")
+    assert len(page.of("img")) >= 3
+
+
+def test_nothing_leaves_the_page_and_nothing_runs_in_it(run: Path, smarticles: Smarticles) -> None:
+    smarticles("report", run)
+    page = Read(run / "report.html")
+    assert not {"script", "iframe", "object", "embed", "form"} & {tag for tag, _ in page.tags}
+    for _, attributes in page.tags:
+        assert not [name for name in attributes if name.startswith("on")]
+        for name in ("src", "href", "srcset"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:"))
+    (policy,) = [a["content"] for a in page.of("meta") if a.get("http-equiv") == "Content-Security-Policy"]
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert all(attributes.get("alt") for attributes in page.of("img"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hostile_name_is_a_name(name: str, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = spoil(write_run(tmp_path / "run", status="failed", frames_per_phase=1), name)
+    assert smarticles("report", run).status == 0
+    page = Read(run / "report.html")
+    assert f"This run failed: {name}" in page.text
+    assert page.row(f"warning: beware of {name}")
+    assert page.row("version of git")[1] == name
+    assert not [attributes for attributes in page.of("h1") if attributes]
+    assert {tag for tag, _ in page.tags}.isdisjoint({"script"})
+    assert not [a for a in page.of("img") if not (a["src"] or "").startswith("data:")]
+
+
+def test_of_a_run_without_frames_it_says_so(run: Path, smarticles: Smarticles) -> None:
+    (run / "frames.pvd").unlink()
+    (run / "done.json").unlink()
+    smarticles("report", run)
+    text = Read(run / "report.html").text
+    assert "No frame has been recorded" in text
+    assert "This run has not finished." in text
+
+
+def test_a_scene_of_another_version_is_told_and_no_reason_to_fail(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "old")
+    assert smarticles("report", run).status == 0
+    assert "This version cannot read the scene of this run" in Read(run / "report.html").text
+
+
+def test_what_exists_is_kept_and_what_is_no_run_refused(run: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    (run / "report.html").write_text("mine")
+    said = smarticles("report", run)
+    assert (said.status, "exists already" in said.err) == (2, True)
+    assert (run / "report.html").read_text() == "mine"
+    assert smarticles("report", run, "--overwrite").status == 0
+    assert "let its name end in .html" in smarticles("report", run, "--output", tmp_path / "a.pdf").err
+    assert "does not exist; make it" in smarticles("report", run, "--output", tmp_path / "no" / "a.html").err
+    assert "is no run, sweep or study" in smarticles("report", tmp_path, "--output", tmp_path / "a.html").err
+
+
+# -- sweeps and studies ------------------------------------------------------------------------------------------------
+
+
+def test_the_page_of_a_sweep_has_means_and_figures(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    content = yaml.safe_load(sweep_file.read_text())
+    content |= {"repeats": {"seeds": [1, 2]}, "run_name": "n{{ count }}_{{ seed }}"}
+    sweep_file.write_text(yaml.safe_dump(content))
+    (tmp_path / "scene.yaml.j2").write_text(
+        (tmp_path / "scene.yaml.j2").read_text().replace("seed: 1", "seed: {{ seed }}")
+    )
+    folder = make_folder(sweep_file, tmp_path / "out", "smarticles sweep <hostile>")
+    packing = dict(zip((entry.name for entry in folder.entries), (0.12, 0.14, 0.2, 0.3), strict=True))
+    for entry in folder.entries[:3]:
+        phi = packing[entry.name]
+        write_run(folder.run(entry), packing=(0.1, 0.1, phi, phi), **{k: entry.values[k] for k in ("count", "seed")})
+    assert smarticles("report", folder.path).status == 0
+    page = Read(folder.path / "report.html")
+    assert page.row("5", "2")[3].startswith("0.1300 ± 0.0100")
+    assert page.row("6", "1")[3] == "0.2000"
+    assert page.row("n6_2")[:2] == ["n6_2", "missing"]
+    assert page.row("contact")[1] == "4 of 4"
+    assert page.row("count", "5, 6")[2] == "2"
+    assert "smarticles sweep <hostile>" in page.text
+    alts = [attributes["alt"] for attributes in page.of("img")]
+    assert "phi second-highest-com against count, from 0.13 to 0.2" in alts
+
+
+def test_the_page_of_a_study_has_its_verdicts(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    folder = make_folder(study_file("gravish", quick=True), tmp_path / "study", "smarticles study gravish --quick")
+    for entry in [one for one in folder.entries if not one.again and one.values["l_over_w"] in (0.4, 0.7)]:
+        known = {"aspect_ratio": entry.values["l_over_w"], "seed": entry.values["seed"]}
+        of_entry(write_run(folder.run(entry), frames_per_phase=2, **known), entry)
+    smarticles("report", folder.path)
+    before = Read(folder.path / "report.html").text
+    assert "smarticles study gravish --quick --out study --analyse" in before
+    assert smarticles("study", "gravish", "--quick", "--out", folder.path, "--analyse").status == 0
+    assert smarticles("report", folder.path, "--overwrite").status == 0
+    page = Read(folder.path / "report.html")
+    assert page.row("question") == ["question", "answer", "evidence"]
+    assert page.row("Is phi_f above phi_0 at every l/w?")[1] == "yes"
+    assert any(row[0] == "phi_f" and "0.7" in row and "0.13" in row for row in page.rows)  # Gravish's, at 0.7
+    assert any("Gravish et al., PRL 108, 208001" in line for line in page.text.splitlines())
+    assert [alt for a in page.of("img") if (alt := a["alt"] or "").startswith("Figure “phi” of the study gravish")]
+    # The results alone make a page as well.
+    assert smarticles("report", folder.path / "results", "--output", tmp_path / "results.html").status == 0
+    assert Read(tmp_path / "results.html").row("question")
+
+
+def test_results_that_are_damaged_are_refused(tmp_path: Path, smarticles: Smarticles) -> None:
+    (tmp_path / "provenance.json").write_text("{")
+    said = smarticles("report", tmp_path)
+    assert (said.status, "analyse the study again" in said.err) == (2, True)
+
+
+# -- parts -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_thinned_curve_keeps_its_extremes() -> None:
+    times = np.linspace(0, 1, 10_001)
+    values = np.sin(50 * times)
+    values[777], values[5000] = 9.0, math.nan
+    few_times, few = thinned(times, values)
+    assert len(few) <= 400
+    assert (few.max(), few.min()) == (9.0, np.nanmin(values))
+    assert times[777] in few_times
+    assert (np.diff(few_times) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("cells", "numeric"),
+    [
+        (["1", "-2.5", "1e-05", "0.1 ± 0.02", "-", "+3.1 ± 2 %"], True),
+        (["1", "1.5 s"], False),
+        (["-", "2026-11-22"], False),
+        (["1.2.3-x"], False),
+        ([], False),
+    ],
+)
+def test_columns_of_numbers_are_known(cells: list[str], numeric: bool) -> None:
+    assert Table(caption="", header=["a"], rows=[[cell] for cell in cells]).numeric == [numeric]
+
+
+def test_a_long_table_says_what_is_left_out(tmp_path: Path, smarticles: Smarticles) -> None:
+    (tmp_path / "provenance.json").write_text('{"study": "x", "runs": [], "missing": [], "footer": []}')
+    (tmp_path / "times.csv").write_text("a,b\n" + "".join(f"{k},1\n" for k in range(500)) + "# of nothing\n")
+    smarticles("report", tmp_path)
+    page = Read(tmp_path / "report.html")
+    assert len(page.rows) == 201
+    assert "300 more rows are left out here." in page.text
+    assert not re.search("of nothing", " ".join(cell for row in page.rows for cell in row))
+
+
+def test_hashes_of_scenes_are_there(run: Path, smarticles: Smarticles) -> None:
+    scene = small({"count": 12})
+    manifest = json.loads((run / "run.json").read_text())
+    (run / "run.json").write_text(json.dumps(manifest | {"scene_sha256": scene_hash(scene)}))
+    smarticles("report", run)
+    assert Read(run / "report.html").row("scene hash (SHA-256)")[1] == scene_hash(scene)

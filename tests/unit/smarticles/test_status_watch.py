@@ -1,0 +1,71 @@
+"""status --watch: looks again until nothing goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_cases import Smarticles, WriteRun
+
+from smarticles.commands import status as command
+from templates.sweep.folder import open_folder
+
+
+class Clock:
+    """Stands for `time`: each wait lets the next thing happen."""
+
+    def __init__(self, *steps) -> None:
+        self.steps, self.waits = list(steps), []
+
+    def sleep(self, seconds: float) -> None:
+        self.waits.append(seconds)
+        self.steps.pop(0)()
+
+
+@pytest.fixture
+def out(tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles) -> Path:
+    """A sweep of two runs, of which one is done."""
+    smarticles("sweep", sweep_file, "--out", tmp_path / "out")
+    write_run(tmp_path / "out" / "runs" / "n5")
+    return tmp_path / "out"
+
+
+def test_it_ends_when_nothing_runs(
+    out: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = write_run(out / "runs" / "n6", status="unfinished")
+    lock = open_folder(out).lock()
+    lock.__enter__()
+    clock = Clock(
+        lambda: None,
+        lambda: (run / "progress.json").write_text('{"phase": "shake", "time_s": 1.5}'),
+        lambda: (lock.__exit__(None, None, None), write_run(out / "runs" / "n6")),
+    )
+    monkeypatch.setattr(command, "time", clock)
+    said = smarticles("status", out, "--watch", "0.5")
+    assert (said.status, said.err) == (0, "")
+    assert clock.waits == [0.5] * 3
+    # A look that shows nothing new is not told again.
+    lasts = [line for line in said.out.splitlines() if line.startswith("counts: ")]
+    assert lasts == ["counts: 2 runs, 1 done, 1 running"] * 2 + ["counts: 2 runs, 2 done"]
+    assert [line.split()[1] for line in said.out.splitlines() if line.startswith("n6")] == ["running"] * 2 + ["done"]
+
+
+def test_ctrl_c_is_its_way_to_end(
+    out: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    write_run(out / "runs" / "n6", status="unfinished")
+    monkeypatch.setattr(command, "time", Clock(stop))
+    with open_folder(out).lock():
+        said = smarticles("status", out, "--watch")
+    assert (said.status, said.err) == (0, "")
+    assert said.out.count("running") == 2
+
+
+def test_of_what_does_not_run_it_is_one_look(out: Path, smarticles: Smarticles) -> None:
+    assert smarticles("status", out, "--watch").out == smarticles("status", out).out
+    said = smarticles("status", out, "--watch", "--json")
+    assert (said.status, "leave it out with --json" in said.err) == (2, True)
