@@ -18,14 +18,13 @@ from smarticles.commands import (
     compare,
     doctor,
     export,
-    init,
     measure,
     plan,
     render,
     report,
     resume,
     run,
-    schema,
+    scene_files,
     status,
     study,
     sweep,
@@ -37,7 +36,7 @@ from smarticles.parsing import Commands, Parser, add_debug
 from smarticles.stopping import orderly_stop
 
 COMMANDS = (
-    *(init, run, plan, schema, doctor, measure, compare, render, view, export, report),
+    *(scene_files, run, plan, doctor, measure, compare, render, view, export, report),
     *(sweep, status, resume, study, accuracy, verify),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""

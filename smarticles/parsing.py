@@ -34,6 +34,9 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"[\w-]+", invalid[2])
             what = message.partition(":")[0].removeprefix("argument ")
             message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known, cutoff=0.5)}"
+        wrong = re.fullmatch(r"(argument .*): invalid (?:float|int) value: ('.*')", message, flags=re.DOTALL)
+        if wrong:
+            message = f"{wrong[1]}: {wrong[2]} is not a number"
         msg = f"{message}; see `{self.prog} --help`"
         raise InputError(msg)
 

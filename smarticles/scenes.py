@@ -38,7 +38,7 @@ def run_here(
     *,
     settings: Sequence[str] = (),
     resume: bool,
-    threads: int = 1,
+    threads: int | None = None,
 ) -> int:
     """Run a scene in this process.
 
@@ -48,7 +48,7 @@ def run_here(
         arguments: of the command, for the manifest.
         settings: keys that differ from the file, `KEY=VALUE`.
         resume: go on in a run directory that holds an unfinished run.
-        threads: of the engine; only one gives the same bits again.
+        threads: of the engine; by default one, or as many as the run that is resumed began with.
 
     Returns:
         Exit status: 0, or 75 where SIGUSR1 stopped the run at a checkpoint.
@@ -59,11 +59,15 @@ def run_here(
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
     from dem.engine.cores import threads_warning  # noqa: PLC0415
+    from dem.record.manifest import read_run  # noqa: PLC0415
+    from dem.record.names import MANIFEST  # noqa: PLC0415
 
     scene = read_scene(scene_file, settings)
+    if threads is None:
+        threads = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
     if (warning := threads_warning(threads)) is not None:
         print(f"smarticles: warning: {warning}", file=sys.stderr)
-    # YADE reads it when it is loaded, and a batch system may have set it to all cores of the node.
+    # Engines read it when they are loaded, and a batch system may have set it to all cores of the node.
     os.environ["OMP_NUM_THREADS"] = str(threads)
     # These lead to YADE: not before the scene is known to be good.
     from dem.run import run  # noqa: PLC0415

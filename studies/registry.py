@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dem.errors import InputError, nearest
-from studies import casting, chain, collapse, engines, fracture, gravish, melting, procedures, sensitivity
+from studies import casting, chain, collapse, engines, fracture, friction, gravish, melting, procedures, sensitivity
 from studies.base.shipped import Shipped
 
 STUDIES: Mapping[str, Shipped] = MappingProxyType(
@@ -15,6 +15,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
         study.name: study
         for study in (
             gravish.SHIPPED,
+            friction.SHIPPED,
             sensitivity.SHIPPED,
             sensitivity.SECTION,
             procedures.SHIPPED,

@@ -20,6 +20,17 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene))
 
 
+def thread_warnings(scene: Scene, threads: int) -> tuple[str, ...]:
+    """Threads that a scene has no use for, in one line."""
+    pays = engine_kind(scene.engine).threads_pay_from
+    if threads == 1 or scene.count >= pays:
+        return ()
+    return (
+        f"--threads {threads}: {scene.count} smarticles gain little by more than one thread, from about {pays} on "
+        "they do; for many small runs use a sweep with one thread each",
+    )
+
+
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
     """Knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
     fidelity = scene.fidelity

@@ -36,20 +36,28 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
         raise
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path, write: Callable[[Path], None], *, make_folder: bool = True) -> None:
     """Let `write` make a file of a run, a sweep or a bench.
 
     Args:
-        path: the file that is to appear, or to be replaced; its folder is made if needed.
+        path: the file that is to appear, or to be replaced.
         write: called with the temporary path, which keeps the suffix of `path`.
+        make_folder: whether its folder is made if needed; not where its absence means that somebody moved it away.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; what was at `path` before is untouched.
     """
     try:
-        path.parent.mkdir(exist_ok=True)
+        if make_folder:
+            path.parent.mkdir(exist_ok=True)
         with whole(path) as temporary:
             write(temporary)
+    except FileNotFoundError as error:
+        msg = (
+            f"{path}: cannot be written, its folder is gone; if it was moved, what is written in it is whole, and a "
+            "run goes on from there: smarticles resume DIR"
+        )
+        raise RunError(msg) from error
     except OSError as error:
         msg = (
             f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
@@ -58,18 +66,18 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         raise RunError(msg) from error
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
     """Write text whole; errors as in `write_whole`."""
 
     def write(temporary: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
-    write_whole(path, write)
+    write_whole(path, write, make_folder=make_folder)
 
 
-def write_json(path: Path, data: Any) -> None:
+def write_json(path: Path, data: Any, *, make_folder: bool = True) -> None:
     """Write JSON whole; errors as in `write_whole`."""
-    write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n", make_folder=make_folder)
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:

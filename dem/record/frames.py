@@ -46,7 +46,7 @@ class FrameWriter:
         name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
-        write_text(self.folder / names.collection(self.noun), self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames only, of the given times [s]; later files are removed."""
@@ -54,7 +54,7 @@ class FrameWriter:
         kept = {self.folder / names.member(self.noun, k) for k in range(len(self.times))}
         for path in set((self.folder / names.folder(self.noun)).glob("*.vtu")) - kept:
             path.unlink()
-        write_text(self.folder / names.collection(self.noun), self._collection())
+        write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def _collection(self) -> str:
         rows = [

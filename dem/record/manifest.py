@@ -178,7 +178,7 @@ def mark_done(
     """
     (out / FAILED).unlink(missing_ok=True)
     data = {"status": "done", "time_s": time, "steps": steps, "wall_s": wall, "cpu_s": cpu, "phases": list(phases)}
-    write_json(out / DONE, data)
+    write_json(out / DONE, data, make_folder=False)
 
 
 def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: float | None) -> None:
@@ -192,7 +192,8 @@ def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: 
         checkpoint: simulated time of the last good checkpoint [s]; None: there is none.
     """
     try:
-        write_json(out / FAILED, {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint})
+        data = {"status": status, "cause": cause, "time_s": time, "checkpoint_s": checkpoint}
+        write_json(out / FAILED, data, make_folder=False)
     except RunError:
         return
 

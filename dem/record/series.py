@@ -76,7 +76,7 @@ class SeriesWriter:
         Raises:
             RunError: it cannot be written.
         """
-        write_whole(self.folder / names.SERIES, self._write)
+        write_whole(self.folder / names.SERIES, self._write, make_folder=False)
         self._written = time.monotonic()
 
     def _write(self, path: Path) -> None:

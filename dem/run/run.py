@@ -17,10 +17,10 @@ import numpy as np
 
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
-from dem.plan.advice import warnings_of
+from dem.plan.advice import thread_warnings, warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_text
-from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, write_manifest
+from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, read_run, write_manifest
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE
 from dem.record.progress import ProgressWriter
 from dem.record.rundir import claimed, log_of, recorded_scene_hash
@@ -133,7 +133,8 @@ def _run(
             made_by=made_by,
             time_steps=steps,
         )
-        for warning in warnings_of(scene):
+        threads = engine_kind(scene.engine).threads()
+        for warning in (*warnings_of(scene), *thread_warnings(scene, threads)):
             simulation.warn(warning)
         if resume:
             _restore(simulation, scene, out, log)
@@ -187,6 +188,12 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
+    begun, now = read_run(out).threads, engine_kind(scene.engine).threads()
+    if begun != now:
+        simulation.warn(
+            f"--threads {now}: the run began with {begun}; it goes on, with other last bits than a run that was never "
+            "stopped"
+        )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 
 

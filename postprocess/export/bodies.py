@@ -23,7 +23,7 @@ from postprocess.measures.entanglement import link_passages
 from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.pictures.surroundings import DrawnHooks, Surroundings, read_surroundings
-from postprocess.scene_file import read_scene
+from postprocess.scene_file import read_phases, read_scene
 
 if TYPE_CHECKING:
     pass
@@ -105,6 +105,10 @@ class Bodies:
         container = read_scene(run.directory).part("container")
         height = None if container is None else container.values.get("height_m")
         self._height = None if container is None or height is None else container.number("height_m", positive=True)
+        # The wall rests where the floor is at rest, at z = 0, while a shake moves the floor alone.
+        self._floor_alone = {
+            phase.index for phase in read_phases(run.directory) if phase.values.get("moves") == "floor"
+        }
         self._top = 0.0  # of the highest smarticle above the floor
         self._reach = 0.0  # of the farthest one from the axis
         self._span = math.inf, -math.inf  # of all along x
@@ -166,7 +170,8 @@ class Bodies:
         raised = self._around.raised(frame.time, frame.phase, self._top_of(frame))
         if raised is None:
             return None
-        outline = np.array([(radius, 0.0, floor + raised + height) for radius, height in self._corners()])
+        base = 0.0 if frame.phase in self._floor_alone else floor
+        outline = np.array([(radius, 0.0, base + raised + height) for radius, height in self._corners()])
         line = pv.MultipleLines(outline)
         turned: pv.PolyData = line.extrude_rotate(resolution=ROUND, capping=False).triangulate()
         turned.clear_data()

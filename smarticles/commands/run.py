@@ -40,10 +40,10 @@ directory that holds something else is never touched.""",
     run.add_argument(
         "--threads",
         type=positive_int,
-        default=1,
         metavar="N",
-        help="threads of YADE; default 1, whatever OMP_NUM_THREADS says: with more, two runs differ in their last "
-        "bits, and threads that find no free core make a run many times slower",
+        help="threads of the engine; default 1, whatever OMP_NUM_THREADS says, or what the run to be resumed began "
+        "with. Results depend on their number in the last bits: the same number gives the same bits on links, not on "
+        "YADE. They pay from about 1000 smarticles on; threads that find no free core make a run slower",
     )
 
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
+from dem.record.series import read_series
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
+from studies.base.figures import History
 from studies.base.runs import DEFINITION, duration
 
 SHAKEN = "time shaken [s]"
@@ -31,7 +34,7 @@ STAGES: Mapping[str, str] = MappingProxyType(
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """How the stages are averaged, for footers."""
 
-_SHAKE = "shake"
+_SHAKE, _SERIES = "shake", "packing_fraction"
 
 
 def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, object]:
@@ -89,6 +92,27 @@ def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, obje
     row["scene_sha256"] = run.scene_sha256
     row["run"] = run.directory.name
     return row
+
+
+def packing_history(run: RunManifest) -> History:
+    """φ of a shaken run against the time since shaking began [-].
+
+    Args:
+        run: A finished run.
+
+    Raises:
+        InputError: It was not shaken, or recorded no φ.
+    """
+    shakes = [phase for phase in run.phases if phase.type == _SHAKE]
+    start, end = (shakes[0].start, shakes[-1].end) if shakes else (None, None)
+    series = read_series(run.directory)
+    values = np.asarray(series[_SERIES], dtype=np.float64)
+    if start is not None and end is not None:
+        shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
+        if shown.any():
+            return History(times=series.time[shown] - start, values=values[shown], active=end - start)
+    msg = f"{run.directory}: no packing fraction was recorded while shaking"
+    raise InputError(msg)
 
 
 def measured_quantities(runs: pd.DataFrame) -> list[str]:

@@ -6,11 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
-from dem.record.series import read_series
 from postprocess.report import figures
 from studies.base.engines import TOLD, engines_of, judging, of_engine
 from studies.base.figures import (
@@ -27,14 +24,13 @@ from studies.base.figures import (
     told_histories,
 )
 from studies.base.runs import ENGINES
-from studies.base.shaken import SHAKEN
+from studies.base.shaken import SHAKEN, packing_history
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 _ASPECT = "aspect ratio [-]"
-_SERIES = "packing_fraction"
 _WIDE = 1.4 * figures.COLUMN_WIDTH  # for the longer legend of two engines
 _SHIFT = 0.005  # in l/w, to keep error bars apart
 
@@ -158,7 +154,7 @@ def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence
     without, ends = [], []
     for run in manifests:
         try:
-            history = _history(run)
+            history = packing_history(run)
         except InputError:
             without.append(run.directory.name)
         else:
@@ -185,23 +181,6 @@ def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence
     if without:
         told.append(f"No time series of φ: {', '.join(without)}.")
     return finished(figure, path, [*told, *footer])
-
-
-def _history(run: RunManifest) -> History:
-    """Reads one run's history.
-
-    Raises:
-        InputError: There is none.
-    """
-    series = read_series(run.directory)
-    shakes = [phase for phase in run.phases if phase.type == "shake"]
-    start, end = shakes[0].start, shakes[-1].end
-    values = np.asarray(series[_SERIES], dtype=np.float64)
-    shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
-    if start is None or end is None or not shown.any():
-        msg = f"{run.directory}: no packing fraction was recorded while shaking"
-        raise InputError(msg)
-    return History(times=series.time[shown] - start, values=values[shown], active=end - start)
 
 
 def _draw_means(

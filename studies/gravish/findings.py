@@ -8,8 +8,6 @@ has none, and what would need one is left undetermined.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -17,6 +15,7 @@ import pandas as pd
 from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import mean_columns, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
+from studies.base.questions import Question, YesNo
 from studies.base.references import COLUMNS, DIGITISING_ERROR, reference_at
 from studies.base.runs import DEFINITION
 from studies.base.shaken import SHAKEN, STAGES, measured_quantities
@@ -26,23 +25,6 @@ ACCEPTED_DEVIATION = 10.0
 
 
 _COMPARED = {f"{stage} {DEFINITION}": stage for stage in COLUMNS}
-
-YesNo = Literal["yes", "no", "undetermined"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Question:
-    """A question of the study, answered.
-
-    Attributes:
-        question: Ends in a question mark.
-        answer: "undetermined" where the data cannot tell.
-        evidence: The numbers behind it.
-    """
-
-    question: str
-    answer: YesNo
-    evidence: str
 
 
 def summarise_runs(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

@@ -9,7 +9,6 @@ How errors and answers come about is in `studies.gravish.findings`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
@@ -30,13 +29,13 @@ from studies.base.engines import (
     of_engine,
     told_engines,
 )
+from studies.base.questions import Question, questions_table
 from studies.base.references import DIGITISING_ERROR, GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
 from studies.base.study import Analysis, Study, Tables
 from studies.gravish import figures
 from studies.gravish.findings import (
-    Question,
     answers,
     deviations_from_reference,
     steps_between_ratios,
@@ -110,7 +109,7 @@ class Gravish(Study[Question]):
 
     def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
         """`verdicts.csv`."""
-        return {"verdicts": pd.DataFrame([asdict(one) for one in judged])}
+        return {"verdicts": questions_table(judged)}
 
     def reference_of(self, tables: Tables) -> Reference:
         """Gravish's packing fractions."""
@@ -202,7 +201,7 @@ class Gravish(Study[Question]):
 
     def told(self, analysis: Analysis[Question]) -> Sequence[str]:
         """Questions with their answers."""
-        return [f"{one.question} {one.answer.upper()}\n    {one.evidence}" for one in analysis.judged]
+        return [one.told for one in analysis.judged]
 
 
 def _engine_header(table: pd.DataFrame) -> list[str]:

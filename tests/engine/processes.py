@@ -20,9 +20,9 @@ def gate(file: str, count: int, send: str, *, after: str = "", once: str = "") -
     return {"PYTHONPATH": os.pathsep.join(paths), "GATE": json.dumps(told)}
 
 
-def start(scene: Path, out: Path, variables: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
+def start(scene: Path, out: Path, variables: Mapping[str, str] | None = None, *options: str) -> subprocess.Popen[str]:
     """Run a scene, or go on with it."""
-    command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(out)]
+    command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(out), *options]
     if (out / "run.json").exists():
         command.append("--resume")
     # A batch system may say so; a run has one thread all the same, and the same bits.

@@ -283,3 +283,17 @@ def test_disk_that_fills_up_ends_the_run_with_one_line(
         assert len(meshio.read(path).points) > 0
     assert len(series(out)["time_s"]) > 1
     assert not [path for path in out.rglob("*") if "partial" in path.name]
+
+
+def test_a_limit_of_file_sizes_is_told_and_is_no_internal_error(scene_data: SceneData, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(yaml.safe_dump(scene_data()))
+    # Enough for a frame, and not for the state that YADE writes with a library of its own.
+    command = ["bash", "-c", 'ulimit -f 20; exec "$@"', "bash", sys.executable, "-m", "smarticles", "run", str(scene)]
+    said = subprocess.run(
+        [*command, "--out", str(tmp_path / "run")], capture_output=True, text=True, check=False, timeout=TIMEOUT
+    )
+    assert said.returncode == 1
+    (line,) = said.stderr.splitlines()
+    assert "the state cannot be written (" in line
+    assert "the checkpoint before is whole" in line

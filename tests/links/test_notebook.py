@@ -1,7 +1,7 @@
 """The notebook and README's Python run from top to bottom in a fresh process; numbers are those of their runs.
 
-The notebook's cells are plain Python and are run as such: a Jupyter kernel would bring another IPython than the one that YADE
-imports.
+The notebook's cells are plain Python and are run as such: a Jupyter kernel would bring another IPython than the one
+that YADE imports.
 """
 
 from __future__ import annotations

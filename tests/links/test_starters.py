@@ -9,7 +9,7 @@ import pytest
 import smarticles
 from smarticles.starters import KINDS, starter
 
-FEW = {"hook": 16, "chain": 2}
+FEW = {"hook": 30, "chain": 2}
 """How many smarticles make each scene still meaningful; 8 of the others."""
 
 SHORT = {

@@ -32,7 +32,7 @@ class SyntheticRun:
 
     `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
     a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
-    `wall_s` [s]; `more` are constant series: name, value.
+    `wall_s` [s]; `more` are constant series: name, value. The scene tells of contact where there is a `friction`.
     """
 
     aspect_ratio: float = 0.7
@@ -52,6 +52,7 @@ class SyntheticRun:
     name: str = "synthetic"
     wall_s: float = 1.0
     more: tuple[tuple[str, float], ...] = ()
+    friction: float | None = None
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -216,7 +217,10 @@ def write_manifest(directory: Path, run: SyntheticRun, **more: Any) -> None:
 def _write_scene(directory: Path, run: SyntheticRun) -> None:
     settings = {"internal-oscillation": {"theta_deg": run.theta, "scaled": True}, **SETTINGS}
     phases = [{"type": kind, **settings.get(kind, {"duration_s": run.durations[kind]})} for kind in run.phases]
-    (directory / "scene.yaml").write_text(yaml.safe_dump({"schema_version": 1, "phases": phases}))
+    scene: dict[str, Any] = {"schema_version": 1, "phases": phases}
+    if run.friction is not None:
+        scene["contact"] = {"friction_smarticle": run.friction, "friction_wall": run.friction}
+    (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
 
 
 def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64]) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import pandas as pd
 import pytest
 
-from benchmarks import effects, twins
+from benchmarks import effects, scaling, twins
 from dem.plan.effects import EFFECTS, decide
 from dem.plan.steps import time_step
 from dem.scene.reading import parse_scene
@@ -52,3 +53,27 @@ def test_twins_are_valid(kind: str) -> None:
     one, other = (parse_scene(scene(changes), source="benchmarks") for changes in twins.twins(0.5)[kind])
     assert one != other
     assert time_step(one) == time_step(other)
+
+
+@pytest.mark.parametrize("count", scaling.COUNTS)
+def test_piles_of_any_number_are_as_high(count: int) -> None:
+    scene = parse_scene(scaling.scene_of(count), source="benchmarks")
+    assert time_step(scene) > 0
+    area = scene.container.radius_m**2
+    assert count / area == pytest.approx(scaling.PAPER_COUNT / scaling.PAPER_RADIUS**2)
+
+
+def test_the_table_of_scaling_takes_the_least_time_of_every_stretch_and_says_growth_and_gain() -> None:
+    def told(wall: list[float], processor: list[float]) -> dict[str, Any]:
+        return {"wall": wall, "processor": processor, "touches": 2.0, "memory": 100.0, "height": 0.01}
+
+    each = 1e6 / (scaling.LENGTH * scaling.STRETCHES)
+    rows = [
+        scaling.row_of(100, 1, [told([1.0, 3.0], [1.0, 2.0]), told([2.0, 1.0], [2.0, 1.0])]),
+        scaling.row_of(100, 2, [told([0.5, 0.5], [1.0, 1.0])]),
+        scaling.row_of(200, 1, [told([5.0, 1.0], [4.0, 2.0])]),
+    ]
+    assert rows[0][scaling.WALL] == pytest.approx(2.0 * each / 100)
+    table = scaling.with_ratios(pd.DataFrame(rows))
+    assert table["faster than one thread [1]"].tolist() == pytest.approx([1.0, 2.0, 1.0])
+    assert table["growth against N = 100 [1]"].tolist()[::2] == pytest.approx([1.0, 1.5])

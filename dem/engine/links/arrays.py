@@ -102,7 +102,9 @@ class Cells(NamedTuple):
         marks: (N S, 7) as in `Pairs`.
         centres: (N, 3) as in `Pairs`.
         boxes: (N S, 6) lower and upper corners of boxes about links [m], by bin.
-        close: (N S,) links that may be near the one that is looked at.
+        lines: (N S, 8) their segments, skins [m] and inverse squared lengths [1/m²], by bin.
+        close: (N S,) places in `order` of links that may be near the one that is looked at.
+        places: (N S,) which row of the list each link's pairs are in.
         rows: (N S + 2,) where the list's rows begin.
         lower: (P,) links with the lower numbers, as pairs are found.
         upper: (P,) the others.
@@ -118,7 +120,9 @@ class Cells(NamedTuple):
     marks: Array
     centres: Array
     boxes: Array
+    lines: Array
     close: Indices
+    places: Indices
     rows: Indices
     lower: Indices
     upper: Indices
@@ -334,6 +338,8 @@ def cells_for(links: int, smarticles: int, capacity: int) -> Cells:
         np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
         np.zeros((links, 6)),
+        np.zeros((links, 8)),
+        np.zeros(links, np.int32),
         np.zeros(links, np.int32),
         np.zeros(links + 2, np.int32),
         np.zeros(capacity, np.int32),

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
-from dem.engine.links.compiler import kernel, part
+from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.contact.bars import push_hooks
 from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import push_apart
@@ -15,7 +15,8 @@ from dem.engine.links.contact.walls import push_sideways, push_up
 from dem.engine.links.motion.motoring import look
 from dem.engine.links.motion.moving import drift, kick
 from dem.engine.links.motion.poses import find_motion, find_spin, pose
-from dem.engine.links.neighbours import FULL, GOOD, build, moved, tighten
+from dem.engine.links.neighbours.lists import FULL, GOOD, build, tighten
+from dem.engine.links.neighbours.skins import moved
 from dem.engine.links.shape import Shape
 
 LOST, WORK = 0, 1  # places in `totals`
@@ -69,9 +70,21 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
         ledger: see `dem.engine.links.contact.pairs.put_down`; emptied.
         dt: time step [s].
     """
-    for i in range(bodies.position.shape[0]):
+    find_velocities(shape, bodies, motors, 0, bodies.position.shape[0])
+    return dissipated(bodies, ledger, dt)
+
+
+@inlined
+def find_velocities(shape: Shape, bodies: Bodies, motors: Any, begin: int, stop: int) -> None:
+    """Bring velocities of smarticles from `begin` up to `stop` up to date after a kick."""
+    for i in range(begin, stop):
         find_spin(bodies, i, motors)
         find_motion(shape, bodies, i, motors)
+
+
+@inlined
+def dissipated(bodies: Bodies, ledger: Array, dt: float) -> float:
+    """What `settle` returns, once velocities are known; the ledger is emptied."""
     motion, position, total = bodies.motion, bodies.position, 0.0
     for n in range(1, int(ledger[0, 0]) + 1):
         row = ledger[n]
@@ -126,6 +139,7 @@ def advance(
     Returns:
         Steps that were made; fewer where a list is full.
     """
+    n = bodies.position.shape[0]
     for step in range(steps):
         shaken_to(ground, begin + (made + step) * dt)
         if motors is not None and motors.due[1] == 0:
@@ -139,13 +153,13 @@ def advance(
             bodies.shares[:] = 0.0
         lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
         if channel is None:
-            lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt)
+            lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt, 0, n)
         else:
-            lost += push_sideways(shape, wall_law, bodies, ends, ground, channel[0], motors, ledger, dt)
+            lost += push_sideways(shape, wall_law, bodies, ends, ground, channel[0], motors, ledger, dt, 0, n)
         if rims is not None:
-            lost += push_rims(shape, wall_law, bodies, ground, rims, motors, ledger, dt)
+            lost += push_rims(shape, wall_law, bodies, ground, rims, motors, ledger, dt, 0, n)
         if hooks is not None:
-            lost += push_hooks(shape, wall_law, bodies, ground, hooks, motors, ledger, dt, out)
+            lost += push_hooks(shape, wall_law, bodies, ground, hooks, motors, ledger, dt, out, 0, n)
         if cords is not None:
             totals[WORK] += pull(shape, bodies, cords, motors, dt)
         for k in range(6):
@@ -153,10 +167,12 @@ def advance(
                 ground.sums[k, d] += ground.force[k, d]
             if k < 4:
                 totals[WORK] -= ground.force[k, 2] * ground.speed[k] * dt
-        kick(shape, bodies, motors, gravity, planar, dt)
+        kick(shape, bodies, motors, gravity, planar, dt, 0, n)
+        if motors is not None:
+            motors.elapsed[0] += dt
         if ledger is not None:
             totals[LOST] += lost + settle(shape, bodies, motors, ledger, dt)
-        drift(shape, bodies, motors, dt, row)
+        drift(shape, bodies, motors, dt, row, 0, n)
         if motors is not None:
             motors.due[1] -= 1
         for k in range(4):

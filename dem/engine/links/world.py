@@ -38,6 +38,7 @@ from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
 from dem.engine.links.stepping import advance
+from dem.engine.links.team.team import Team
 from dem.errors import refuse
 from dem.physics.contact import ContactLaw
 
@@ -82,6 +83,7 @@ class World:
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to the plane z = 0.
         account: whether to add up what contacts dissipate.
+        threads: that make the steps; results depend on their number in the last bits.
     """
 
     particle: Particle
@@ -90,6 +92,7 @@ class World:
     gravity: float
     planar: bool
     account: bool
+    threads: int = 1
     steps: int = 0
     time_step: float = math.nan
     motors: Motoring | None = None
@@ -106,6 +109,7 @@ class World:
 
     def __post_init__(self) -> None:
         law = self.contact
+        self.team = Team(self.threads) if self.threads > 1 else None
         self.shape = shape_of(self.particle)
         self.laws = tuple(
             Law(law.normal_stiffness, law.tangential_stiffness, damping, damping * law.tangential_damping, friction)
@@ -233,7 +237,8 @@ class World:
                 self.make_room(int(GROWTH * len(self.pairs.first)))
 
     def _call(self, steps: int) -> int:
-        made: int = advance(
+        make = advance if self.team is None else self.team.advance
+        made: int = make(
             steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
             self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
             self.hooks, self.rims, self.channel, self.cords, self.ledger, self.out, self.row, self.totals,

@@ -123,6 +123,16 @@ class YadeEngine:
         self.fixtures.bind()
         self._assembly.bind()
 
+    def _store(self, file: Path) -> None:
+        try:
+            self._omega.save(str(file))
+        except RuntimeError as error:  # of the stream that YADE's library writes into
+            msg = (
+                f"{file}: the state cannot be written ({error}); free space, or raise the limit of a file's size, and "
+                "go on with `smarticles run … --resume`; the checkpoint before is whole"
+            )
+            raise RunError(msg) from error
+
     def save(self, scratch: Path) -> Saved:
         """See the interface.
 
@@ -131,7 +141,7 @@ class YadeEngine:
         """
         file = scratch / SCRATCH
         try:
-            self._omega.save(str(file))
+            self._store(file)
             memory = {
                 "assembly": self._assembly.memory,
                 "motors": self.motors.memory,

@@ -30,6 +30,7 @@ class YadeKind:
     name = "yade"
     damps_once_per_look = True
     idle_knobs: tuple[str, ...] = ()
+    threads_pay_from = 0  # not measured
 
     def version(self) -> str:
         """See the interface."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import resource
 import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -268,6 +270,54 @@ def test_a_directory_that_holds_something_is_left_as_it_is(
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
     assert not kind.built
+
+
+def test_a_directory_that_is_moved_while_it_runs_leaves_nothing_behind(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken, left = Simulation._checkpoint, [2]
+
+    def checkpoint(simulation: Simulation) -> None:
+        taken(simulation)
+        left[0] -= 1
+        if not left[0]:
+            simulation.folder.rename(tmp_path / "moved")
+
+    monkeypatch.setattr(Simulation, "_checkpoint", checkpoint)
+    with pytest.raises(RunError, match=r"its folder is gone; if it was moved, .* smarticles resume DIR"):
+        run(scene_of("rested"), tmp_path / "here")
+    assert not (tmp_path / "here").exists()
+    # It goes on where it lies now, to the same bits.
+    left[0] = 0
+    run(scene_of("rested"), tmp_path / "moved", resume=True)
+    assert series(tmp_path / "moved")
+
+
+@pytest.mark.parametrize("most_bytes", [500, 2000, 6000, 12_000])
+def test_a_limit_of_file_sizes_ends_a_run_in_one_line(kind: KindDouble, tmp_path: Path, most_bytes: int) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        with pytest.raises(RunError, match=r"cannot be written \(File too large\); free space") as caught:
+            run(scene_of("rested"), tmp_path / "run")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert len(str(caught.value).splitlines()) == 1
+    assert not (tmp_path / "run" / "done.json").exists()
+
+
+def test_a_disk_that_cannot_be_written_is_told_before_anything_runs(
+    kind: KindDouble, mount_disk: Callable[[str], Path]
+) -> None:
+    folder = mount_disk("64m")
+    run(scene_of("rested"), folder / "run")
+    (folder / "run" / "done.json").unlink()
+    subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+    with pytest.raises(InputError, match=r"cannot be made \(Read-only file system\); choose another directory"):
+        run(scene_of("rested"), folder / "new")
+    with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\); choose another directory"):
+        run(scene_of("rested"), folder / "run", resume=True)
+    assert len(kind.built) == 1
 
 
 def test_who_comes_second_does_not_write_over_who_was_quicker(

@@ -63,9 +63,9 @@ def test_version(smarticles: Smarticles) -> None:
 @pytest.mark.parametrize(
     ("words", "wrong", "way_out"),
     [
-        ([], "command", "known: init, run, plan, "),
+        ([], "command", "known: init, schema, run, plan, "),
         (["stduy"], "COMMAND: 'stduy'", "'study'"),
-        (["xyzzy"], "COMMAND: 'xyzzy'", "known: init, run, plan, "),
+        (["xyzzy"], "COMMAND: 'xyzzy'", "known: init, schema, run, plan, "),
         (["--frobnicate"], "--frobnicate", "known: "),
         (["run"], "SCENE.yaml, --out", ""),
         (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "--sett", "'--set'"),

@@ -18,6 +18,7 @@ from smarticles.main import main
 from smarticles.sweeps import make_folder
 
 CHROMIUM = shutil.which("chromium")
+RUNS = (" ".join(NAMES), " ".join(reversed(NAMES)))
 PHONE = {"viewport": {"width": 360, "height": 740}, "is_mobile": True, "device_scale_factor": 2}
 DESK = {"viewport": {"width": 1200, "height": 900}}
 
@@ -61,10 +62,10 @@ class Seen:
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory, write_run: WriteRun) -> dict[str, Path]:
-    """Pages of a run for each hostile name, and of a sweep."""
+    """Pages of two runs with all hostile names, and of a sweep: what one of them opens, another might close."""
     folder = tmp_path_factory.mktemp("pages")
     found = {}
-    for number, name in enumerate(NAMES):
+    for number, name in enumerate(RUNS):
         run = spoil(write_run(folder / f"run{number}", status="failed", frames_per_phase=1), name)
         assert main(["report", str(run)]) == 0
         found[name] = run / "report.html"
@@ -86,7 +87,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory, write_run: WriteRun) -> dict
     return found
 
 
-@pytest.mark.parametrize("name", [*NAMES, "sweep"])
+@pytest.mark.parametrize("name", [*RUNS, "sweep"], ids=["forth", "back", "sweep"])
 def test_it_says_nothing_asks_for_nothing_and_shows_every_picture(
     name: str, pages: dict[str, Path], browser: Any
 ) -> None:
@@ -108,7 +109,7 @@ def test_it_says_nothing_asks_for_nothing_and_shows_every_picture(
 
 def test_it_is_dark_where_that_is_wanted(pages: dict[str, Path], browser: Any, tmp_path: Path) -> None:
     light, dark = (
-        Seen(browser, pages[NAMES[-1]], **DESK, color_scheme=scheme).picture(tmp_path / f"{scheme}.png")
+        Seen(browser, pages[RUNS[0]], **DESK, color_scheme=scheme).picture(tmp_path / f"{scheme}.png")
         for scheme in ("light", "dark")
     )
     # Pictures of piles stand on a light card in both.

@@ -9,6 +9,10 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
+from dem.record.manifest import write_manifest
+from dem.run.run import manifest
+from dem.scene.reading import load_scene
+
 
 def test_plan_prints_phases_and_cost(scene_file: Path, smarticles: Smarticles) -> None:
     said = smarticles("plan", scene_file)
@@ -106,3 +110,30 @@ def test_threads_are_those_asked_for_whatever_the_batch_system_says(
     monkeypatch.setattr("dem.run.run.run_scene", run_scene)
     assert smarticles("run", scene_file, "--out", scene_file.parent / "out", *options).status == 0
     assert seen == [threads]
+
+
+@pytest.mark.parametrize(("options", "threads"), [([], "3"), (["--threads", "1"], "1")])
+def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
+    scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch, options: list[str], threads: str
+) -> None:
+    out = scene_file.parent / "out"
+    seen: list[str] = []
+
+    def run_scene(*_: object, **__: object) -> None:
+        seen.append(os.environ["OMP_NUM_THREADS"])
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "64")
+    monkeypatch.setattr("dem.run.run.run_scene", run_scene)
+    scene = load_scene(scene_file)
+    steps = [1e-4] * len(scene.phases)
+    out.mkdir()
+    write_manifest(manifest(scene, out, steps=steps, command="", made_by=("links", "1"), threads=3))
+    assert smarticles("run", scene_file, "--out", out, "--resume", *options).status == 0
+    assert seen == [threads]
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "two"])
+def test_a_number_of_threads_that_is_none_is_refused(scene_file: Path, smarticles: Smarticles, number: str) -> None:
+    said = smarticles("run", scene_file, "--out", scene_file.parent / "out", "--threads", number)
+    assert said.status == 2
+    assert f"--threads: must be a whole number from 1: got '{number}'" in said.err

@@ -162,6 +162,8 @@ def push_hooks(
     ledger: Any,
     dt: float,
     out: Array,
+    begin: int,
+    stop: int,
 ) -> float:
     """Add the forces of the hooks.
 
@@ -175,6 +177,8 @@ def push_hooks(
         ledger: of forces that dissipate; None where nobody asks.
         dt: time step [s].
         out: scratch.
+        begin: the first smarticle.
+        stop: the one after the last.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
@@ -183,7 +187,7 @@ def push_hooks(
     each = shape.kinds.shape[0] * shape.offsets.shape[0]
     for hook in range(2):
         height = ground.place[LOWER + hook]
-        for p in range(segments.shape[0]):
+        for p in range(each * begin, each * stop):
             x, y, z = segments[p, 0], segments[p, 1], segments[p, 2] - height
             ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
             for bar in range(2):

@@ -10,7 +10,11 @@ from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
 from dem.engine.links.contact.meeting import BARE, POINTS, meet_at
 from dem.engine.links.contact.nearest import nearest
+from dem.engine.links.memory import fetch
 from dem.engine.links.shape import Shape
+
+FEW = 500  # smarticles, which a processor has in its cache
+AHEAD = 6  # contacts
 
 
 @inlined
@@ -90,14 +94,29 @@ def push_apart(
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    segments, position, motion = bodies.segments, bodies.position, bodies.motion
-    owner, kind = pairs.owner, pairs.kind
-    diameter, inverses = 2 * shape.radius, shape.inverses
-    reach = diameter * diameter
-    lost = 0.0
     # First who touches, without a branch that would be mispredicted, then what they do.
-    count = 0
-    for k in range(pairs.counts[1]):
+    count = find_touching(shape, bodies, pairs, 0, pairs.counts[1])
+    return push_touching(shape, law, bodies, pairs, hinged, ledger, dt, out, 0, count)
+
+
+@inlined
+def find_touching(shape: Shape, bodies: Bodies, pairs: Pairs, begin: int, stop: int) -> int:
+    """Write those that touch, or did so in the last step, among some of the near pairs.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles.
+        pairs: `touching` and `nearest` are written, from `begin` on.
+        begin: place of the first pair in `near`.
+        stop: the one after the last.
+
+    Returns:
+        Their number.
+    """
+    segments, kind, inverses, diameter = bodies.segments, pairs.kind, shape.inverses, 2 * shape.radius
+    reach = diameter * diameter
+    count = begin
+    for k in range(begin, stop):
         pair = pairs.near[k]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
@@ -109,7 +128,27 @@ def push_apart(
         x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
         pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
         count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
-    for k in range(count):
+    return count - begin
+
+
+@part
+def push_touching(
+    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array,
+    begin: int, stop: int,
+) -> float:  # fmt: skip
+    """Add the forces of some of the pairs that touch, from place `begin` in `touching` up to `stop`; see `push_apart`.
+
+    Returns:
+        Energy of tangential springs whose contacts have ended [J].
+    """
+    segments, position, motion = bodies.segments, bodies.position, bodies.motion
+    owner, kind = pairs.owner, pairs.kind
+    diameter, inverses = 2 * shape.radius, shape.inverses
+    reach = diameter * diameter
+    lost, many = 0.0, position.shape[0] > FEW
+    for k in range(begin, stop):
+        if many:
+            _fetch_contact(bodies, pairs, hinged, pairs.touching[min(k + AHEAD, stop - 1)])
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
@@ -174,6 +213,29 @@ def push_apart(
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
+
+
+@inlined
+def _fetch_contact(bodies: Bodies, pairs: Pairs, hinged: Any, pair: int) -> None:
+    """Have the memory that a contact needs brought near: all that many smarticles have does not fit into a cache."""
+    p, q = pairs.first[pair], pairs.second[pair]
+    i, j = pairs.owner[p], pairs.owner[q]
+    fetch(pairs.slip, pair, 2)
+    fetch(bodies.segments, p, 1)
+    fetch(bodies.segments, q, 1)
+    fetch(bodies.position, i, 1)
+    fetch(bodies.position, j, 1)
+    if hinged is None:
+        fetch(bodies.motion, i, 1)
+        fetch(bodies.motion, j, 1)
+        fetch(bodies.load, i, 1)
+        fetch(bodies.load, j, 1)
+    else:
+        row, other = 3 * i + pairs.kind[p], 3 * j + pairs.kind[q]
+        fetch(bodies.motion, row, 1)
+        fetch(bodies.motion, other, 1)
+        fetch(bodies.shares, row, 1)
+        fetch(bodies.shares, other, 1)
 
 
 @inlined

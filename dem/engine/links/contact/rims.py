@@ -54,8 +54,9 @@ def nearest_to_circle(link: Array, radius: float, height: float) -> float:
 
 @part
 def push_rims(
-    shape: Shape, law: Law, bodies: Bodies, ground: Ground, rims: Rims, hinged: Any, ledger: Any, dt: float
-) -> float:
+    shape: Shape, law: Law, bodies: Bodies, ground: Ground, rims: Rims, hinged: Any, ledger: Any, dt: float,
+    begin: int, stop: int,
+) -> float:  # fmt: skip
     """Add the forces of the rims on links between their ends; for the ends themselves the wall cares.
 
     Args:
@@ -67,6 +68,8 @@ def push_rims(
         hinged: None while welded.
         ledger: of forces that dissipate; None where nobody asks.
         dt: time step [s].
+        begin: the first smarticle.
+        stop: the one after the last.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
@@ -77,7 +80,7 @@ def push_rims(
     each = shape.kinds.shape[0] * shape.offsets.shape[0]
     for rim in range(rims.radii.shape[0]):
         height, round_ = ground.place[WALL] + rims.heights[rim], rims.radii[rim]
-        for p in range(segments.shape[0]):
+        for p in range(each * begin, each * stop):
             low = min(segments[p, 2], segments[p, 2] + segments[p, 5]) - radius
             high = max(segments[p, 2], segments[p, 2] + segments[p, 5]) + radius
             touching = False

@@ -138,21 +138,23 @@ def end_contacts(ends: Ends, p: int, end: int, now: int) -> float:
 
 @part
 def push_up(
-    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float
-) -> float:
-    """Add the forces of floor and wall; arguments as in `press`.
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, hinged: Any, ledger: Any, dt: float,
+    begin: int, stop: int,
+) -> float:  # fmt: skip
+    """Add the forces of floor and wall on smarticles from `begin` up to `stop`; other arguments as in `press`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, radius = bodies.segments, shape.radius
     links, lost, link = shape.kinds.shape[0], 0.0, -1
+    each = links * shape.offsets.shape[0]
     floor, lift = ground.place[0], ground.place[1]
     walled, lifted = ground.flags[0] != 0, ground.flags[1] != 0
     tiers = ground.radii.shape[0]
     inner = ground.radii[tiers - 1] - radius
     least = inner * inner if walled else math.inf
-    for p in range(segments.shape[0]):
+    for p in range(each * begin, each * stop):
         link = link + 1 if link + 1 < links else 0
         for end in range(0 if shape.kinds[link] == 1 else 1, 2):
             x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
@@ -255,16 +257,18 @@ def _edge(
 
 @part
 def push_sideways(
-    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, half: float, hinged: Any, ledger: Any, dt: float
-) -> float:
-    """Add the forces of the walls y = ±`half` [m] of a channel; other arguments as in `press`.
+    shape: Shape, law: Law, bodies: Bodies, ends: Ends, ground: Ground, half: float, hinged: Any, ledger: Any,
+    dt: float, begin: int, stop: int,
+) -> float:  # fmt: skip
+    """Add the forces of the walls y = ±`half` [m] of a channel; other arguments as in `push_up`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
     segments, radius = bodies.segments, shape.radius
     links, lost = shape.kinds.shape[0], 0.0
-    for p in range(segments.shape[0]):
+    each = links * shape.offsets.shape[0]
+    for p in range(each * begin, each * stop):
         for end in range(0 if shape.kinds[p % links] == 1 else 1, 2):
             x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
             if end == 1:

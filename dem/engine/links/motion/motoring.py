@@ -79,7 +79,14 @@ def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 @kernel
 def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
-    for i in range(bodies.position.shape[0]):
+    _note_some(bodies, motors, motors.elapsed[0], 0, bodies.position.shape[0])
+    motors.elapsed[0] = 0.0
+
+
+@inlined
+def _note_some(bodies: Bodies, motors: Motoring, elapsed: float, begin: int, stop: int) -> None:
+    """The same for smarticles from `begin` up to `stop`, a time [s] after the last look."""
+    for i in range(begin, stop):
         row = bodies.plane[i]
         turn_axes(bodies, i)
         normal = along_normal(bodies, i)
@@ -87,17 +94,16 @@ def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
             bodies.rate[i, 0], bodies.rate[i, 1] = rates(row, normal, motors.momentum[i, 0], motors.momentum[i, 1])
         p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
         for k in range(2):
-            if motors.elapsed[0] > 0.0:
+            if elapsed > 0.0:
                 impulse = motors.impulse[i, k]
                 if motors.law < SLIP:
                     impulse = p[k] - motors.momentum[i, k] - impulse
-                    motors.work[i, k] += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / motors.elapsed[0]
-                motors.torque[i, k] = impulse / motors.elapsed[0]
+                    motors.work[i, k] += impulse * (bodies.alpha[i, k] - motors.begun[i, k]) / elapsed
+                motors.torque[i, k] = impulse / elapsed
             motors.impulse[i, k] = 0.0
             motors.begun[i, k] = bodies.alpha[i, k]
             if motors.law < SLIP:
                 motors.momentum[i, k] = p[k]
-    motors.elapsed[0] = 0.0
 
 
 @kernel
@@ -127,11 +133,18 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
         bodies: the smarticles; `rate` is written.
         motors: written.
     """
-    interval, last = motors.interval, motors.targets.shape[0] - 1
-    now = min(motors.due[0], last)
+    now = min(motors.due[0], motors.targets.shape[0] - 1)
     motors.due[0], motors.due[1] = now + 1, motors.period
-    note(shape, bodies, motors)
-    for i in range(bodies.position.shape[0]):
+    look_some(bodies, motors, now, motors.elapsed[0], 0, bodies.position.shape[0])
+    motors.elapsed[0] = 0.0
+
+
+@inlined
+def look_some(bodies: Bodies, motors: Motoring, now: int, elapsed: float, begin: int, stop: int) -> None:
+    """The same for smarticles from `begin` up to `stop`, by row `now`, a time [s] after the last look."""
+    interval = motors.interval
+    _note_some(bodies, motors, elapsed, begin, stop)
+    for i in range(begin, stop):
         r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
         for k in range(2):
             target = motors.targets[now, i, k]

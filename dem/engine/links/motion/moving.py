@@ -20,8 +20,10 @@ from dem.engine.links.shape import Shape
 
 
 @part
-def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
-    """Change momenta by the forces in `load` or `shares`, by weight and by motors.
+def kick(
+    shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float, begin: int, stop: int
+) -> None:
+    """Change momenta of some smarticles by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
         shape: what all smarticles have in common.
@@ -30,10 +32,12 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
         dt: time step [s].
+        begin: the first smarticle.
+        stop: the one after the last.
     """
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
-    for i in range(bodies.position.shape[0]):
+    for i in range(begin, stop):
         if motors is not None:
             for d in range(6):
                 load[i, d] = bodies.shares[3 * i, d] + bodies.shares[3 * i + 1, d] + bodies.shares[3 * i + 2, d]
@@ -69,8 +73,6 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
                 motors.impulse[i, 1] += dt * t2
                 motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
                 bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
-    if motors is not None:
-        motors.elapsed[0] += dt
 
 
 @part
@@ -92,8 +94,8 @@ def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
 
 
 @part
-def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
-    """Move and turn everything by a step.
+def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array, begin: int, stop: int) -> None:
+    """Move and turn some smarticles by a step.
 
     Args:
         shape: what all smarticles have in common.
@@ -101,9 +103,11 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
         motors: None while welded.
         dt: time step [s].
         row: (PLANE,) scratch.
+        begin: the first smarticle.
+        stop: the one after the last.
     """
     position, velocity, turn = bodies.position, bodies.velocity, bodies.turn
-    for i in range(position.shape[0]):
+    for i in range(begin, stop):
         for d in range(3):
             position[i, d] += dt * velocity[i, d]
         if motors is not None:

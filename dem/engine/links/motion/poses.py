@@ -115,7 +115,13 @@ def pose(shape: Shape, bodies: Bodies, hinged: Any) -> None:
             `rate` where angles are free.
         hinged: the motors; None while welded: then no barb moves by itself.
     """
-    for i in range(bodies.position.shape[0]):
+    pose_some(shape, bodies, hinged, 0, bodies.position.shape[0])
+
+
+@inlined
+def pose_some(shape: Shape, bodies: Bodies, hinged: Any, begin: int, stop: int) -> None:
+    """The same for the smarticles from `begin` up to `stop`."""
+    for i in range(begin, stop):
         turn_axes(bodies, i)
         if hinged is not None and hinged.law >= SLIP:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]

@@ -81,6 +81,13 @@ def test_wall_has_the_height_that_the_scene_gives(pile):
     assert wall.bounds[5] - wall.bounds[4] == pytest.approx(0.2)
 
 
+def test_a_wall_stays_while_the_floor_moves_alone(pile):
+    changed(pile, phases=[{"type": "relax"}, {"type": "relax"}, {"type": "shake", "moves": "floor"}, {"type": "relax"}])
+    assert bodies_at(pile, 2)["wall"].bounds[4] == pytest.approx(0.0)
+    assert bodies_at(pile, 2)["floor"].bounds[4] == pytest.approx(FLOOR)
+    assert bodies_at(pile, 3)["wall"].bounds[4] == pytest.approx(FLOOR)
+
+
 def test_tiers_are_steps_with_ceilings(pile):
     tiers = [{"radius_m": radius, "height_m": height} for radius, height in TIERS]
     wall = bodies_at(changed(pile, container={"tiers": tiers}))["wall"]

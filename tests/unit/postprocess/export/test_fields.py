@@ -74,7 +74,8 @@ def test_local_packing_has_no_value_without_a_wall(pile):
 def test_a_lone_smarticle_has_no_local_packing(tmp_path):
     """The first frame of a pour: its points and their images lie in one plane."""
     write_run(tmp_path, SyntheticRun(count=1, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
-    FrameWriter(tmp_path).write(mesh_of(u_shape(0.008)[None] + [0.0, 0.0, 0.003], time=0.5), 0.5)
+    upright = u_shape(0.008)[None][..., [0, 2, 1]] + [0.0, 0.0, 0.003]
+    FrameWriter(tmp_path).write(mesh_of(upright, time=0.5), 0.5)
     assert np.isnan(values(tmp_path, "local_packing_fraction")[1]).all()
 
 

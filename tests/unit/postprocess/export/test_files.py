@@ -117,6 +117,21 @@ def test_gltf_tells_its_run_has_dull_materials_and_fields(pile, tmp_path):
         assert np.isfinite(np.asarray(accessor.get("min", [0]) + accessor.get("max", [0]), dtype=float)).all()
 
 
+def test_gltf_has_no_field_with_holes(pile, tmp_path):
+    """Its numbers must be finite; without a wall there is no local packing."""
+    for name in ("run.json", "done.json"):
+        content = json.loads((pile / name).read_text())
+        content["phases"][3]["type"] = "remove-container"
+        (pile / name).write_text(json.dumps(content))
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    (pile / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in kinds]}))
+    tree = glb_tree(export_run(pile, to="glb", output=tmp_path / "a.glb"))
+    shape = next(mesh for mesh in tree["meshes"] if mesh["name"] == "smarticles")
+    attributes = shape["primitives"][0]["attributes"]
+    assert "_CROSSINGS" in attributes
+    assert "_LOCAL_PACKING_FRACTION" not in attributes
+
+
 def test_gltf_in_one_text_file_holds_its_bytes(single, tmp_path):
     tree = json.loads(export_run(single, to="gltf", output=tmp_path / "one.gltf").read_text())
     (buffer,) = tree["buffers"]

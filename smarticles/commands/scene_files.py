@@ -1,8 +1,9 @@
-"""init: a commented scene to begin with."""
+"""init and schema: a commented scene to begin with, and all keys that a scene may have."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 from pathlib import Path
 
@@ -12,7 +13,13 @@ from smarticles.starters import KINDS, about, starter
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add the commands."""
+    _add_init(commands)
+    _add_schema(commands)
+
+
+def _add_init(commands: Commands) -> None:
+    """Add `init`."""
     init = commands.add(
         "init",
         write_scene,
@@ -48,4 +55,27 @@ def write_scene(arguments: argparse.Namespace) -> int:
     place, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
     print(f"{output}: {about(arguments.kind)}")
     print(f"next: smarticles plan {place}, smarticles run {place} --out {run}")
+    return 0
+
+
+def _add_schema(commands: Commands) -> None:
+    """Add `schema`."""
+    commands.add(
+        "schema",
+        print_schema,
+        summary="print the JSON schema of scene files",
+        text="""
+Every key with its unit, default and meaning. Editors use it to complete and check scenes: put
+`# yaml-language-server: $schema=scene.schema.json` on the first line of a scene.""",
+        examples="""\
+  smarticles schema > scene.schema.json
+""",
+    )
+
+
+def print_schema(_: argparse.Namespace) -> int:
+    """`smarticles schema`."""
+    from dem.scene.reading import json_schema  # noqa: PLC0415
+
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return 0

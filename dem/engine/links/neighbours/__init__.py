@@ -1,0 +1,1 @@
+"""Which links are near each other."""

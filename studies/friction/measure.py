@@ -1,0 +1,96 @@
+"""One row per run of the study `friction`: φ before, in the course of, at the end of and after shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.errors import InputError
+from dem.record.manifest import RunManifest
+from postprocess.scene_file import read_scene
+from postprocess.statistics.columns import ASPECT
+from studies.base.figures import History
+from studies.base.runs import DEFINITION, MeasuredRun
+from studies.base.shaken import measured_row, packing_history
+
+FRICTION = "friction [-]"
+
+TIMES = (5.0, 10.0, 20.0)
+"""When φ is taken in the course of shaking [s]."""
+
+_TIME, _PHI, _SHAKEN = "time [s]", "phi [-]", "shaken [s]"
+
+WINDOW = 1.0
+"""Over how long before those times it is averaged [s]: 30 periods of shaking."""
+
+COMPARED: Mapping[str, str] = MappingProxyType(
+    {
+        "phi_0": "phi_0",
+        "phi 5 s": "phi_f",
+        "phi 10 s": "phi_f",
+        "phi_f": "phi_f",
+        "phi_f relaxed": "phi_f relaxed",
+    }
+)
+"""What is set against Gravish, and as which of their stages: φ after 5 and 10 s as if they had shaken no longer."""
+
+
+def column(stage: str) -> str:
+    """Column of φ at a stage."""
+    return f"{stage} {DEFINITION} [-]"
+
+
+def at_time(time: float) -> str:
+    """What φ after some time of shaking [s] is called."""
+    return f"phi {time:g} s"
+
+
+def friction_run(run: RunManifest) -> MeasuredRun:
+    """φ by stage, and its history.
+
+    Raises:
+        InputError: It was not shaken after another phase, its walls have another friction than its smarticles, or it
+            cannot be read.
+    """
+    history = packing_history(run)
+    row = {FRICTION: _friction(run), **measured_row(run, [DEFINITION])}
+    for time in TIMES:
+        if time <= history.active + 1e-6:
+            row[column(at_time(time))] = _around(history, time)
+    return MeasuredRun(manifest=run, rows=[{ASPECT: row.pop(ASPECT), **row}], history=_told(history))
+
+
+def _told(history: History) -> dict[str, NDArray[np.float64]]:
+    """A history as the arrays of a measured run."""
+    return {_TIME: history.times, _PHI: history.values, _SHAKEN: np.array([history.active])}
+
+
+def history_of(run: MeasuredRun) -> History:
+    """φ of a measured run since shaking began."""
+    told = run.history
+    return History(times=told[_TIME], values=told[_PHI], active=float(told[_SHAKEN][0]))
+
+
+def _friction(run: RunManifest) -> float:
+    """The one coefficient of friction of a run [-]."""
+    contact = read_scene(run.directory).part("contact")
+    if contact is None:
+        msg = f"{run.directory}: scene.yaml tells no contact; give runs of the study friction"
+        raise InputError(msg)
+    between, wall = contact.number("friction_smarticle"), contact.number("friction_wall")
+    if between != wall:
+        msg = (
+            f"{run.directory}: friction is {between:g} between smarticles and {wall:g} at walls; "
+            "the study friction has one for both"
+        )
+        raise InputError(msg)
+    return between
+
+
+def _around(history: History, time: float) -> float:
+    """Mean over `WINDOW` up to a time [s] of shaking; NaN where nothing was recorded."""
+    shown = (history.times > time - WINDOW) & (history.times <= time + 1e-6)
+    return float(np.mean(history.values[shown])) if shown.any() else float("nan")
