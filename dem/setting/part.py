@@ -68,7 +68,7 @@ Duration = Annotated[float, Field(ge=1e-6, le=1e6)]
 Speed = Annotated[float, Field(ge=1e-9, le=1e3)]  # m/s
 Turning = Annotated[float, Field(ge=1e-6, le=1e4)]  # rad/s
 Frequency = Annotated[float, Field(ge=1e-3, le=1e4)]  # Hz
-Stiffness = Annotated[float, Field(ge=1e-3, le=1e9)]  # N/m
+Stiffness = Annotated[float, Field(ge=1e-3, le=1e12)]  # N/m
 Force = Annotated[float, Field(ge=1e-12, le=1e6)]  # N
 HingeAngle = Annotated[
     float,

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from dem.body.particle import HINGE_CLEARANCE
 from dem.phases.gaits.drive import BARBS, actuated, drive
 from dem.phases.phase import SceneView
-from dem.setting.motion import SimpleMotion, Sine, Triangle
+from dem.setting.course import SimpleMotion
+from dem.setting.motion import Sine, Triangle
 from dem.setting.part import HINGE_RANGE
 
 Array = NDArray[np.float64]

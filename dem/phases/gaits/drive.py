@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.phases.phase import SceneView
-from dem.setting.motion import Course, Motion
+from dem.setting.course import Course
+from dem.setting.motion import Motion
 from dem.setting.motor import Motor
 from dem.setting.smarticle import Smarticle
 
