@@ -30,8 +30,8 @@ def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 
     Example:
         >>> runs = pd.DataFrame({"friction": [0.2, 0.2, 0.4], "phi [-]": [0.1, 0.3, 0.5]})
-        >>> means_by(runs, ["friction"]).values.tolist()
-        [[0.2, 2, 0.2, 0.09999999999999998], [0.4, 1, 0.5, nan]]
+        >>> means_by(runs, ["friction"]).round(3).values.tolist()
+        [[0.2, 2.0, 0.2, 0.1], [0.4, 1.0, 0.5, nan]]
     """
     quantities = [
         name

@@ -21,8 +21,7 @@ def add(commands: Commands) -> None:
         text="""
 Serves a page on this machine alone, for whoever has the address that is printed: it holds a token. Turn
 with the mouse, move in time, colour by any field of `smarticles export --help`, click on a smarticle
-for its fields. A run that goes on is followed. Ends with its window, or by Ctrl-C. Needs no network;
-the packages it needs come with pip install 'smarticles[view]'.""",
+for its fields. A run that goes on is followed. Ends with its window, or by Ctrl-C. Needs no network.""",
         examples="""\
   smarticles view runs/a
   smarticles view runs/a --no-browser --port 8000      on a cluster: then ssh -L 8000:127.0.0.1:8000
@@ -46,7 +45,7 @@ def view_run(arguments: argparse.Namespace) -> int:
     try:
         from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
     except ModuleNotFoundError as error:
-        msg = f"view: the Python package {error.name!r} is not installed; pip install 'smarticles[view]'"
+        msg = f"view: the Python package {error.name!r} is not installed; 'make setup' installs it, as does pip install of this project"
         raise InputError(msg) from None
 
     def opened(address: str) -> None:

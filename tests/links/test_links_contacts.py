@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine.links.neighbours import build
+from dem.engine.links.neighbours.lists import build
 from dem.physics.contact import damping_ratio
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel

@@ -89,7 +89,7 @@ def test_full_disk_is_a_run_error_with_the_way_out(tmp_path: Path) -> None:
 def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
     write_text(tmp_path / "new" / "a.txt", "x")
     assert (tmp_path / "new" / "a.txt").read_text() == "x"
-    with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written \(No such file or directory\)"):
+    with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written, its folder is gone"):
         write_text(tmp_path / "gone" / "far" / "a.txt", "x")
 
 

@@ -168,7 +168,7 @@ def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "a sweep file holds keys such as template and points: got None"),
+        ("", "a sweep file holds keys such as template and points: got null"),
         ("a: [", "line 1, column 5: not valid YAML"),
         (SWEEP.replace("run_name", "runname"), r"unknown key 'runname'; did you mean 'run_name'?"),
         (SWEEP.replace("grid", "gird"), "points: unknown key 'gird'; did you mean 'grid'?"),

@@ -132,4 +132,4 @@ def test_a_port_that_is_none_is_refused(capsys, port):
 
 def test_what_is_no_run_is_refused(tmp_path, capsys):
     assert main(["view", str(tmp_path)]) == 2
-    assert "cannot read manifest" in capsys.readouterr().err
+    assert "cannot read run directory" in capsys.readouterr().err
