@@ -45,7 +45,7 @@ def view_run(arguments: argparse.Namespace) -> int:
     try:
         from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
     except ModuleNotFoundError as error:
-        msg = f"view: the Python package {error.name!r} is not installed; 'make setup' installs it, as does pip install of this project"
+        msg = f"view: the Python package {error.name!r} is not installed; run 'make setup', or install the project anew"
         raise InputError(msg) from None
 
     def opened(address: str) -> None:
