@@ -59,12 +59,15 @@ def yade_version() -> str:
 
 
 def yade_threads() -> int:
-    """Threads that YADE runs with here: OMP_NUM_THREADS, or 1 where nobody set it.
+    """Threads that YADE runs with here: OMP_NUM_THREADS, or 1 where nobody set it; no simulation is touched.
 
     Raises:
         RunError: YADE is not installed.
     """
-    return int(load_yade().omega.numThreads)
+    import_yade()
+    from yade import wrapper  # noqa: PLC0415 - as above
+
+    return int(wrapper.Omega().numThreads)
 
 
 def import_yade() -> Any:
