@@ -57,7 +57,7 @@ def _draw_differences(path: Path, judged: Sequence[Equivalence], footer: Sequenc
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set_xlabel("links less YADE over YADE's mean [%]")
     if shown:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
     return finished(figure, path, ["Bands: margins, chosen beforehand.", *footer])
 
 
@@ -85,9 +85,9 @@ def _draw_pitch(path: Path, pitch: pd.DataFrame, footer: Sequence[str]) -> list[
             label=name,
         )
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6)
-    axes.set_xlabel("pitch of YADE's spheres over their diameter; links at 0 [-]")
+    axes.set_xlabel("pitch over sphere diameter; links at 0 [-]")
     axes.set_ylabel("mean over that of links [-]")
     if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
     note = "Error bars: 95 % of each mean; that of links stands at 0. Points are set apart sideways."
     return finished(figure, path, [note, *footer])
