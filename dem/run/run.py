@@ -198,8 +198,8 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
 
 
 def _keep_series(simulation: Simulation | None) -> None:
-    if simulation is None:
-        return
+    if simulation is None or not simulation.recorder.samples:
+        return  # nothing was taken yet: what is there is of a run that could not be gone on with
     try:
         simulation.recorder.series.write()
     except RunError:

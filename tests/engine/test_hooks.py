@@ -175,7 +175,7 @@ def test_a_hook_that_nothing_touched_is_told_at_the_end_of_its_pull(worker: Any,
     assert answer["error"] is None, answer
     assert log.count(told) == 1
     # What is known before is told before, once.
-    assert log.count("WARNING recording.frame_interval_s: 8 s is longer than the whole run, about 0.35 s") == 1
+    assert log.count("WARNING recording.frame_interval_s: 8 s is longer than the whole run, about 0.525 s") == 1
     assert log.index("recording.frame_interval_s") < log.index("phase 0 deposit begins")
     answer, log = whole(worker, tmp_path / "within", hooks={"lower_height_m": 3e-3, "upper_height_m": 6e-3})
     assert answer["error"] is None, answer
