@@ -58,7 +58,7 @@ def parse_scene(data: Any, *, source: str) -> Scene:
         raise InputError(msg) from None
 
 
-def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """Read a scene file.
 
     Args:
@@ -68,6 +68,7 @@ def load_scene(path: Path, overrides: Sequence[str] = ()) -> Scene:
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
+    path = Path(path)
     if path.is_dir():
         inside = path / SCENE
         msg = f"{path}: is a directory; give " + (str(inside) if inside.is_file() else "the path of a scene file")
