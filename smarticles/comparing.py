@@ -19,7 +19,7 @@ from dem.record.names import FRAME, MANIFEST, SERIES, collection
 from dem.record.series import read_series
 from postprocess.scene_file import read_scene
 from postprocess.statistics.points import marked
-from smarticles.measuring import PHASE, grouped, measured
+from smarticles.measuring import PHASE, grouped, measured, values_in
 from templates.sweep.folder import MANIFEST as SWEEP
 from templates.sweep.folder import Folder, open_folder
 from templates.sweep.sweep_file import SEED
@@ -136,7 +136,7 @@ def _sweeps(one: Folder, other: Folder) -> Comparison:
         for name in both
         if all((f.run(e[name]) / MANIFEST).is_file() for f, e in zip((one, other), names, strict=True))
     ]
-    variables = [_varied(folder) for folder in (one, other)]
+    variables = [values_in(folder) for folder in (one, other)]
     by = [name for name in variables[0] if name != SEED and name in variables[1]]
     keys = [*by, *PHASE]
     return Comparison(
@@ -150,17 +150,6 @@ def _sweeps(one: Folder, other: Folder) -> Comparison:
         bits={name: same_bits(one.run(names[0][name]), other.run(names[1][name])) for name in begun},
         measures=_beside(grouped(measured([one.path]), keys), grouped(measured([other.path]), keys), keys),
     )
-
-
-def _varied(folder: Folder) -> dict[str, list[Any]]:
-    """Variables and constants of a sweep, and what values they take."""
-    found: dict[str, list[Any]] = {}
-    for entry in folder.entries:
-        for name, value in entry.values.items():
-            values = found.setdefault(name, [])
-            if value not in values:
-                values.append(value)
-    return found
 
 
 def _told(values: list[Any]) -> Any:

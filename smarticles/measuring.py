@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from postprocess.measures.table import Costly
+    from templates.sweep.folder import Folder
 
 _WORTH_PROCESSES = 6
 """Runs from which on starting processes saves time: each loads its libraries anew."""
@@ -48,6 +49,17 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
             msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
             raise InputError(msg)
         found |= begun
+    return found
+
+
+def values_in(folder: Folder) -> dict[str, list[Any]]:
+    """Variables and constants of a sweep and the values that each takes, in the order of the sweep."""
+    found: dict[str, list[Any]] = {}
+    for entry in folder.entries:
+        for name, value in entry.values.items():
+            values = found.setdefault(name, [])
+            if value not in values:
+                values.append(value)
     return found
 
 

@@ -71,20 +71,30 @@ def run_scene(
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
-    steps, made_by = builders.steps(scene), (kind.name, kind.version())
+    steps, made_by, threads = builders.steps(scene), (kind.name, kind.version()), kind.threads()
     with claimed(out, resume=resume):
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
                 return None
         else:
-            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=kind.threads()))
+            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(scene, out, log, builders, steps=steps, made_by=made_by, progress=progress, resume=resume)
+            return _run(
+                scene,
+                out,
+                log,
+                builders,
+                steps=steps,
+                made_by=made_by,
+                threads=threads,
+                progress=progress,
+                resume=resume,
+            )
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -117,6 +127,7 @@ def _run(
     *,
     steps: Sequence[float],
     made_by: tuple[str, str],
+    threads: int,
     progress: bool,
     resume: bool,
 ) -> RunOutcome:
@@ -133,28 +144,23 @@ def _run(
             made_by=made_by,
             time_steps=steps,
         )
-        threads = engine_kind(scene.engine).threads()
         for warning in (*warnings_of(scene), *thread_warnings(scene, threads)):
             simulation.warn(warning)
         if resume:
-            _restore(simulation, scene, out, log)
+            _restore(simulation, scene, out, log, threads)
         phases = simulation.run()
         mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
     except RunError as error:
-        _keep_series(simulation)
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
     except StopRequestedError as error:
-        _keep_series(simulation)
         _mark_ended(simulation, out, log, status="interrupted", cause=str(error))
         raise
     except KeyboardInterrupt:
-        _keep_series(simulation)
         _mark_ended(simulation, out, log, status="interrupted", cause="interrupted by the user")
         raise
     except Exception as error:
         # A defect of ours: the run directory must still say that the run has ended.
         log.exception("unexpected error")
-        _keep_series(simulation)
         _mark_ended(simulation, out, log, status="failed", cause=f"unexpected {type(error).__name__}: {error}")
         raise
     finally:
@@ -163,11 +169,12 @@ def _run(
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, *, status: str, cause: str) -> str:
-    """Say why a run ends too early.
+    """Write the series that was taken, and say why a run ends too early.
 
     Returns:
         The cause, and for a failed run its last good checkpoint.
     """
+    _keep_series(simulation)
     time, checkpoint = 0.0, None
     if simulation is not None:
         time, checkpoint = simulation.engine.time, simulation.checkpointed
@@ -179,7 +186,7 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, *
     return cause
 
 
-def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger) -> None:
+def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, threads: int) -> None:
     if not has_checkpoint(out):
         log.info("resumed from the start: no checkpoint was written")
         simulation.recorder.truncate({})
@@ -188,11 +195,11 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
-    begun, now = read_run(out).threads, engine_kind(scene.engine).threads()
-    if begun != now:
+    begun = read_run(out).threads
+    if begun != threads:
         simulation.warn(
-            f"--threads {now}: the run began with {begun}; it goes on, with other last bits than a run that was never "
-            "stopped"
+            f"--threads {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
+            "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from postprocess.report.markdown import table_lines
+
 
 def cell(text: str) -> str:
     """Text as it may stand in a cell: one line, and nothing in it that would end the cell or begin HTML."""
@@ -22,5 +24,4 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         head: titles of its columns.
         rows: cells, escaped already where they are data.
     """
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    return "\n".join(table_lines(head, rows)) + "\n"

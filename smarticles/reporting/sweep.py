@@ -14,7 +14,7 @@ from dem.record.names import FRAME, collection
 from dem.scene.reading import load_scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
-from smarticles.measuring import grouped, measured
+from smarticles.measuring import grouped, measured, values_in
 from smarticles.reporting.accuracy import accuracy_blocks
 from smarticles.reporting.charts import Points, against_variable
 from smarticles.reporting.page import Block, Figure, Listing, Page, Section, Table, Words
@@ -52,7 +52,7 @@ def sweep_page(folder: Folder, table: Path | None, made: str, *, jobs: int) -> P
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
     analysed = (results / PROVENANCE).is_file()
-    varied = _varied(folder)
+    varied = values_in(folder)
     sections = read_results(results).sections() if analysed else _measured(folder, varied, jobs=jobs)
     scenes = _scenes(folder)
     first = next(iter(scenes), None)
@@ -93,17 +93,6 @@ def _lead(states: Sequence[RunStatus], varied: Mapping[str, Sequence[Any]]) -> l
         *((state, str(number)) for state, number in counts.items()),
         ("varies", ", ".join(names) or "nothing"),
     ]
-
-
-def _varied(folder: Folder) -> dict[str, list[Any]]:
-    """Values of each variable, in the order of the sweep."""
-    found: dict[str, list[Any]] = {}
-    for entry in folder.entries:
-        for name, value in entry.values.items():
-            values = found.setdefault(name, [])
-            if value not in values:
-                values.append(value)
-    return found
 
 
 def _independent(folder: Folder, varied: Mapping[str, Sequence[Any]]) -> list[str]:

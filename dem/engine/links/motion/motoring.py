@@ -37,6 +37,7 @@ from dem.engine.links.shape import Shape
 
 HALT, STALL, EASE = range(3)
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
+# As in `dem.physics.motor`, which is no source that compiled code is named after; a test holds the two together.
 EASED, PATIENCE = 0.5, 20  # of the speed at τ_max; findings in a row, of both barbs, after which a motor stops
 ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the turn in a step
 
