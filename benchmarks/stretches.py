@@ -13,12 +13,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from dem.engine.interface import Engine, Saved
 from dem.engine.kinds import engine_kind
 from dem.plan.steps import time_steps
 from dem.record.checkpoint import read_checkpoint
 from dem.record.manifest import read_run
-from dem.scene.reading import load_scene, scene_hash
+from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 
 AMPLITUDE, FREQUENCY = 0.552e-3, 30.0  # m, Hz: Γ = 2, the paper's shaking
 STEP, LENGTH = 30, 4  # steps before the first stretch, steps of a stretch
@@ -27,8 +29,12 @@ STEP, LENGTH = 30, 4  # steps before the first stretch, steps of a stretch
 def poured(run: Path) -> tuple[Engine, float]:
     """The pile of a run's last checkpoint on as many threads as OMP_NUM_THREADS says, and its time step [s]."""
     scene, made_by = load_scene(run / "scene.yaml"), read_run(run).versions["links"]
-    step = min(time_steps(scene))
-    engine = engine_kind("links").build(scene, step)
+    # An engine has a shaker only where the scene calls for one, and the pour does not.
+    content = yaml.safe_load(dump_scene(scene))
+    content["phases"].append({"type": "shake", "duration_s": 1.0, "frequency_hz": FREQUENCY})
+    shaken = parse_scene(content, source=str(run))
+    step = min(time_steps(shaken))
+    engine = engine_kind("links").build(shaken, step)
     checkpoint, _ = read_checkpoint(run, scene_sha256=scene_hash(scene), made_by=("links", made_by))
     state: dict[str, Any] = dict(checkpoint.state)
     engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), run)

@@ -306,17 +306,18 @@ class EngineDouble:
     def count(self) -> int:
         return len(self.positions)
 
-    def add(self, poses: Poses) -> None:
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         self.told.append(("add", len(poses.positions)))
         n, boxes = len(poses.positions), self.particle.boxes
         self.positions = np.concatenate([self.positions, poses.positions])
-        self.velocities = np.concatenate([self.velocities, np.zeros((n, 3))])
+        self.velocities = np.concatenate([self.velocities, np.tile([0.0, 0.0, -speed], (n, 1))])
         turned = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
         self._rotations = np.concatenate([self._rotations, turned])
         lowest = (self._rotations[:, 2] @ self.particle.centres.T).min(axis=1)
         self.stands = self.particle.radius - lowest
         self._standing = np.concatenate([self._standing, np.zeros(n, dtype=np.bool_)])
-        self.account.added += boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
+        energy = self.gravity * float(poses.positions[:, 2].sum()) + n * speed**2 / 2
+        self.account.added += boxes.mass * energy
         self.motors.angles = np.tile(boxes.angles, (self.count, 1))
         self.strings.places = self.state().link_positions
 
@@ -325,7 +326,7 @@ class EngineDouble:
         return State.rigid(self.particle.boxes, self.positions.copy(), self._rotations, self.velocities.copy(), still)
 
     @property
-    def gravity_impulse(self) -> float:
+    def impulse(self) -> float:
         return self._seconds * self.particle.boxes.mass * self.gravity
 
     def unbalanced_force(self) -> float:

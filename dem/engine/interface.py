@@ -219,7 +219,7 @@ class Account(Protocol):
 
     @property
     def added(self) -> float:
-        """Gravitational energy above z = 0 that smarticles had when they were added [J]."""
+        """Energy of motion, and of gravity above z = 0, that smarticles had when they were added [J]."""
 
     @property
     def dissipated(self) -> float:
@@ -294,8 +294,8 @@ class Engine(Protocol):
     def count(self) -> int:
         """Smarticles present, N."""
 
-    def add(self, poses: Poses) -> None:
-        """Add smarticles of the particle's own shape, at rest."""
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
 
     def state(self) -> State:
         """Poses and velocities of all smarticles.
@@ -305,8 +305,8 @@ class Engine(Protocol):
         """
 
     @property
-    def gravity_impulse(self) -> float:
-        """What gravity has given to all smarticles, each since it was added [N s], downwards."""
+    def impulse(self) -> float:
+        """What gravity has given to all smarticles, each since it was added, and what they were thrown with [N s], downwards."""
 
     def unbalanced_force(self) -> float:
         """Mean net force on a smarticle over its weight [1]: 0 for a still pile, 1 in free fall, inf when empty."""

@@ -31,7 +31,10 @@ class Settle(Part):
 
 
 class Deposit(Part, Phase):
-    """Pour smarticles in layers of random, non-overlapping poses just above the pile, then wait until it settles."""
+    """Pour smarticles in layers of random, non-overlapping poses just above the others, then wait until all have settled.
+
+    A layer is poured when the last one has come down, or `every_s`; above those that are still in the air if there are any.
+    """
 
     pours: ClassVar[bool] = True
     type: Literal["deposit"]
@@ -46,6 +49,16 @@ class Deposit(Part, Phase):
         0.2,
         description="a layer has come down when each of its smarticles touches something "
         "and falls slower than this [m/s]",
+    )
+    every_s: float | None = Field(
+        None,
+        ge=1e-4,
+        le=1e6,
+        description="pour a layer each so often [s], come down or not, as in the paper's own code; by default each waits "
+        "until the last one has come down",
+    )
+    thrown_at_m_per_s: float = Field(
+        0.0, ge=0, le=1000, description="speed that smarticles are thrown down with, 0 to let them fall [m/s]"
     )
     settle: Settle = Field(default_factory=Settle, description="when the poured pile counts as settled")
 
@@ -79,7 +92,12 @@ class Deposit(Part, Phase):
 
     def expected_duration(self, count: int) -> float:
         """See `Phase.expected_duration`."""
-        return LAYER_SECONDS * math.ceil(count / self.per_layer) + SETTLE_SECONDS
+        layer = LAYER_SECONDS if self.every_s is None else self.every_s
+        return layer * math.ceil(count / self.per_layer) + SETTLE_SECONDS
+
+    def peak_speed(self, gravity: float) -> float:
+        """See `Phase.peak_speed`."""
+        return self.thrown_at_m_per_s
 
     def begin(self, scene: SceneView, index: int) -> Stage:
         """See `Phase.begin`."""
@@ -87,7 +105,7 @@ class Deposit(Part, Phase):
 
 
 class Pouring:
-    """Layers of random poses just above the pile, the next when the last has come down; then the pile settles."""
+    """Layers of random poses just above all others, the next when it is due; then the pile settles."""
 
     def __init__(self, phase: Deposit, scene: SceneView) -> None:
         self._phase = phase
@@ -105,7 +123,11 @@ class Pouring:
 
     def proceed(self, engine: Engine) -> float:
         """See `Stage.proceed`."""
-        memory = self.memory
+        memory, every = self.memory, self._phase.every_s
+        if memory["left"] and every is not None:
+            self._pour(engine)
+            memory["layer"] = 0  # nobody waits for it
+            return every
         if memory["layer"]:
             self._look_at_layer(engine)
         elif not memory["left"] and self._has_settled(engine):
@@ -156,16 +178,20 @@ class Pouring:
 def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng: np.random.Generator) -> None:
     particle, state = scene.particle, engine.state()
     tops = state.vertices[..., 2].max(axis=1)
-    top = tops.max(initial=engine.fixtures.floor)
-    near = tops > top - 2 * particle.radius
-    cylinder, bottom = engine.cylinder, top + particle.radius
+    cylinder, slab = engine.cylinder, phase.layer_height_w * scene.smarticle.middle_length_m
+    if phase.every_s is None:
+        bottom = tops.max(initial=engine.fixtures.floor) + particle.radius
+    else:
+        # Some may still fly: from the top of the wall, so that layers keep the distance that they have in time.
+        bottom = cylinder.height - slab - 2 * particle.reach
+    near = tops > bottom - 3 * particle.radius
     hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
     poses = place_layer(
         particle,
         count=size,
         radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
         bottom=bottom,
-        height=phase.layer_height_w * scene.smarticle.middle_length_m,
+        height=slab,
         obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
         rng=rng,
         narrower=cylinder.inner_radii if cylinder.upper else None,
@@ -178,4 +204,4 @@ def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng
             f"above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
         )
         raise RunError(msg)
-    engine.add(poses)
+    engine.add(poses, speed=phase.thrown_at_m_per_s)

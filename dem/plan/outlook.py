@@ -10,6 +10,7 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.plan.advice import warnings_of
 from dem.plan.effects import Decision, decide
+from dem.plan.protocol import protocol_lines
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
 from dem.setting.fidelity import fidelities
@@ -31,7 +32,7 @@ class PlannedPhase:
 class Plan:
     """Everything `smarticles plan` says.
 
-    `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
+    `protocol` are lines of what the scene has by its protocol; `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
     `correction` is the factor that wall times have been corrected by.
     """
 
@@ -54,6 +55,7 @@ class Plan:
     stiffness_N_per_m: float = 0.0
     strands: int = 0
     correction: float = 1.0
+    protocol: tuple[str, ...] = ()
 
     def corrected(self, factor: float) -> Self:
         """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
@@ -72,6 +74,7 @@ class Plan:
             f"{self.name}: {self.count} smarticles of {self._section_to_text()}, "
             f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
+            *self.protocol,
             self._steps_to_text(),
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
@@ -178,4 +181,5 @@ def plan(scene: Scene) -> Plan:
         fidelity=scene.fidelity.base,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
+        protocol=protocol_lines(scene),
     )

@@ -63,6 +63,7 @@ class RunManifest:
         smarticle_mass: Mass of one smarticle [kg].
         solid_volume: Volume of one smarticle, t1 t2 (w + 2l) [m³].
         container_radius: [m]; of the widest tier.
+        packing_radius: That packing fractions are computed with [m], where it is not the container's; None otherwise.
         container_tiers: Cylinders of different radii that stand on each other.
         planar: Whether all motion is confined to a plane, without a container.
         channel_width: Distance of the two walls in the plane [m]; None without.
@@ -101,6 +102,7 @@ class RunManifest:
     time_step: float
     phases: tuple[PhaseRecord, ...]
     status: str
+    packing_radius: float | None = None
     container_tiers: int = 1
     planar: bool = False
     channel_width: float | None = None
@@ -109,6 +111,11 @@ class RunManifest:
     end_time: float | None = None
     steps: int | None = None
     wall_time: float | None = None
+
+    @property
+    def measured_radius(self) -> float:
+        """Radius that packing fractions are computed with [m]."""
+        return self.container_radius if self.packing_radius is None else self.packing_radius
 
     def walled(self, phase: int) -> bool:
         """Whether the container's wall is there in the phase of an index."""
@@ -122,6 +129,7 @@ class RunManifest:
 def manifest_data(run: RunManifest) -> dict[str, Any]:
     """The content of `run.json`: what made a run; how it ended is in another file."""
     plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
+    measured = {} if run.packing_radius is None else {"packing_radius_m": run.packing_radius}
     return {
         "format": MANIFEST_FORMAT,
         "name": run.name,
@@ -142,6 +150,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "smarticle_mass_kg": run.smarticle_mass,
         "solid_volume_m3": run.solid_volume,
         "container_radius_m": run.container_radius,
+        **measured,
         "container_tiers": run.container_tiers,
         "sphere_diameter_m": run.sphere_diameter,
         "spheres_per_smarticle": run.spheres_per_smarticle,
@@ -311,6 +320,7 @@ def read_run(directory: Path | str) -> RunManifest:
         smarticle_mass=run.number("smarticle_mass_kg", positive=True),
         solid_volume=run.number("solid_volume_m3", positive=True),
         container_radius=run.number("container_radius_m", positive=True),
+        packing_radius=run.number("packing_radius_m", positive=True) if "packing_radius_m" in run.data else None,
         # Runs of before there were tiers do not say.
         container_tiers=run.integer("container_tiers", least=1) if "container_tiers" in run.data else 1,
         planar=run.data.get("planar") is True,

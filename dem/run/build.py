@@ -45,7 +45,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     """The recorder of a scene, with the watchdog's limits."""
     recording = scene.recording
     # No one radius gives the volume of a mould of tiers.
-    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.radius_m
+    radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius
     sampler = Sampler(radius, {effect for effect in EffectName if called_for(scene, effect)})
     return Recorder(
         sampler=sampler,

@@ -248,6 +248,7 @@ def manifest(
         smarticle_mass=boxes.mass,
         solid_volume=boxes.volume,
         container_radius=scene.container.radius_m,
+        packing_radius=scene.container.packing_radius_m,
         container_tiers=1 + len(scene.cylinder.upper),
         sphere_diameter=particle.chain.diameter,
         spheres_per_smarticle=len(particle.centres),

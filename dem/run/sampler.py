@@ -120,8 +120,8 @@ class Sampler:
     def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
         # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
         # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
-        # Smarticles are added at rest, so a layer that was poured in between brings no momentum.
-        time, impulse, before = engine.time, engine.gravity_impulse, self._before
+        # What smarticles were thrown with when they were added counts with what gravity gave.
+        time, impulse, before = engine.time, engine.impulse, self._before
         self._before = (time, impulse, momentum)
         if before is None or time <= before[0]:
             return np.full(3, math.nan)

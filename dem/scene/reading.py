@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import yaml
@@ -21,7 +22,10 @@ from dem.setting.fidelity import FIDELITIES
 
 SCHEMA_VERSION = 1
 DEFAULT_ENGINE = "yade"
-DEFAULT_MOVES = "container"
+YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {"shake": {"moves": "container"}, "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0}}
+)
+"""Keys of phases that are younger than the format, by type of phase, with their defaults."""
 
 
 def parse_scene(data: Any, *, source: str) -> Scene:
@@ -91,14 +95,25 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """The resolved scene as plain data; keys younger than the format are not told where they have their defaults."""
+    """The resolved scene as plain data; keys younger than the format are not told where they have their defaults.
+
+    A protocol would fill them in again, so that with one they are all told.
+    """
     data = scene.model_dump(mode="json")
     if scene.engine == DEFAULT_ENGINE:
         del data["engine"]
-    for phase in data["phases"]:
-        if phase.get("moves") == DEFAULT_MOVES:
-            del phase["moves"]
+    if scene.protocol is None:
+        _leave_out(data, {"protocol": None})
+        _leave_out(data["container"], {"packing_radius_m": None})
+        for phase in data["phases"]:
+            _leave_out(phase, YOUNGER.get(phase["type"], {}))
     return data
+
+
+def _leave_out(data: dict[str, Any], defaults: Mapping[str, Any]) -> None:
+    for key, default in defaults.items():
+        if data[key] == default:
+            del data[key]
 
 
 def dump_scene(scene: Scene) -> str:

@@ -30,6 +30,7 @@ from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.motor import Motor
 from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
+from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
 from dem.setting.smarticle import Smarticle
 
@@ -45,6 +46,11 @@ class Scene(Part):
     schema_version: Literal[1] = Field(1, description="version of this format [1]")
     engine: Literal["yade", "links"] = Field(
         "yade", description="what computes it: yade, chains of spheres on YADE, or links, swept segments"
+    )
+    protocol: Protocol | None = Field(
+        None,
+        description="rules that fill in what the scene leaves open: text, as the paper says, or code, as its own code did: "
+        "motor.law, friction, container, what a shake moves, how smarticles are poured; default: neither",
     )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")
@@ -64,6 +70,11 @@ class Scene(Part):
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="stages of the run, in order")
     recording: Recording = Field(default_factory=Recording, description="frames and series")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _filled_by_protocol(cls, data: Any) -> Any:
+        return with_protocol(data)
 
     @field_validator("fidelity", mode="before")
     @classmethod

@@ -28,6 +28,11 @@ class Container(Part):
 
     radius_m: Length = Field(0.0234, description="inner radius [m]; the paper's is 2w")
     height_m: Length | None = Field(None, description="height of the wall [m]; by default high enough for the pour")
+    packing_radius_m: Length | None = Field(
+        None,
+        description="radius that packing fractions are computed with [m], where it is not the wall's, as in the paper's "
+        "own code; by default radius_m",
+    )
 
     tiers: tuple[Tier, ...] | None = Field(
         None,
@@ -52,6 +57,9 @@ class Container(Part):
     @model_validator(mode="after")
     def _narrower_upwards(self) -> Self:
         tiers = self.tiers or ()
+        if tiers and self.packing_radius_m is not None:
+            msg = f"packing_radius_m: {self.packing_radius_m:g} m, but a mould of tiers has no packing fraction; leave it out"
+            raise ValueError(msg)
         for number, (below, tier) in enumerate(pairwise(tiers), 1):
             if tier.radius_m > below.radius_m:
                 msg = (
@@ -69,6 +77,11 @@ class Container(Part):
                     msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
                     raise ValueError(msg)
         return self
+
+    @property
+    def measured_radius(self) -> float:
+        """Radius [m] that packing fractions are computed with."""
+        return self.radius_m if self.packing_radius_m is None else self.packing_radius_m
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Packing fraction of a pile in a cylinder, by named definitions.
 
 One definition alone moves the value by several per cent, so each result names its own. No
-definition corrects the container's radius.
+definition corrects the container's radius but where a scene says so, with `container.packing_radius_m`.
 """
 
 from __future__ import annotations
@@ -163,10 +163,12 @@ def packing_of(frame: Frame, run: RunManifest, *, definition: str) -> float:
     """
     if not run.fills_cylinder(frame.phase):
         return math.nan
+    # The costly ones look inside the pile, where it is only the wall that can be in the way.
+    radius = run.container_radius if definition in COSTLY_DEFINITIONS else run.measured_radius
     try:
         return packing_fraction(
             frame.vertices,
-            radius=run.container_radius,
+            radius=radius,
             solid_volume=run.solid_volume,
             definition=definition,
             floor_z=frame.floor_z,

@@ -50,7 +50,7 @@ def test_free_fall() -> None:
     assert made.state().positions[0, 2] == pytest.approx(5 - 9.81 * 0.1 * (0.1 + 1e-4) / 2, abs=1e-12)
     assert made.state().velocities[0, 2] == pytest.approx(-9.81 * 0.1, rel=1e-12)
     assert made.unbalanced_force() == pytest.approx(1.0)
-    assert made.gravity_impulse == pytest.approx(9.81 * 0.1 * made.particle.boxes.mass)
+    assert made.impulse == pytest.approx(9.81 * 0.1 * made.particle.boxes.mass)
 
 
 def test_a_spin_keeps_its_energy_over_a_thousand_turns() -> None:

@@ -100,6 +100,7 @@ class LinksEngine:
         self.strings = LinksStrings(self._world)
         """See the interface."""
         self._smarticle_seconds = 0.0
+        self._thrown = 0.0
         self._world.set_time_step(time_step)
 
     # -- time --------------------------------------------------------------------------------------------------
@@ -141,19 +142,21 @@ class LinksEngine:
         """See the interface."""
         return self._world.count
 
-    def add(self, poses: Poses) -> None:
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         """See the interface."""
-        self._world.add(poses)
-        self.account.added += self.particle.boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
+        self._world.add(poses, speed=speed)
+        mass, new = self.particle.boxes.mass, len(poses.positions)
+        self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self._thrown += mass * new * speed
 
     def state(self) -> State:
         """See the interface."""
         return self._world.state()
 
     @property
-    def gravity_impulse(self) -> float:
+    def impulse(self) -> float:
         """See the interface."""
-        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity
+        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
     def unbalanced_force(self) -> float:
         """See the interface."""
@@ -213,6 +216,7 @@ class LinksEngine:
             "world": self._world.memory,
             "added": self.account.added,
             "smarticle_seconds": self._smarticle_seconds,
+            "thrown": self._thrown,
         }
         return Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
 
@@ -239,3 +243,4 @@ class LinksEngine:
         self.motors.restore({name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)})
         self.account.added = saved.memory["added"]
         self._smarticle_seconds = saved.memory["smarticle_seconds"]
+        self._thrown = saved.memory.get("thrown", 0.0)  # there was no such thing once

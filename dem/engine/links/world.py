@@ -148,8 +148,8 @@ class World:
         self.time_step = time_step
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
-    def add(self, poses: Poses) -> None:
-        """Add smarticles of the particle's own shape, at rest."""
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        """See `Engine.add`."""
         new, boxes = len(poses.positions), self.particle.boxes
         fresh = no_bodies(self.each)
         rigid = 3 if self.articulated else 1
@@ -161,6 +161,7 @@ class World:
             )
         )
         fresh.position[:] = poses.positions
+        fresh.motion[:, 2] = -speed
         # Poses are those of the principal axes; here the axes are the middle link's.
         for i, rotation in enumerate(poses.rotations):
             fresh.turn[i] = quaternion_of(rotation.as_matrix() @ boxes.link_rotations[1])

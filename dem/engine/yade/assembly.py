@@ -82,9 +82,10 @@ class Assembly:
         bodies = self._yade.omega.bodies
         self._states = [bodies[body].state for body in self._ids]
 
-    def add(self, poses: Poses) -> None:
-        """Add smarticles of the particle's own shape, at rest."""
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        """See `Engine.add`."""
         particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
+        falling = np.array([0.0, 0.0, -speed])
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
             spheres = [
                 omega.bodies.append(
@@ -102,7 +103,7 @@ class Assembly:
                     inertia=particle.boxes.inertia,
                     position=position,
                     rotation=rotation.as_matrix(),
-                    velocity=still,
+                    velocity=falling,
                     angular_momentum=still,
                     planar=self._planar,
                 )

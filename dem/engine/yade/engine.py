@@ -85,6 +85,7 @@ class YadeEngine:
         hinge_law, motor_law = hinges or (None, None)
         self._assembly = Assembly(self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths)
         self._smarticle_seconds = 0.0
+        self._thrown = 0.0
         # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
         self._loaded: tuple[int, float] | None = None
         called_for = {
@@ -146,6 +147,7 @@ class YadeEngine:
                 "assembly": self._assembly.memory,
                 "motors": self.motors.memory,
                 "smarticle_seconds": self._smarticle_seconds,
+                "thrown": self._thrown,
                 "fixtures": self.fixtures.memory,
                 "strings": self.strings.memory,
                 "account": self.account.memory,
@@ -171,6 +173,7 @@ class YadeEngine:
         self._omega.load(str(file), quiet=True)
         self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
+        self._thrown = memory.get("thrown", 0.0)  # there was no such thing once
         self.fixtures.restore(memory["fixtures"])
         self.strings.restore(memory["strings"])
         self.account.restore(memory["account"])
@@ -179,10 +182,12 @@ class YadeEngine:
         self._assembly.bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
-    def add(self, poses: Poses) -> None:
-        """Add smarticles at rest."""
-        self._assembly.add(poses)
-        self.account.added += self.particle.boxes.mass * self.gravity * float(poses.positions[:, 2].sum())
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        """See the interface."""
+        self._assembly.add(poses, speed=speed)
+        mass, new = self.particle.boxes.mass, len(poses.positions)
+        self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self._thrown += mass * new * speed
 
     def set_time_step(self, time_step: float) -> None:
         """Take steps of another length [s] from now on.
@@ -234,9 +239,9 @@ class YadeEngine:
         return self._assembly.count
 
     @property
-    def gravity_impulse(self) -> float:
-        """What gravity has given to all smarticles, each since it was added [N s], downwards."""
-        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity
+    def impulse(self) -> float:
+        """See the interface."""
+        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
     def state(self) -> State:
         """Poses and velocities of all smarticles."""
