@@ -306,7 +306,7 @@ class Engine(Protocol):
 
     @property
     def impulse(self) -> float:
-        """What gravity has given to all smarticles, each since it was added, and what they were thrown with [N s], downwards."""
+        """What gravity, and throwing them, has given to all smarticles since they were added [N s], downwards."""
 
     def unbalanced_force(self) -> float:
         """Mean net force on a smarticle over its weight [1]: 0 for a still pile, 1 in free fall, inf when empty."""

@@ -31,9 +31,9 @@ class Settle(Part):
 
 
 class Deposit(Part, Phase):
-    """Pour smarticles in layers of random, non-overlapping poses just above the others, then wait until all have settled.
+    """Pour smarticles in layers of random, non-overlapping poses, then wait until the pile settles.
 
-    A layer is poured when the last one has come down, or `every_s`; above those that are still in the air if there are any.
+    A layer is poured just above the pile when the last one has come down; or by the clock, from the top of the wall.
     """
 
     pours: ClassVar[bool] = True
@@ -54,8 +54,8 @@ class Deposit(Part, Phase):
         None,
         ge=1e-4,
         le=1e6,
-        description="pour a layer each so often [s], come down or not, as in the paper's own code; by default each waits "
-        "until the last one has come down",
+        description="pour a layer each so often [s], from the top of the wall, as the paper's own code does; by "
+        "default each waits until the last one has come down",
     )
     thrown_at_m_per_s: float = Field(
         0.0, ge=0, le=1000, description="speed that smarticles are thrown down with, 0 to let them fall [m/s]"

@@ -32,8 +32,9 @@ class PlannedPhase:
 class Plan:
     """Everything `smarticles plan` says.
 
-    `protocol` are lines of what the scene has by its protocol; `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
-    `correction` is the factor that wall times have been corrected by.
+    `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
+    `correction` is the factor that wall times have been corrected by; `protocol` are lines of what the scene has by its
+    protocol.
     """
 
     name: str

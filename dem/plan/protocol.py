@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from dem.errors import shown
 from dem.scene.scene import Scene
 from dem.setting.protocol import PARTS, PROTOCOLS
 
@@ -37,4 +36,4 @@ def _keys(scene: Scene, says: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple
 
 
 def _told(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else shown(value)
+    return f"{value:g}" if isinstance(value, float) else "null" if value is None else str(value)

@@ -49,8 +49,8 @@ class Scene(Part):
     )
     protocol: Protocol | None = Field(
         None,
-        description="rules that fill in what the scene leaves open: text, as the paper says, or code, as its own code did: "
-        "motor.law, friction, container, what a shake moves, how smarticles are poured; default: neither",
+        description="rules that fill in what the scene leaves open: text, as the paper says, or code, as its own code "
+        "did: motor.law, friction, container, what a shake moves; default: neither",
     )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")

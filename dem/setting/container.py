@@ -30,8 +30,8 @@ class Container(Part):
     height_m: Length | None = Field(None, description="height of the wall [m]; by default high enough for the pour")
     packing_radius_m: Length | None = Field(
         None,
-        description="radius that packing fractions are computed with [m], where it is not the wall's, as in the paper's "
-        "own code; by default radius_m",
+        description="radius that packing fractions are computed with [m], where it is not the wall's, as in the "
+        "paper's own code; by default radius_m",
     )
 
     tiers: tuple[Tier, ...] | None = Field(
@@ -58,7 +58,7 @@ class Container(Part):
     def _narrower_upwards(self) -> Self:
         tiers = self.tiers or ()
         if tiers and self.packing_radius_m is not None:
-            msg = f"packing_radius_m: {self.packing_radius_m:g} m, but a mould of tiers has no packing fraction; leave it out"
+            msg = f"packing_radius_m: {self.packing_radius_m:g} m, but tiers have no packing fraction; leave it out"
             raise ValueError(msg)
         for number, (below, tier) in enumerate(pairwise(tiers), 1):
             if tier.radius_m > below.radius_m:

@@ -1,8 +1,11 @@
 """Protocols: what the paper's text and its own code differ in, as keys of a scene.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: the text states one set of
-rules, the scripts and sources in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol fills in
-what a scene leaves open; what a scene says itself stands.
+rules, the sources and run scripts in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol
+fills in what a scene leaves open; what a scene says itself stands.
+
+One difference is left to the scene: the code throws a layer down at 2 m/s every 15 ms (`every_s` and `thrown_at_m_per_s` of
+a deposit), which the soft contacts of the named fidelities do not bear; it takes `fidelity.stiffness_N_per_m` of 4000.
 """
 
 from __future__ import annotations
@@ -19,14 +22,12 @@ PROTOCOLS: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType(
             "motor": {"law": "halt"},
             "contact": {"friction_smarticle": 0.4, "friction_wall": 0.4},
             "container": {"radius_m": 0.0234},
-            "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0},
             "shake": {"moves": "container"},
         },
         "code": {
             "motor": {"law": "ease"},
             "contact": {"friction_smarticle": 0.2, "friction_wall": 0.2},
             "container": {"radius_m": 0.0224, "packing_radius_m": 0.0234},
-            "deposit": {"every_s": 0.015, "thrown_at_m_per_s": 2.0},
             "shake": {"moves": "floor"},
         },
     }

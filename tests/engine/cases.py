@@ -120,6 +120,30 @@ def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, A
     return {"v": engine.state().velocities[0, 1]}
 
 
+def thrown(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
+    """Two smarticles thrown down from high above the floor."""
+    scene = scene_of(data)
+    engine = build(scene)
+    poses = place_layer(
+        scene.particle, count=2, radius=0.02, bottom=1.0, height=0.02, obstacles=np.empty((0, 3)),
+        rng=np.random.default_rng(1),
+    )  # fmt: skip
+    engine.add(poses, speed=speed)
+    before, added = engine.state(), engine.account.added
+    engine.advance(round(duration / engine.time_step))
+    after = engine.state()
+    return {
+        "fallen": before.positions[:, 2] - after.positions[:, 2],
+        "speeds": -after.velocities[:, 2],
+        "momentum": after.momentum,
+        "impulse": engine.impulse,
+        "added": added,
+        "energy": before.kinetic_energy + before.potential_energy(engine.gravity, 0.0),
+        "time": engine.time,
+        "step": engine.time_step,
+    }
+
+
 def pour(
     engine: YadeEngine, scene: Scene, count: int, obstacles: np.ndarray | None = None, radius: float | None = None
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import builds
 import numpy as np
@@ -51,6 +52,22 @@ def test_free_fall() -> None:
     assert made.state().velocities[0, 2] == pytest.approx(-9.81 * 0.1, rel=1e-12)
     assert made.unbalanced_force() == pytest.approx(1.0)
     assert made.impulse == pytest.approx(9.81 * 0.1 * made.particle.boxes.mass)
+
+
+def test_what_is_thrown_falls_from_that_speed_on() -> None:
+    made = builds.engine(gravity=9.81, dt=1e-4)
+    made.add(builds.at([[0, 0, 5.0], [0.3, 0, 5.0]]), speed=2.0)
+    before = made.state()
+    assert made.account.added == pytest.approx(before.kinetic_energy + before.potential_energy(9.81, 0.0), rel=1e-14)
+    made.advance(200)
+    after, time = made.state(), 0.02
+    assert after.velocities[:, 2] == pytest.approx(-(2 + 9.81 * time), rel=1e-12)
+    # Of first order: velocities belong to the middles of steps.
+    assert 5 - after.positions[:, 2] == pytest.approx(2 * time + 9.81 * time * (time + 1e-4) / 2, abs=1e-12)
+    assert made.impulse == pytest.approx(-after.momentum[2], rel=1e-12)
+    again = builds.engine(gravity=9.81, dt=1e-4)
+    again.load(made.save(Path()), Path())
+    assert again.impulse == made.impulse
 
 
 def test_a_spin_keeps_its_energy_over_a_thousand_turns() -> None:

@@ -161,7 +161,7 @@ class World:
             )
         )
         fresh.position[:] = poses.positions
-        fresh.motion[:, 2] = -speed
+        fresh.velocity[:, 2] = -speed
         # Poses are those of the principal axes; here the axes are the middle link's.
         for i, rotation in enumerate(poses.rotations):
             fresh.turn[i] = quaternion_of(rotation.as_matrix() @ boxes.link_rotations[1])

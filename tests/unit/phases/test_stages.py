@@ -102,6 +102,27 @@ def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> N
     assert engine.positions[:, 2] == pytest.approx(engine.stands)
 
 
+def test_a_pour_by_the_clock_waits_for_nobody_until_all_are_there() -> None:
+    clocked = {"phases.0.every_s": 0.015, "phases.0.thrown_at_m_per_s": 2.0}
+    scene = small({"count": 12, **clocked})
+    engine, stage = EngineDouble.of(scene, DT), scene.phases[0].begin(scene, 0)
+    counts, waits, tops = [], [], []
+    for _ in range(3):
+        waits.append(stage.proceed(engine))
+        counts.append(engine.count)
+        new = slice(0, 5) if engine.count == 5 else slice(engine.count - (5 if engine.count == 10 else 2), None)
+        assert (engine.velocities[new, 2] == -2.0).all()
+        tops.append(engine.state().vertices[new, :, 2].min())
+        engine.advance(round(waits[-1] / DT))
+    assert (counts, waits) == ([5, 10, 12], [0.015] * 3)
+    # All from the same height, high up at the wall, whatever is below.
+    least = scene.cylinder.height - scene.phases[0].layer_height_w * 0.0117 - 2 * scene.particle.reach
+    assert least < min(tops)
+    assert max(tops) < least + 0.0117
+    perform(stage, engine)
+    assert engine.touches().all()
+
+
 def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
     poses = []
     for anew in (False, True):
