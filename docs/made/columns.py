@@ -68,7 +68,7 @@ def measure_columns() -> str:
         if isinstance(measure, FrameMeasure):
             of = "the last frame of each phase" if measure.costly else "each frame"
         else:
-            of = f"each phase `{measure.phase}`"
+            of = "each phase " + ", ".join(code(name) for name in measure.phases)
         rows = [(code(quantity.header), cell(measure.name), of) for quantity in measure.quantities]
         parts.setdefault(module, []).extend(rows)
     texts = []

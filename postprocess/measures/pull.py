@@ -213,7 +213,7 @@ def _samples(edges: NDArray[np.float64], window: float) -> int:
 MEASURES = (
     PhaseMeasure(
         name="pull of a hook",
-        phase=PULL,
+        phases=(PULL,),
         quantities=(
             Quantity("hook peak force over n W_s", "-", Shown(heading="peak F/nW", place=40, form=".3f")),
             Quantity("hook peak time", "s"),

@@ -98,21 +98,21 @@ class PhaseMeasure:
 
     Attributes:
         name: Of the measure; no other has it.
-        phase: Type of the phases that tell it.
+        phases: Types of the phases that tell it.
         quantities: Its columns.
         take: The values of a phase of an index, one per column.
         told_of: Whether the series holds enough of a phase of an index; else there are no such columns.
     """
 
     name: str
-    phase: str
+    phases: tuple[str, ...]
     quantities: tuple[Quantity, ...]
     take: Callable[[RunManifest, Series, int], Sequence[float]]
     told_of: Callable[[Series, int], bool]
 
     def columns(self, run: RunManifest, series: Series, phase: int) -> dict[str, float]:
         """Its values by column; none where the phase is of another type or the series does not hold enough of it."""
-        if run.phases[phase].type != self.phase or not self.told_of(series, phase):
+        if run.phases[phase].type not in self.phases or not self.told_of(series, phase):
             return {}
         values = self.take(run, series, phase)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))

@@ -205,7 +205,7 @@ def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
 MEASURES = (
     PhaseMeasure(
         name="strain of a chain",
-        phase=STRAIN,
+        phases=(STRAIN,),
         quantities=tuple(_MEANINGS),
         take=_strain_of,
         told_of=lambda series, _: has_strain(series),

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.manifest import PhaseRecord, RunManifest
 from dem.record.series import Series, read_series
+from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import ASPECT, SEED
@@ -38,15 +39,19 @@ from studies.base.runs import DEFINITION, duration
 
 PHI_ACTIVE = f"phi {DEFINITION} at the end of the activity [-]"
 ENERGY = "energy per smarticle [J]"
+SAMPLED = f"energy per smarticle sampled every {APART:g} s [J]"
 HEIGHT, STRAIGHT, HALF = "com height over h0 [-]", "com height straight over h0 [-]", "half of compaction at [-]"
+LOWEST = "lowest com height over h0 while closing [-]"
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         PHI_ACTIVE: "packing fraction over the last frames of the activity, as the paper's φ_f; static: at rest",
         PHI: "packing fraction at rest: after the activity, or of the static state",
         CROSSINGS: "⟨N⟩ at rest: links of others through a smarticle's plane",
         ENERGY: "work of the motors, or of the shaken container, on the smarticles; static: none",
+        SAMPLED: "of the motors, summed as torque times angle over moments so far apart, as the paper's code could",
         HEIGHT: "height of the centre of mass at rest after the activity, over that before it",
         STRAIGHT: "the same at the end of the straight state of the shape change",
+        LOWEST: "the least of it, as a mean over 0.1 s, while barbs close in the shape change",
         HALF: "share of the activity after which half of the final compaction is reached; empty without any",
     }
 )
@@ -112,6 +117,7 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
     row[HEIGHT] = after["com height [m]"] / before["com height [m]"]
     straight_until = settings.number("opening_s") + settings.number("straight_hold_s") if procedure == SHAPE else None
     row |= _of_series(run, active, straight_until)
+    row[SAMPLED] = during.get(SAMPLED_WORK, math.nan) / run.count
     row["escaped at the end [-]"] = after["escaped [-]"]
     row["frames averaged [-]"] = int(table["frames averaged"].min())
     row["scene_sha256"] = run.scene_sha256
@@ -148,7 +154,7 @@ def _of_series(run: RunManifest, active: PhaseRecord, straight_until: float | No
         active: Its activity.
         straight_until: When barbs start to close again, after the beginning of the activity [s].
     """
-    found = {STRAIGHT: math.nan, HALF: math.nan, ENERGY: math.nan}
+    found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.directory / "series.h5").exists():
         return found
     series = read_series(run.directory)
@@ -160,9 +166,20 @@ def _of_series(run: RunManifest, active: PhaseRecord, straight_until: float | No
         if straight_until is not None:
             last = (time > straight_until - _WINDOW) & (time <= straight_until)
             found[STRAIGHT] = float(height[last].mean()) if last.any() else math.nan
+            found[LOWEST] = _lowest(time, height, straight_until, duration(active))
         elif active.type == "internal-oscillation":
             found[HALF] = half_compaction(time, height, duration(active))
     return found
+
+
+def _lowest(time: NDArray[np.float64], height: NDArray[np.float64], start: float, end: float) -> float:
+    """The least mean over a window between two times [s]; NaN if there is less than a window of them."""
+    shown = (time > start) & (time <= end)
+    if shown.sum() < 2:
+        return math.nan
+    samples = max(round(_WINDOW / float(np.median(np.diff(time[shown])))), 1)
+    smooth = np.convolve(height[shown], np.full(samples, 1 / samples), mode="valid") if shown.sum() >= samples else ()
+    return float(min(smooth, default=math.nan))
 
 
 def _gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import pandas as pd
 
 from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.findings import Verdict, all_of, judge, negative, told
+from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import pairs
 from postprocess.statistics.seeds import Slope, mean_over_seeds, slope_within
-from studies.base.procedures import THETA, of_procedure
+from studies.base.procedures import STATIC, THETA, of_procedure
 
 
 def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
@@ -45,3 +45,44 @@ def compared(table: pd.DataFrame, quantity: str, one: str, others: Sequence[str]
         parts.append(f"less {other} {told(effect, 3)}{places if len(means) else ''}")
         verdicts.append(judge(effect if sign > 0 else negative(effect)))
     return "; ".join(parts), all_of(verdicts)
+
+
+def with_aspect(
+    paper: str, part: pd.DataFrame, quantity: str, symbol: str, *, sign: int, form: str, unit: str = "", when: str = ""
+) -> Finding:
+    """A finding that a quantity rises (sign 1) or falls (−1) with the aspect ratio.
+
+    Args:
+        paper: What the paper says.
+        part: Samples of one procedure.
+        quantity: Column.
+        symbol: What it is called.
+        sign: Which way.
+        form: Of a number.
+        unit: Of it, with a space before.
+        when: What the criterion says besides.
+    """
+    slope = against_aspect(part, quantity)
+    return Finding(
+        paper=paper,
+        ours=f"{symbol} against l/w {told(slope, 3, unit)}; by l/w {by_aspect(part, quantity, form)}{unit}",
+        verdict=judge(slope if sign > 0 else negative(slope)),
+        criterion=f"slope of {symbol} against l/w {'>' if sign > 0 else '<'} 0{when}",
+    )
+
+
+def mean_above_zero(paper: str, values: pd.Series, symbol: str, unit: str = "") -> Finding:
+    """A finding that something is above zero in the mean over runs."""
+    effect = mean_over_seeds(values)
+    return Finding(
+        paper=paper,
+        ours=f"{symbol} {told(effect, 3, unit)}",
+        verdict=judge(effect),
+        criterion=f"{symbol} > 0, mean over runs",
+    )
+
+
+def gains(table: pd.DataFrame, procedure: str, quantity: str) -> pd.DataFrame:
+    """What a procedure adds to the static state of the same aspect ratio and seed, in the column of the quantity."""
+    both = pairs_of(table, quantity, procedure, STATIC)
+    return both.assign(**{quantity: both["one"] - both["other"]})

@@ -1,0 +1,99 @@
+"""What motors did in a phase, as somebody sees it who looks at the smarticles only now and then.
+
+The paper integrates τ dα over every step. Its own code keeps torque and angle together every 0.1 s only
+(CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`), and a sum over samples so far apart is another quantity: of a
+barb that goes to and fro several times in between it is nearly nothing. Both stand beside each other in the tables:
+the integral is `motor_work_J` of the series.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.errors import InputError
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import RunManifest
+from dem.record.series import Series
+from postprocess.measures.registry import PhaseMeasure, Quantity
+
+Array = NDArray[np.float64]
+
+APART = 0.1
+"""Between two samples, as in the paper's code [s]."""
+
+ACTUATED = ("actuate", "internal-oscillation", "shape-change")
+"""Types of phase in which motors move barbs."""
+
+_WORK = Quantity(f"motor work sampled every {APART:g} s", "J")
+
+SAMPLED_WORK = _WORK.header
+"""Its column in tables of phases."""
+
+_NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall on the nearest step
+
+
+def sampled_work(angles: Array, torques: Array) -> float:
+    """Σ τ Δα, each torque times the way since the sample before.
+
+    Args:
+        angles: (samples, N, 2) of the barbs [rad].
+        torques: (samples, N, 2) of their motors [N m].
+
+    Returns:
+        The sum over all barbs [J]; NaN of fewer than two samples.
+
+    Raises:
+        InputError: The two are not of one shape.
+
+    Example:
+        >>> import numpy as np
+        >>> there, back = np.zeros((1, 1, 2)), np.full((1, 1, 2), 0.5)
+        >>> sampled_work(np.concatenate([there, back]), np.full((2, 1, 2), 2e-3))
+        0.002
+    """
+    if angles.shape != torques.shape:
+        msg = f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}"
+        raise InputError(msg)
+    if len(angles) < 2:
+        return math.nan
+    return float((torques[1:] * np.diff(angles, axis=0)).sum())
+
+
+def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
+    """Which frames are samples: the first one, and each that is a multiple of `apart` [s] later.
+
+    Returns:
+        Their numbers; none where frames do not fall on those times.
+    """
+    if not len(frames):
+        return []
+    multiples = (frames.times - frames.times[0]) / apart
+    chosen = np.flatnonzero(np.abs(multiples - np.round(multiples)) < _NEAR)
+    wanted = np.arange(len(chosen))
+    return [int(k) for k in chosen] if np.array_equal(np.round(multiples[chosen]), wanted) else []
+
+
+def _sampled_work_of(run: RunManifest, series: Series, phase: int) -> tuple[float]:
+    frames = read_frames(run.directory).in_phase(phase)
+    chosen = [frames[k] for k in sampled(frames)]
+    if not chosen:
+        return (math.nan,)
+    angles, torques = (
+        np.array([frame.cell_data[name][:, [0, 2]] for frame in chosen]) for name in ("angle_rad", "motor_torque_N_m")
+    )
+    known = ~np.isnan(torques).any(axis=(1, 2))  # the first frame may be of before motors were there
+    return (sampled_work(angles[known], torques[known]),)
+
+
+MEASURES = (
+    PhaseMeasure(
+        name="sampled motor work",
+        phases=ACTUATED,
+        quantities=(_WORK,),
+        take=_sampled_work_of,
+        told_of=lambda series, _: "motor_work_J" in series.data,
+    ),
+)
