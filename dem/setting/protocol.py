@@ -4,8 +4,8 @@ Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Ma
 rules, the sources and run scripts in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol
 fills in what a scene leaves open; what a scene says itself stands.
 
-One difference is left to the scene: the code throws a layer down at 2 m/s every 15 ms (in a deposit `every_s: 0.015` and
-`thrown_at_m_per_s: 2`). Soft contacts of the named fidelities do not bear that, those of `stiffness_N_per_m: 4000` do.
+One difference is left to the scene: the code throws a layer down at 2 m/s every 15 ms (in a deposit, `every_s: 0.015`
+and `thrown_at_m_per_s: 2`). Soft contacts of the named fidelities do not bear that, those of 4000 N/m do.
 """
 
 from __future__ import annotations

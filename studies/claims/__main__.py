@@ -1,0 +1,94 @@
+"""Write `CLAIMS.md` and `claims.csv` into a folder of results: `python -m studies.claims [RESULTS]`."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from studies.claims.verdicts import Claim, Tested, claims
+
+HEAD = """\
+# The paper's claims, one by one
+
+Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023 (DOI 10.1039/d2sm01573k), in
+its order; what its simulations say was tested twice where both are told: by the rules of the **text**, and by those of
+the paper's own **code** where it says otherwise (`protocol: text` and `protocol: code`, spelled out by `smarticles
+plan`). Made by `make claims` from the tables of the studies in this folder, which name scene, seed, versions and
+command of every run; a test holds this page against them. Errors are standard errors; verdicts go by 95 %.
+
+*Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: the
+opposite was found. *Not resolved*: neither. *No data*: the runs are still to be made. *On YADE*: the same finding by
+the text on the other engine, where it has runs of its own; it has no say in the verdict, but shows where engines differ.
+"""
+
+
+def text(found: Sequence[Claim]) -> str:
+    """The page."""
+    counted = Counter(claim.verdict for claim in found)
+    lines = [
+        HEAD,
+        f"{len(found)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common()) + ".",
+        "",
+    ]
+    part = ""
+    for claim in found:
+        if claim.part != part:
+            part = claim.part
+            lines += [
+                "",
+                f"## {part}",
+                "",
+                "| | claim | verdict | by the text | by the code | on YADE | rests on | why |",
+                "| --- | --- | --- | --- | --- | --- | --- | --- |",
+            ]
+        ours = (_told(tested) for tested in (claim.text, claim.code, claim.yade))
+        cells = (str(claim.number), claim.says, f"**{claim.verdict}**", *ours, _rests(claim), claim.why)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _told(tested: Tested | None) -> str:
+    return "–" if tested is None else f"{tested.verdict}: {tested.ours}"
+
+
+def _rests(claim: Claim) -> str:
+    tested = [one for one in (claim.text, claim.code, claim.yade) if one is not None]
+    told = [f"[{one.study}]({one.study}/): {one.basis}" for one in tested]
+    return "; ".join(told) or "–"
+
+
+def table(found: Sequence[Claim]) -> pd.DataFrame:
+    """The same as one row per claim."""
+    rows = []
+    for claim in found:
+        row = {
+            "number": claim.number,
+            "part": claim.part,
+            "claim": claim.says,
+            "verdict": claim.verdict,
+            "why": claim.why,
+        }
+        for name, tested in (("text", claim.text), ("code", claim.code), ("text on YADE", claim.yade)):
+            for key in ("study", "verdict", "ours", "criterion", "basis"):
+                row[f"by the {name}: {key}"] = "" if tested is None else getattr(tested, key)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write page and table."""
+    parser = argparse.ArgumentParser(prog="python -m studies.claims", description=__doc__)
+    parser.add_argument("results", type=Path, nargs="?", default=Path("results"), help="folder of the studies' results")
+    folder: Path = parser.parse_args(arguments).results
+    found = claims(folder)
+    (folder / "CLAIMS.md").write_text(text(found), encoding="utf-8")
+    table(found).to_csv(folder / "claims.csv", index=False)
+    print(f"{folder / 'CLAIMS.md'}: {len(found)} claims")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+"""What the studies under `results/` say of the paper's claims.
+
+`claims.yaml` names for every claim the study that tests it and the finding there; verdict, numbers and what they rest
+on are taken from the tables of that study alone, so that the list of claims holds no number of its own.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import pandas as pd
+import yaml
+
+from dem.errors import InputError
+from postprocess.statistics.columns import ASPECT, SEED
+
+CLAIMS = Path(__file__).with_name("claims.yaml")
+
+Verdict = Literal["reproduced", "partly", "not", "not resolved", "not testable", "no data"]
+
+_FOUND: Mapping[str, Verdict] = {
+    "found": "reproduced",
+    "not found": "not",
+    "not resolved": "not resolved",
+    "no data": "no data",
+    "yes": "reproduced",
+    "no": "not",
+    "undetermined": "not resolved",
+}
+_COUNT = "smarticles [-]"
+
+ON_YADE = "-yade"
+"""What the folder of a study's results on YADE is called beside that of its results on links."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tested:
+    """What one study says of a claim.
+
+    Attributes:
+        study: Folder under `results/`.
+        verdict: Of its finding.
+        ours: Its numbers.
+        criterion: What its verdict asks for.
+        basis: Smarticles, seeds and engine that it rests on.
+    """
+
+    study: str
+    verdict: Verdict
+    ours: str
+    criterion: str
+    basis: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One claim of the paper.
+
+    Attributes:
+        number: In the paper's order, from 1.
+        part: Of the paper.
+        says: The claim.
+        text: By the rules of the paper's text; None where that was not tested.
+        code: By those of its own code.
+        yade: By those of the text on YADE, from results of their own; None where these have no such finding.
+        why: What decides the verdict, or why there is none.
+    """
+
+    number: int
+    part: str
+    says: str
+    text: Tested | None
+    code: Tested | None
+    yade: Tested | None
+    why: str
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of both together: partly where one finds it and the other does not."""
+        tested = [one.verdict for one in (self.text, self.code) if one is not None]
+        told = {verdict for verdict in tested if verdict != "no data"}
+        if not tested:
+            return "not testable"
+        if not told:
+            return "no data"
+        if len(told) == 1:
+            return told.pop()
+        return "partly" if "reproduced" in told else "not resolved"
+
+
+def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
+    """All claims with what the studies found.
+
+    Args:
+        results: Folder of the studies' results.
+        listed: The list of claims.
+
+    Raises:
+        InputError: A study or a finding that the list names is not there.
+    """
+    tables = _Tables(results)
+    found: list[Claim] = []
+    for part, entry in _entries(listed):
+        found.append(
+            Claim(
+                number=len(found) + 1,
+                part=part,
+                says=entry["says"],
+                text=tables.tested(entry.get("text")),
+                code=tables.tested(entry.get("code")),
+                yade=tables.on_yade(entry.get("text")),
+                why=entry.get("untested") or entry.get("why", ""),
+            )
+        )
+    return tuple(found)
+
+
+def _entries(listed: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
+    for part in yaml.safe_load(listed.read_text(encoding="utf-8")):
+        for entry in part["claims"]:
+            yield part["part"], entry
+
+
+class _Tables:
+    """Findings of studies, read once."""
+
+    def __init__(self, results: Path) -> None:
+        self._results = results
+        self._found: dict[str, dict[str, Sequence[str]]] = {}
+        self._bases: dict[str, str] = {}
+
+    def tested(self, named: Sequence[str] | None) -> Tested | None:
+        """What a study says, named with its finding; None of none."""
+        if named is None:
+            return None
+        study, finding = named
+        if study not in self._found:
+            self._found[study], self._bases[study] = self._read(study), _basis(self._results / study)
+        try:
+            ours, verdict, criterion = self._found[study][finding]
+        except KeyError:
+            msg = f"{self._results / study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
+            raise InputError(msg) from None
+        return Tested(study=study, verdict=_FOUND[verdict], ours=ours, criterion=criterion, basis=self._bases[study])
+
+    def on_yade(self, named: Sequence[str] | None) -> Tested | None:
+        """What the same finding is in the results of the study on YADE, where there are such."""
+        if named is None or not (self._results / f"{named[0]}{ON_YADE}").is_dir():
+            return None
+        study, finding = f"{named[0]}{ON_YADE}", named[1]
+        if study not in self._found:
+            self._found[study], self._bases[study] = self._read(study), _basis(self._results / study)
+        return self.tested((study, finding)) if finding in self._found[study] else None
+
+    def _read(self, study: str) -> dict[str, Sequence[str]]:
+        """Numbers, verdict and criterion by finding; a study of questions has no criterion but the question."""
+        for name, order in (("findings.csv", (1, 2, 3)), ("verdicts.csv", (2, 1, 0))):
+            path = self._results / study / name
+            if path.is_file():
+                with path.open(encoding="utf-8", newline="") as file:
+                    rows = [row for row in csv.reader(file) if not row[0].startswith("# ")][1:]
+                return {row[0]: [row[column] for column in order] for row in rows}
+        msg = f"{self._results / study}: has neither findings.csv nor verdicts.csv; analyse the study first"
+        raise InputError(msg)
+
+
+def _basis(folder: Path) -> str:
+    """`168 – 494 smarticles, l/w 0.4 – 1.1, 8 seeds, links`."""
+    runs = pd.read_csv(folder / "runs.csv", comment="#")
+    made = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["runs"]
+    engines = sorted({"links" if "links" in run["versions"] else "YADE" for run in made})
+    parts = [f"{_span(runs[_COUNT])} smarticles"]
+    if ASPECT in runs:
+        parts.append(f"l/w {_span(runs[ASPECT])}")
+    seeds = runs[SEED].nunique()
+    parts += [f"{seeds} seed{'' if seeds == 1 else 's'}", " and ".join(engines)]
+    return ", ".join(parts)
+
+
+def _span(values: pd.Series) -> str:
+    least, most = values.min(), values.max()
+    return f"{least:g}" if least == most else f"{least:g} – {most:g}"

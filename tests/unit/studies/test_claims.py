@@ -1,0 +1,110 @@
+"""The list of claims: what it takes from the studies, what it makes of two protocols, and that the one that is shipped
+says what the tables beside it say."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dem.errors import InputError
+from studies.claims.__main__ import main, text
+from studies.claims.verdicts import CLAIMS, Claim, claims
+
+RESULTS = Path(__file__).parents[3] / "results"
+
+
+def written(folder: Path, verdicts: dict[tuple[str, str], str]) -> Path:
+    """Results of all studies that the list names; every finding is found but those that `verdicts` has."""
+    named = defaultdict(list)
+    for part in yaml.safe_load(CLAIMS.read_text(encoding="utf-8")):
+        for entry in part["claims"]:
+            for key in ("text", "code"):
+                if key in entry:
+                    named[entry[key][0]].append(entry[key][1])
+    for study, findings in named.items():
+        (folder / study).mkdir(parents=True)
+        with (folder / study / "findings.csv").open("w", encoding="utf-8", newline="") as file:
+            out = csv.writer(file)
+            out.writerow(("finding in the paper", "ours", "verdict", "criterion"))
+            for one in findings:
+                out.writerow((one, "ours", verdicts.get((study, one), "found"), "criterion"))
+            file.write(f"# Study {study}\n")
+        rows = "seed,smarticles [-],aspect ratio [-]\n1,494,0.4\n2,168,1.1\n# Study\n"
+        (folder / study / "runs.csv").write_text(rows)
+        (folder / study / "provenance.json").write_text(json.dumps({"runs": [{"versions": {"links": "x"}}]}))
+    return folder
+
+
+def one_of(found: tuple[Claim, ...], says: str) -> Claim:
+    """The claim that says so."""
+    (claim,) = [claim for claim in found if claim.says == says]
+    return claim
+
+
+def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
+    found = claims(written(tmp_path, {}))
+    assert [claim.number for claim in found] == list(range(1, len(found) + 1))
+    most = one_of(found, "shape change entangles most")
+    assert most.verdict == "reproduced"
+    assert most.text is not None
+    assert most.text.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 2 seeds, links"
+    assert {claim.verdict for claim in found} == {"reproduced", "not testable"}
+
+
+HIGHEST = "⟨N⟩ is highest for shape change"
+
+
+@pytest.mark.parametrize(
+    ("by_text", "by_code", "verdict"),
+    [
+        ("not found", "found", "partly"),
+        ("not resolved", "found", "partly"),
+        ("not found", "not found", "not"),
+        ("not found", "not resolved", "not resolved"),
+        ("no data", "found", "reproduced"),
+        ("no data", "no data", "no data"),
+    ],
+)
+def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: str, verdict: str) -> None:
+    results = written(tmp_path, {("procedures", HIGHEST): by_text, ("procedures-code", HIGHEST): by_code})
+    claim = one_of(claims(results), "shape change entangles most")
+    assert claim.verdict == verdict
+    assert f"**{verdict}**" in text((claim,))
+
+
+def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
+    results = written(tmp_path, {})
+    findings = results / "chain" / "findings.csv"
+    findings.write_text(findings.read_text().replace("(auxetic)", "(it is said)"))
+    with pytest.raises(InputError, match=r"chain: has no finding 'The chain widens while strained \(auxetic\)'"):
+        claims(results)
+    findings.unlink()
+    with pytest.raises(InputError, match=r"chain: has neither findings\.csv nor verdicts\.csv; analyse the study"):
+        claims(results)
+
+
+def test_what_is_shipped_says_what_the_tables_beside_it_say(tmp_path: Path) -> None:
+    found = claims(RESULTS)
+    assert (RESULTS / "CLAIMS.md").read_text(encoding="utf-8") == text(found), "run `make claims`"
+    rows = [line for line in text(found).splitlines() if line.startswith("| ") and line[2].isdigit()]
+    assert len(rows) == len(found) > 30
+    # Nothing is claimed without a number: every claim that was tested tells ours, and every other one tells why not.
+    for claim in found:
+        tested = [one for one in (claim.text, claim.code) if one is not None]
+        assert all(one.ours for one in tested)
+        assert tested or claim.why
+    with (RESULTS / "claims.csv").open(encoding="utf-8", newline="") as file:
+        assert [row["verdict"] for row in csv.DictReader(file)] == [claim.verdict for claim in found]
+
+
+def test_the_command_writes_page_and_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results = written(tmp_path, {})
+    main([str(results)])
+    assert "CLAIMS.md" in capsys.readouterr().out
+    assert (results / "CLAIMS.md").read_text(encoding="utf-8").startswith("# The paper's claims")
+    assert (results / "claims.csv").is_file()
