@@ -20,6 +20,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             sensitivity.SECTION,
             procedures.SHIPPED,
             procedures.CODE,
+            procedures.FACTORS,
             fracture.SHIPPED,
             melting.SHIPPED,
             casting.SHIPPED,

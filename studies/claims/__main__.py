@@ -22,7 +22,7 @@ command of every run; a test holds this page against them. Errors are standard e
 
 *Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: the
 opposite was found. *Not resolved*: neither. *No data*: the runs are still to be made. *On YADE*: the same finding by
-the text on the other engine, where it has runs of its own; it has no say in the verdict, but shows where engines differ.
+the text on the other engine, where it has runs of its own: no say in the verdict, but it shows where engines differ.
 """
 
 

@@ -1,4 +1,4 @@
-"""The studies `procedures` and `procedures-code`: what each does to a pile, by the paper's text and by its code."""
+"""The studies `procedures`, `procedures-code` and `factors`: by the paper's text, by its code, and one by one."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from studies.base.shipped import Shipped
 
 if TYPE_CHECKING:
+    from studies.procedures.factors import Factors
     from studies.procedures.study import Procedures
 
 
@@ -23,6 +24,12 @@ def _load_code(*, quick: bool) -> Procedures:
     return Procedures("procedures-code")
 
 
+def _load_factors(*, quick: bool) -> Factors:
+    from studies.procedures.factors import Factors  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Factors()
+
+
 SHIPPED = Shipped(
     name="procedures",
     folder=Path(__file__).parent,
@@ -31,8 +38,8 @@ SHIPPED = Shipped(
     about="""\
 shape change, external and internal oscillation of smarticles of several l/w, the latter with several
 amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): packing fraction, entanglement,
-energy, height. 87 runs, seed by seed, so that what is finished covers all points; θ that the hinge cannot
-reach at a small l/w are left out. --quick takes minutes.""",
+energy, height. 302 runs at the paper's eight l/w and counts, seed by seed, so that what is finished covers all
+points; θ that the hinge cannot reach at a small l/w are left out. --quick takes minutes.""",
 )
 
 CODE = Shipped(
@@ -42,5 +49,15 @@ CODE = Shipped(
     pictured={"procedure": "shape-change", "l_over_w": 0.7},
     about="""\
 the same by the rules of the paper's own code: a motor at its torque limit goes on at half the speed and stops after
-20 findings in a row, friction 0.2, the floor shaken alone.""",
+20 findings in a row, friction 0.2, a wall of 22.4 mm, the floor shaken alone.""",
+)
+
+FACTORS = Shipped(
+    name="factors",
+    folder=Path(__file__).parent,
+    load=_load_factors,
+    pictured={"protocol": "code", "law": "ease", "friction": 0.2, "l_over_w": 0.7},
+    about="""\
+which of these differences decides what a shape change leaves: all combinations of the motor's law, friction and the
+wall's radius, at two l/w; 128 runs.""",
 )
