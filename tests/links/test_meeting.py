@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.engine.links.contact.bars import nearest_to_box
-from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS, meet
+from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS, meet, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest_on_segments
 from dem.engine.links.contact.rims import nearest_to_circle
 
@@ -164,3 +164,25 @@ def test_a_bend_is_as_stiff_as_a_bar() -> None:
     corner = np.array([-7 * D, 7 * D, D - depth, 14 * D, -14 * D, 0])
     total = look(middle, corner, (False, False))[0] + look(barb, corner, (True, False))[0]
     assert total == pytest.approx(0.5 * KN * depth**2)
+
+
+def test_what_is_left_out_of_a_lone_contact_is_nothing() -> None:
+    rng, out, kinds = np.random.default_rng(7), np.zeros((ROWS, COLUMNS)), {True: 0, False: 0}
+    for k in range(4000):
+        p, q = segment(rng, 5e-3), segment(rng, 5e-3)
+        if k % 2:  # along each other
+            q[3:] = p[3:] * rng.choice([-1, 1]) + 0.1 * D * rng.normal(size=3)
+        # At a hinge, at an end, anywhere; so near that they touch.
+        s, t = rng.choice([0.0, 1.0, rng.uniform()]), rng.choice([0.0, 1.0, rng.uniform()])
+        q[:3] = p[:3] + s * p[3:] - t * q[3:] + 0.4 * D * rng.normal(size=3)
+        bends = bool(rng.integers(2)), bool(rng.integers(2))
+        rows = meet(p, q, D, KN, *bends, out)
+        if not rows:
+            continue
+        u, v, w = p[3:], q[3:], p[:3] - q[:3]
+        # Sums in the order in which kernels add them up.
+        (a, b, c), (d, e) = (sum(x * y) for x, y in ((u, u), (u, v), (v, v))), (sum(u * w), sum(v * w))
+        alone = meets_elsewhere(p, q, D * D, *bends, a, b, c, d, e, 1 / a, 1 / c) == 0
+        assert alone == (rows == 1 and not out[1:POINTS, 8].any()), (k, bends)
+        kinds[alone] += 1
+    assert min(kinds.values()) > 500

@@ -101,9 +101,9 @@ class Cells(NamedTuple):
         starts: (bins + 2,) where each bin begins in `order`, from the second number on.
         marks: (N S, 7) as in `Pairs`.
         centres: (N, 3) as in `Pairs`.
-        boxes: (N S, 6) lower and upper corners of boxes about links [m], by bin.
+        boxes: (6, N S) lower and upper corners of boxes about links [m], by bin; many are asked for one coordinate.
         lines: (N S, 8) their segments, skins [m] and inverse squared lengths [1/m²], by bin.
-        close: (N S,) places in `order` of links that may be near the one that is looked at.
+        close: (2 N S,) places in `order` of links that may be near the one that is looked at; then scratch.
         places: (N S,) which row of the list each link's pairs are in.
         rows: (N S + 2,) where the list's rows begin.
         lower: (P,) links with the lower numbers, as pairs are found.
@@ -337,9 +337,9 @@ def cells_for(links: int, smarticles: int, capacity: int) -> Cells:
         np.zeros(BINS * links + 66, np.int32),
         np.zeros((links, 7)),
         np.zeros((smarticles, 3)),
-        np.zeros((links, 6)),
+        np.zeros((6, links)),
         np.zeros((links, 8)),
-        np.zeros(links, np.int32),
+        np.zeros(2 * links, np.int32),
         np.zeros(links, np.int32),
         np.zeros(links + 2, np.int32),
         np.zeros(capacity, np.int32),

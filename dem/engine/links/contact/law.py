@@ -59,11 +59,13 @@ def resist(
     squared = stiffness * stiffness * length
     damping = law.shear_damping * weight
     slip[3] = 0.5 * stiffness * length
-    if squared > limit * limit:
-        cut = limit / math.sqrt(squared)
-        sx, sy, sz = sx * cut, sy * cut, sz * cut
-        damping = 0.0
-        slip[3] *= cut * cut
+    # Selections rather than a branch, which nobody could predict. The root of a square is exact: below the limit the
+    # ratio is 1 at least.
+    ratio = limit / math.sqrt(squared)
+    cut = ratio if ratio < 1.0 else 1.0
+    damping = 0.0 if squared > limit * limit else damping
+    sx, sy, sz = sx * cut, sy * cut, sz * cut
+    slip[3] *= cut * cut
     slip[0], slip[1], slip[2] = sx, sy, sz
     viscous = normal - load
     return (

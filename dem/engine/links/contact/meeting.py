@@ -121,6 +121,57 @@ def meet_at(
 
 
 @inlined
+def meets_elsewhere(
+    p: Array, q: Array, reach: float, bend_p: bool, bend_q: bool,
+    a: float, b: float, c: float, d: float, e: float, inverse_a: float, inverse_c: float,
+) -> int:  # fmt: skip
+    """Number of places besides the nearest points at which `meet_at` would find forces; 0 for most links that touch.
+
+    Without a branch: what links do at their ends and hinges cannot be predicted, and a branch that is mispredicted
+    takes as long as all of this. The numbers are those of `_lie_along` and `_hinge`, bit for bit.
+
+    Args:
+        p: as in `meet_at`.
+        q: as in `meet_at`.
+        reach: square of the diameter [m²].
+        bend_p: as in `meet_at`.
+        bend_q: as in `meet_at`.
+        a: as in `meet_at`.
+        b: as in `meet_at`.
+        c: as in `meet_at`.
+        d: as in `meet_at`.
+        e: as in `meet_at`.
+        inverse_a: as in `meet_at`.
+        inverse_c: as in `meet_at`.
+    """
+    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    start, end = -d * inverse_a, (b - d) * inverse_a
+    # Rounding keeps their order: b < 0 where the end is the lower one. Not -0, whose sign would tell.
+    lower, upper = min(start, end), max(start, end)
+    lower_t = 0.5 - math.copysign(0.5, b + 0.0)
+    upper_t = 1.0 - lower_t
+    of_start, of_end = _clamp(e * inverse_c), _clamp((b + e) * inverse_c)
+    s1, t1 = 0.0 if lower <= 0.0 else lower, of_start if lower <= 0.0 else lower_t
+    s2, t2 = 1.0 if upper >= 1.0 else upper, of_end if upper >= 1.0 else upper_t
+    first = _squared(wx + s1 * p[3] - t1 * q[3], wy + s1 * p[4] - t1 * q[4], wz + s1 * p[5] - t1 * q[5])
+    second = _squared(wx + s2 * p[3] - t2 * q[3], wy + s2 * p[4] - t2 * q[4], wz + s2 * p[5] - t2 * q[5])
+    along = (upper > 0.0) & (lower < 1.0) & (first < reach) & (second < reach)
+    # The hinge of the first link at the second one, that of the second at the first one, one hinge at the other.
+    of_p = _squared(wx - of_start * q[3], wy - of_start * q[4], wz - of_start * q[5])
+    s = _clamp(start)
+    of_q = _squared(p[0] + s * p[3] - q[0], p[1] + s * p[4] - q[1], p[2] + s * p[5] - q[2])
+    both = _squared(wx, wy, wz)
+    return (
+        int(along) + int(bend_p & (of_p < reach)) + int(bend_q & (of_q < reach)) + int(bend_p & bend_q & (both < reach))
+    )
+
+
+@inlined
+def _squared(x: float, y: float, z: float) -> float:
+    return x * x + y * y + z * z
+
+
+@inlined
 def _note(
     out: Array, k: int, p: Array, q: Array, s: float, t: float,
     x: float, y: float, z: float, distance: float, load: float, weight: float,

@@ -8,7 +8,7 @@ from typing import Any
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
-from dem.engine.links.contact.meeting import BARE, POINTS, meet_at
+from dem.engine.links.contact.meeting import BARE, POINTS, meet_at, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.memory import fetch
 from dem.engine.links.shape import Shape
@@ -141,11 +141,10 @@ def push_touching(
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    segments, position, motion = bodies.segments, bodies.position, bodies.motion
-    owner, kind = pairs.owner, pairs.kind
+    segments, owner, kind = bodies.segments, pairs.owner, pairs.kind
     diameter, inverses = 2 * shape.radius, shape.inverses
     reach = diameter * diameter
-    lost, many = 0.0, position.shape[0] > FEW
+    lost, many = 0.0, bodies.position.shape[0] > FEW
     for k in range(begin, stop):
         if many:
             _fetch_contact(bodies, pairs, hinged, pairs.touching[min(k + AHEAD, stop - 1)])
@@ -163,13 +162,41 @@ def push_touching(
             continue
         i, j, kind_p, kind_q = owner[p], owner[q], kind[p], kind[q]
         distance = math.sqrt(squared)
-        found = 1 + meet_at(
-            segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, a, b, c, d, e, s, t,
-            inverses[kind_p], inverses[kind_q], x, y, z, distance, out,
-        )  # fmt: skip
         row_i, row_j = i, j
         if hinged is not None:
             row_i, row_j = 3 * i + kind_p, 3 * j + kind_q
+        inverse_p, inverse_q = inverses[kind_p], inverses[kind_q]
+        others = meets_elsewhere(
+            segments[p], segments[q], reach, kind_p != 1, kind_q != 1, a, b, c, d, e, inverse_p, inverse_q
+        )
+        if (others == 0) & (distance < diameter):
+            # Nine of ten: one point, and nothing that a branch would have to be predicted for.
+            px = 0.5 * (segments[p, 0] + s * ux + segments[q, 0] + t * vx)
+            py = 0.5 * (segments[p, 1] + s * uy + segments[q, 1] + t * vy)
+            pz = 0.5 * (segments[p, 2] + s * uz + segments[q, 2] + t * vz)
+            inverse, load = 1 / distance, law.stiffness * (diameter - distance)
+            nx, ny, nz = x * inverse, y * inverse, z * inverse
+            mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
+            slip, twist = pairs.slip[pair, 0], 0.5 * dt * turning
+            stored = slip[3]
+            fx, fy, fz = resist(law, load, 1.0, nx, ny, nz, mx, my, mz, twist, dt, slip)
+            if ledger is not None:
+                known = 0.5 * dt * (fx * mx + fy * my + fz * mz) + slip[3] - stored
+                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, known)
+            fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
+            push(shape, bodies, i, kind_p, hinged, px, py, pz, fx, fy, fz)
+            push(shape, bodies, j, kind_q, hinged, px, py, pz, -fx, -fy, -fz)
+            if pairs.used[pair] & ~1:
+                lost += _forget(pairs, pair, pairs.used[pair] & ~1)
+            pairs.used[pair] = 1
+            depth = diameter - distance + dt * max(0.0, -(mx * nx + my * ny + mz * nz))
+            bodies.deepest[i] = max(bodies.deepest[i], depth)
+            bodies.deepest[j] = max(bodies.deepest[j], depth)
+            continue
+        found = 1 + meet_at(
+            segments[p], segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, a, b, c, d, e, s, t,
+            inverse_p, inverse_q, x, y, z, distance, out,
+        )  # fmt: skip
         used, closing = 0, 0.0
         for slot in range(POINTS):
             weight = out[slot, 8]
@@ -179,15 +206,9 @@ def push_touching(
             px, py, pz = out[slot, 0], out[slot, 1], out[slot, 2]
             nx, ny, nz = out[slot, 3], out[slot, 4], out[slot, 5]
             load, carried = out[slot, 6], out[slot, 7]
-            rx, ry, rz = px - position[i, 0], py - position[i, 1], pz - position[i, 2]
-            gx, gy, gz = px - position[j, 0], py - position[j, 1], pz - position[j, 2]
-            ax, ay, az = motion[row_i, 3], motion[row_i, 4], motion[row_i, 5]
-            bx, by, bz = motion[row_j, 3], motion[row_j, 4], motion[row_j, 5]
-            mx = motion[row_i, 0] + ay * rz - az * ry - (motion[row_j, 0] + by * gz - bz * gy)
-            my = motion[row_i, 1] + az * rx - ax * rz - (motion[row_j, 1] + bz * gx - bx * gz)
-            mz = motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx)
+            mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
             closing = max(closing, -(mx * nx + my * ny + mz * nz))
-            twist = 0.5 * dt * ((ax + bx) * nx + (ay + by) * ny + (az + bz) * nz)
+            twist = 0.5 * dt * turning
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
             if carried > 0.0:
@@ -213,6 +234,39 @@ def push_touching(
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
+
+
+@inlined
+def motion_at(
+    bodies: Bodies, i: int, j: int, row_i: int, row_j: int,
+    x: float, y: float, z: float, nx: float, ny: float, nz: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Velocity of the first body against the second at a point [m/s]; sum of their turns about a normal [rad/s].
+
+    Args:
+        bodies: the smarticles.
+        i: the first smarticle.
+        j: the second one.
+        row_i: of the first body in `Bodies.motion`.
+        row_j: of the second one.
+        x: the point [m].
+        y: the same.
+        z: the same.
+        nx: the normal [1].
+        ny: the same.
+        nz: the same.
+    """
+    position, motion = bodies.position, bodies.motion
+    rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
+    gx, gy, gz = x - position[j, 0], y - position[j, 1], z - position[j, 2]
+    ax, ay, az = motion[row_i, 3], motion[row_i, 4], motion[row_i, 5]
+    bx, by, bz = motion[row_j, 3], motion[row_j, 4], motion[row_j, 5]
+    return (
+        motion[row_i, 0] + ay * rz - az * ry - (motion[row_j, 0] + by * gz - bz * gy),
+        motion[row_i, 1] + az * rx - ax * rz - (motion[row_j, 1] + bz * gx - bx * gz),
+        motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx),
+        (ax + bx) * nx + (ay + by) * ny + (az + bz) * nz,
+    )
 
 
 @inlined

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
+from dem.engine.links.arrays import Array, Bodies, Cells, Indices, Pairs
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
@@ -184,7 +184,34 @@ def draw_boxes(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: G
             cells.lines[m, d] = bodies.segments[p, d]
         cells.lines[m, SKIN], cells.lines[m, INVERSE] = cells.marks[p, 6], shape.inverses[pairs.kind[p]]
         for d in range(3):
-            cells.boxes[m, d], cells.boxes[m, 3 + d] = _box(cells.marks, p, d, 0.5 * grid.bare)
+            cells.boxes[d, m], cells.boxes[3 + d, m] = _box(cells.marks, p, d, 0.5 * grid.bare)
+
+
+@inlined
+def _boxed(
+    boxes: Array, close: Indices, count: int, start: int, stop: int,
+    ly: float, lz: float, hx: float, hy: float, hz: float,
+) -> int:  # fmt: skip
+    """Write places from `start` up to `stop` whose boxes overlap one into `close`, from place `count` on.
+
+    Two loops: the first one is done for several boxes at once by the processor, as it has no order to keep; in the
+    second every place is written down, and the next one over it unless it counts, without a branch.
+
+    Returns:
+        The place after the last.
+    """
+    number, room = stop - start, close.shape[0] // 2
+    if number <= 0:
+        return count
+    overlap = close[room : room + number]
+    x, low_y, low_z = boxes[0, start:stop], boxes[1, start:stop], boxes[2, start:stop]
+    high_y, high_z = boxes[4, start:stop], boxes[5, start:stop]
+    for k in range(number):
+        overlap[k] = (low_y[k] <= hy) & (high_y[k] >= ly) & (low_z[k] <= hz) & (high_z[k] >= lz) & (x[k] <= hx)
+    for k in range(number):
+        close[count] = start + k
+        count += overlap[k]
+    return count
 
 
 @part
@@ -208,37 +235,28 @@ def find_pairs(pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, nu
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(begin, stop):
         p = order[m]
-        ly, lz, hx, hy, hz = boxes[m, 1], boxes[m, 2], boxes[m, 3], boxes[m, 4], boxes[m, 5]
+        ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
         own, mine, skin = owner[p], keys[p] // nx, grid.bare + lines[m, SKIN]
         column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
+        boxed = 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
             start = starts[strip * nx + column + (1 if strip >= mine else 2)]
             if strip == mine:
                 start = m + 1
-            # Written down and overwritten without a branch, as in `tighten`.
-            hits = 0
-            for n in range(start, starts[strip * nx + last + 2]):
-                close[hits] = n
-                hits += not (
-                    (boxes[n, 1] > hy)
-                    | (boxes[n, 4] < ly)
-                    | (boxes[n, 2] > hz)
-                    | (boxes[n, 5] < lz)
-                    | (boxes[n, 0] > hx)
-                )
-            boxed, hits = hits, 0
-            for k in range(boxed):
-                n = close[k]
-                close[hits] = n
-                hits += not (off_lines(lines, m, n, skin + lines[n, SKIN]) | (owner[order[n]] == own))
-            if number + hits > capacity:
-                return -1
-            for k in range(hits):
-                n = close[k]
-                q = order[n]
-                lower[number], upper[number] = min(p, q), max(p, q)
-                number += near_each_other(lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE])
+            boxed = _boxed(boxes, close, boxed, start, starts[strip * nx + last + 2], ly, lz, hx, hy, hz)
+        hits = 0
+        for k in range(boxed):
+            n = close[k]
+            close[hits] = n
+            hits += not (off_lines(lines, m, n, skin + lines[n, SKIN]) | (owner[order[n]] == own))
+        if number + hits > capacity:
+            return -1
+        for k in range(hits):
+            n = close[k]
+            q = order[n]
+            lower[number], upper[number] = min(p, q), max(p, q)
+            number += near_each_other(lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE])
     return number
 
 
