@@ -77,6 +77,8 @@ class RunManifest:
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.
         wall_time: Wall time of a done run [s]; None otherwise.
+        taken_over: Where its smarticles come from, if from another run: `run` (as seen from this one), `frame`,
+            `sha256` of its poses, `time_s`, `fastest_m_per_s`, and that run's `scene_sha256`, `seed` and `engine`.
     """
 
     directory: Path
@@ -111,6 +113,7 @@ class RunManifest:
     end_time: float | None = None
     steps: int | None = None
     wall_time: float | None = None
+    taken_over: Mapping[str, Any] | None = None
 
     @property
     def measured_radius(self) -> float:
@@ -130,6 +133,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
     """The content of `run.json`: what made a run; how it ended is in another file."""
     plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
     measured = {} if run.packing_radius is None else {"packing_radius_m": run.packing_radius}
+    taken = {} if run.taken_over is None else {"taken_over": dict(run.taken_over)}
     return {
         "format": MANIFEST_FORMAT,
         "name": run.name,
@@ -157,6 +161,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "time_step_s": run.time_step,
         "phases": [{"index": phase.index, "type": phase.type, "time_step_s": phase.time_step} for phase in run.phases],
         **plane,
+        **taken,
     }
 
 
@@ -330,6 +335,7 @@ def read_run(directory: Path | str) -> RunManifest:
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),
+        taken_over=run.data.get("taken_over") if isinstance(run.data.get("taken_over"), dict) else None,
         **_ending(directory, phases),
     )
 
