@@ -219,7 +219,7 @@ class Account(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy that smarticles had when they were added: of motion, of gravity above z = 0, of contacts taken in [J]."""
+        """Energy of motion, of gravity above z = 0 and of contacts taken in, that smarticles were added with [J]."""
 
     @property
     def dissipated(self) -> float:

@@ -133,7 +133,6 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
     """The content of `run.json`: what made a run; how it ended is in another file."""
     plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
     measured = {} if run.packing_radius is None else {"packing_radius_m": run.packing_radius}
-    taken = {} if run.taken_over is None else {"taken_over": dict(run.taken_over)}
     return {
         "format": MANIFEST_FORMAT,
         "name": run.name,
@@ -161,7 +160,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "time_step_s": run.time_step,
         "phases": [{"index": phase.index, "type": phase.type, "time_step_s": phase.time_step} for phase in run.phases],
         **plane,
-        **taken,
+        **({} if run.taken_over is None else {"taken_over": dict(run.taken_over)}),
     }
 
 
@@ -335,7 +334,7 @@ def read_run(directory: Path | str) -> RunManifest:
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),
-        taken_over=run.data.get("taken_over") if isinstance(run.data.get("taken_over"), dict) else None,
+        taken_over=run.data.get("taken_over"),
         **_ending(directory, phases),
     )
 
