@@ -77,8 +77,7 @@ class RunManifest:
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.
         wall_time: Wall time of a done run [s]; None otherwise.
-        taken_over: Where its smarticles come from, if from another run: `run` (as seen from this one), `frame`,
-            `sha256` of its poses, `time_s`, `fastest_m_per_s`, and that run's `scene_sha256`, `seed` and `engine`.
+        taken_over: Where its smarticles come from, if from another run, see ARCHITECTURE.md; None otherwise.
     """
 
     directory: Path
