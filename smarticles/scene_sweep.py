@@ -93,6 +93,10 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         msg = f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}"
         raise InputError(msg)
+    for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
+        # Seen from its file, which the template is not beside.
+        if isinstance(phase, dict) and isinstance(phase.get("run"), str):
+            phase["run"] = str((path.parent / phase["run"]).resolve())
     return data
 
 

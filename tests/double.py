@@ -199,6 +199,9 @@ class AccountDouble:
     def elastic(self) -> tuple[float, float]:
         return 0.0, 0.0
 
+    def take_in(self) -> None:
+        pass
+
 
 @dataclass(kw_only=True)
 class EngineDouble:
@@ -320,6 +323,12 @@ class EngineDouble:
         self.account.added += boxes.mass * energy
         self.motors.angles = np.tile(boxes.angles, (self.count, 1))
         self.strings.places = self.state().link_positions
+
+    def still(self) -> None:
+        assert not self.motors.articulated
+        self.told.append(("still",))
+        self.account.dissipated += self.state().kinetic_energy
+        self.velocities[:] = 0.0
 
     def state(self) -> State:
         still = np.zeros_like(self.positions)

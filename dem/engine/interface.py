@@ -219,7 +219,7 @@ class Account(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy of motion, and of gravity above z = 0, that smarticles had when they were added [J]."""
+        """Energy of motion, of gravity above z = 0 and of contacts taken in, that smarticles were added with [J]."""
 
     @property
     def dissipated(self) -> float:
@@ -231,6 +231,9 @@ class Account(Protocol):
 
     def elastic(self) -> tuple[float, float]:
         """Energy in the springs of contacts and of hinges [J]."""
+
+    def take_in(self) -> None:
+        """Count what the springs of contacts hold at present as added: of smarticles that were added touching."""
 
 
 class Engine(Protocol):
@@ -296,6 +299,9 @@ class Engine(Protocol):
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
+
+    def still(self) -> None:
+        """Bring all smarticles to rest where they are, while welded; their kinetic energy is dissipated."""
 
     def state(self) -> State:
         """Poses and velocities of all smarticles.

@@ -18,7 +18,7 @@ class Arrange(Part, Phase):
     """Lay the smarticles out as a chain, ⊔-⊓-⊔…, each hooked into the next; takes no time."""
 
     planar: ClassVar[bool | None] = True
-    lays_out: ClassVar[bool] = True
+    begins: ClassVar[bool] = True
     type: Literal["arrange"]
     gap_m: Length = Field(..., description="free distance of neighbours where they will touch first [m]")
 

@@ -12,22 +12,11 @@ from dem.body.placement import place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.setting.part import Duration, Part, Speed
+from dem.phases.settling import SETTLE_SECONDS, Settle, has_settled
+from dem.setting.part import Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
 LAYER_SECONDS = 0.125  # from a layer of a pour to the next, about; measured on both engines, N = 100 … 270
-SETTLE_SECONDS = 0.35  # of a pile that was poured, about
-
-
-class Settle(Part):
-    """When a pile counts as settled: all hold at every look over a stretch of time."""
-
-    speed_m_per_s: Speed = Field(0.02, description="largest speed of any smarticle [m/s]")
-    unbalanced_force: float = Field(
-        0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
-    )
-    hold_s: float = Field(0.05, ge=0, le=1e6, description="how long both must hold [s]")
-    timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
 
 
 class Deposit(Part, Phase):
@@ -36,6 +25,7 @@ class Deposit(Part, Phase):
     A layer is poured just above the pile when the last one has come down; or by the clock, from the top of the wall.
     """
 
+    begins: ClassVar[bool] = True
     pours: ClassVar[bool] = True
     type: Literal["deposit"]
     per_layer: int = Field(10, ge=1, le=100_000, description="smarticles per layer [1]")
@@ -130,7 +120,7 @@ class Pouring:
             return every
         if memory["layer"]:
             self._look_at_layer(engine)
-        elif not memory["left"] and self._has_settled(engine):
+        elif not memory["left"] and has_settled(self._phase.settle, memory, engine):
             return 0.0
         if memory["left"] and not memory["layer"]:
             self._pour(engine)
@@ -156,23 +146,6 @@ class Pouring:
                 f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
             )
             raise RunError(msg)
-
-    def _has_settled(self, engine: Engine) -> bool:
-        settle: Settle = self._phase.settle
-        speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
-        unbalanced = engine.unbalanced_force()
-        still = speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force
-        self.memory["still"] = self.memory["still"] + CHECK_INTERVAL if still else 0.0
-        if self.memory["still"] > settle.hold_s:
-            return True
-        if self.memory["waited"] > settle.timeout_s:
-            msg = (
-                f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
-                f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
-                f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
-            )
-            raise RunError(msg)
-        return False
 
 
 def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng: np.random.Generator) -> None:

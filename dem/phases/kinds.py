@@ -16,9 +16,11 @@ from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.shape_change import ShapeChange
 from dem.phases.strain import Strain
+from dem.phases.take_over import TakeOver
 
 AnyPhase = Annotated[
     Deposit
+    | TakeOver
     | Relax
     | Shake
     | Actuate

@@ -46,12 +46,14 @@ class Phase:
 
     actuates: ClassVar[bool] = False
     """Whether motors move the barbs in it, or hold them."""
+    begins: ClassVar[bool] = False
+    """Whether it brings the smarticles: a run begins with one such phase and has no other."""
+    sources: ClassVar[frozenset[str]] = frozenset()
+    """Keys that say where something comes from whose content another key pins; a scene's hash leaves them out."""
     pours: ClassVar[bool] = False
     """Whether the pile grows from nothing in it."""
     frees: ClassVar[bool] = False
     """Whether it takes the container away."""
-    lays_out: ClassVar[bool] = False
-    """Whether it puts smarticles into a plane."""
     planar: ClassVar[bool | None] = False
     """Whether it has a meaning in a plane only (True), outside of one only (False), or in either (None)."""
 
@@ -66,6 +68,18 @@ class Phase:
         Raises:
             ValueError: one line with key, value and the way out.
         """
+
+    def ready(self, scene: SceneView) -> None:
+        """Refuse to begin a run where something that it needs is gone since the scene was read.
+
+        Raises:
+            InputError: one line with key, value and the way out.
+        """
+
+    @property
+    def origin(self) -> Mapping[str, Any] | None:
+        """What a run's manifest is to say of the run that its smarticles come from; None: they are its own."""
+        return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         """What is no reason to refuse it: one line each with key, value and the way out."""

@@ -219,4 +219,4 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
 
 def _activity(scene: Scene) -> str:
     kinds = dict.fromkeys(phase.type for phase in scene.phases)
-    return " ".join(kind for kind in kinds if kind not in ("deposit", "relax"))
+    return " ".join(kind for kind in kinds if kind not in ("deposit", "take-over", "relax"))

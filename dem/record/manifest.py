@@ -77,6 +77,7 @@ class RunManifest:
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.
         wall_time: Wall time of a done run [s]; None otherwise.
+        taken_over: Where its smarticles come from, if from another run, see ARCHITECTURE.md; None otherwise.
     """
 
     directory: Path
@@ -111,6 +112,7 @@ class RunManifest:
     end_time: float | None = None
     steps: int | None = None
     wall_time: float | None = None
+    taken_over: Mapping[str, Any] | None = None
 
     @property
     def measured_radius(self) -> float:
@@ -157,6 +159,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "time_step_s": run.time_step,
         "phases": [{"index": phase.index, "type": phase.type, "time_step_s": phase.time_step} for phase in run.phases],
         **plane,
+        **({} if run.taken_over is None else {"taken_over": dict(run.taken_over)}),
     }
 
 
@@ -330,6 +333,7 @@ def read_run(directory: Path | str) -> RunManifest:
         sphere_diameter=run.number("sphere_diameter_m", positive=True),
         spheres_per_smarticle=run.integer("spheres_per_smarticle", least=1),
         time_step=run.number("time_step_s", positive=True),
+        taken_over=run.data.get("taken_over"),
         **_ending(directory, phases),
     )
 

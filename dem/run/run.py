@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import platform
 import subprocess
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import h5py
 import meshio
@@ -72,16 +74,20 @@ def run_scene(
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
     steps, made_by, threads = builders.steps(scene), (kind.name, kind.version()), kind.threads()
+    if not resume:
+        _check_sources(scene)
     with claimed(out, resume=resume):
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
                 return None
+            if not has_checkpoint(out):
+                _check_sources(scene)
         else:
             write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads))
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
-            write_text(out / SCENE, dump_scene(scene))
+            write_text(out / SCENE, dump_scene(scene, out))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
             return _run(
@@ -95,6 +101,12 @@ def run_scene(
                 progress=progress,
                 resume=resume,
             )
+
+
+def _check_sources(scene: Scene) -> None:
+    """Refuse to begin what cannot begin any more."""
+    for phase in scene.phases:
+        phase.ready(scene)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -260,7 +272,14 @@ def manifest(
         status="unfinished",
         planar=scene.plane is not None,
         channel_width=None if scene.plane is None else scene.plane.width_m,
+        taken_over=_origin(scene, out),
     )
+
+
+def _origin(scene: Scene, out: Path) -> dict[str, Any] | None:
+    """What the manifest says of the run that smarticles come from, by a path that holds where both are moved."""
+    origin = scene.phases[0].origin
+    return None if origin is None else {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -28,12 +29,13 @@ YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 """Keys of phases that are younger than the format, by type of phase, with their defaults."""
 
 
-def parse_scene(data: Any, *, source: str) -> Scene:
+def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     """Validate plain data.
 
     Args:
         data: the content of a scene file.
         source: file name for messages.
+        folder: where directories of other runs are seen from; by default the working directory.
 
     Raises:
         InputError: one line with file, key, value and the way out.
@@ -56,7 +58,7 @@ def parse_scene(data: Any, *, source: str) -> Scene:
         msg = f"{source}: schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
         raise InputError(msg)
     try:
-        return Scene.model_validate(data)
+        return Scene.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         msg = f"{source}: {refusals(error, data, described='`smarticles schema`')}"
         raise InputError(msg) from None
@@ -91,7 +93,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     data = parse_yaml(text, str(path))
     for override in overrides if isinstance(data, Mapping) else ():
         apply_override(data, override)
-    return parse_scene(data, source=str(path))
+    return parse_scene(data, source=str(path), folder=path.parent)
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
@@ -116,14 +118,29 @@ def _leave_out(data: dict[str, Any], defaults: Mapping[str, Any]) -> None:
             del data[key]
 
 
-def dump_scene(scene: Scene) -> str:
-    """The resolved scene as YAML, every default written out."""
-    return str(yaml.safe_dump(_plain(scene), sort_keys=False, allow_unicode=True))
+def dump_scene(scene: Scene, folder: Path | None = None) -> str:
+    """The resolved scene as YAML, every default written out.
+
+    Args:
+        scene: the scene.
+        folder: of the file that it is written to, where directories of other runs are seen from; None: nobody knows,
+            and they are written in full.
+    """
+    data = _plain(scene)
+    if folder is not None:
+        for phase in data["phases"]:
+            if "run" in phase:
+                phase["run"] = os.path.relpath(phase["run"], folder.resolve())
+    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
 
 
 def scene_hash(scene: Scene) -> str:
-    """SHA-256 of the canonical JSON of the resolved scene."""
-    text = json.dumps(_plain(scene), sort_keys=True, separators=(",", ":"))
+    """SHA-256 of the canonical JSON of the resolved scene, without what says where pinned content comes from."""
+    data = _plain(scene)
+    for told, phase in zip(data["phases"], scene.phases, strict=True):
+        for key in phase.sources:
+            del told[key]
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -43,10 +43,10 @@ def _check_space(scene: SceneView) -> None:
 
 
 def _check_order(scene: SceneView) -> None:
-    pours = [phase.pours for phase in scene.phases]
-    if not pours[0] or sum(pours) > 1:
+    begins = [phase.begins for phase in scene.phases]
+    if not begins[0] or sum(begins) > 1:
         kinds = ", ".join(phase.kind for phase in scene.phases)
-        msg = f"phases: got {kinds}; a run starts with one 'deposit' and has no other"
+        msg = f"phases: got {kinds}; a run starts with one 'deposit' or one 'take-over' and has no other"
         raise ValueError(msg)
 
 
@@ -56,7 +56,7 @@ def _check_plane(scene: SceneView) -> None:
         if phase.planar is False:
             msg = f"phases.{index}: {phase.kind} has no meaning in a plane; use {planar}, or leave plane out"
             raise ValueError(msg)
-        if phase.lays_out != (index == 0):
+        if phase.begins != (index == 0):
             msg = f"phases.{index}: {phase.kind}; a run in a plane starts with one 'arrange' and has no other"
             raise ValueError(msg)
     if scene.hooks is not None:

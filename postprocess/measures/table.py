@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
 
-PASSIVE_PHASES = frozenset({"deposit", "relax"})
+PASSIVE_PHASES = frozenset({"deposit", "take-over", "relax"})
 """Types of phase in which nothing drives the pile; all others count as activity."""
 
 LAST_FRAMES = 20

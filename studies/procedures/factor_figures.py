@@ -52,7 +52,7 @@ def draw(
         first.invert_yaxis()
         figure.tight_layout()
         figures.add_footer(figure, footer)
-        return figures.save(figure, output / "factors.png")
+        return figures.save(figure, output / "factors")
 
 
 def _named(row: pd.Series) -> str:

@@ -61,7 +61,8 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
     for index, values in enumerate([*assigned, *again]):
         name = _run_name(sweep, values)
         data = render_yaml(sweep.template_text, values, str(sweep.template))
-        scene = parse_scene(data, source=f"{sweep.template}, rendered for run {name}")
+        source = f"{sweep.template}, rendered for run {name}"
+        scene = parse_scene(data, source=source, folder=sweep.template.parent)
         points.append(
             Point(
                 name=name,

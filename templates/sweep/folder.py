@@ -281,7 +281,7 @@ def create_folder(
     for point in points:
         file = folder.path / "scenes" / f"{point.name}.yaml"
         if not file.exists():
-            write_text(file, dump_scene(point.scene))
+            write_text(file, dump_scene(point.scene, file.parent))
     return folder
 
 

@@ -39,6 +39,10 @@ class LinksAccount:
         """See the interface; hinges have no springs."""
         return self._world.look().elastic_energy, 0.0
 
+    def take_in(self) -> None:
+        """See the interface."""
+        self.added += self.elastic()[0]
+
     def removed(self, remove: Callable[[], None]) -> None:
         """Do something that takes contacts away; what their springs held is dissipated."""
         counted = self._world.ledger is not None

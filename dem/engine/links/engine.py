@@ -20,6 +20,7 @@ from dem.engine.interface import Saved
 from dem.engine.links.account import LinksAccount
 from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
 from dem.engine.links.motors import LinksMotors
+from dem.engine.links.stepping import LOST
 from dem.engine.links.strings import LinksStrings
 from dem.engine.links.world import World
 from dem.errors import InputError
@@ -148,6 +149,14 @@ class LinksEngine:
         mass, new = self.particle.boxes.mass, len(poses.positions)
         self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
+
+    def still(self) -> None:
+        """See the interface."""
+        assert not self.motors.articulated  # links that are at rest would be told otherwise by their motors
+        world = self._world
+        world.totals[LOST] += self.state().kinetic_energy
+        for moving in (world.bodies.velocity, world.bodies.momentum, world.bodies.spin):
+            moving[:] = 0.0
 
     def state(self) -> State:
         """See the interface."""

@@ -34,7 +34,7 @@ class YadeAccount:
         self.container_work = 0.0
         """Work of moving fixtures, and of strings, on the smarticles since the start [J]."""
         self.added = 0.0
-        """Gravitational energy above z = 0 that smarticles had when they were added [J]."""
+        """Energy of smarticles when they were added, in height and in contacts that were taken in [J]."""
         self.dissipated = 0.0
         """Energy dissipated since the start, by contacts, hinges and welding [J]; sampled, see `Meter`."""
         self._assembly = assembly
@@ -69,6 +69,10 @@ class YadeAccount:
         """Energy in the springs of contacts and of hinges [J]."""
         hinges = self._assembly.hinges
         return self._meter.contacts({}).elastic_energy, 0.0 if hinges is None else hinges.elastic_energy()
+
+    def take_in(self) -> None:
+        """Count what the springs of contacts hold as added."""
+        self.added += self.elastic()[0]
 
     @property
     def given(self) -> float:

@@ -140,6 +140,15 @@ class Assembly:
             )
         return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
 
+    def still(self) -> None:
+        """Take all velocities away, while welded."""
+        assert self.hinges is None  # links that are at rest would be told otherwise by their motors
+        nought, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
+        # Contact laws read the members' own velocities, before the integrator has moved them.
+        for state in (*self._states, *(bodies[sphere].state for spheres in self._spheres for sphere in spheres)):
+            state.vel = state.angVel = nought
+            state.angMom = nought
+
     def _check(self, table: Array) -> None:
         broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
         refuse(

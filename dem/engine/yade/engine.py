@@ -189,6 +189,11 @@ class YadeEngine:
         self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
 
+    def still(self) -> None:
+        """See the interface."""
+        self.account.dissipated += self.state().kinetic_energy
+        self._assembly.still()
+
     def set_time_step(self, time_step: float) -> None:
         """Take steps of another length [s] from now on.
 

@@ -1,0 +1,361 @@
+"""The phase that takes over the smarticles of another run, on whatever engine that one was computed.
+
+A frame holds poses to the last bit, and no contacts: what springs of friction held is forgotten, and smarticles begin
+at rest. On another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each
+other's valleys, smooth links do not. What overlaps by that is let apart without speed, before time goes on freely.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+
+from dem.body.fitting import fitted_poses
+from dem.body.placement import Poses
+from dem.engine.interface import Engine
+from dem.errors import InputError, RunError, shown
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
+from dem.phases.settling import Settle, has_settled
+from dem.record.taken import LAST, Taken, take
+from dem.setting.hooks import Cross
+from dem.setting.part import Part
+
+Array = NDArray[np.float64]
+
+TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
+STRIDE = 10  # steps between looks at whether what overlaps flies apart; a contact swings in about as many
+# Sphere diameters that a vertex may be from its place in the scene's shape. A hinge on YADE gives way by 0.01 in a
+# pile, and contacts at rest are about as deep, so that it makes no more overlap than there is.
+MOST_OFF = 0.02
+_SHAPE = {  # keys of a smarticle, and what the manifest of a run calls them
+    "aspect_ratio": "aspect_ratio",
+    "middle_length_m": "middle_length",
+    "thickness_normal_m": "thickness_normal",
+    "thickness_in_plane_m": "thickness_in_plane",
+}
+
+
+class TakeOver(Part, Phase):
+    """Begin with the smarticles of another run, of any engine, at rest where a frame of it has them; they settle."""
+
+    begins: ClassVar[bool] = True
+    sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
+    type: Literal["take-over"]
+    run: str = Field(..., min_length=1, description="directory of the run, as seen from the scene file")
+    frame: Annotated[int, Field(ge=0)] | Literal["last"] = Field(
+        "last",
+        description="number of the frame, as in the name of its file; last: of a run that is done, resolved when the "
+        "scene is read",
+    )
+    sha256: str | None = Field(
+        None,
+        description="of the frame's vertices above the floor; by default filled in when the scene is read, so that a "
+        "source which has changed since is noticed. It counts for the scene's hash, directory and number do not",
+    )
+    settle: Settle = Field(default_factory=Settle, description="when the pile counts as settled")
+
+    @field_validator("run")
+    @classmethod
+    def _seen_from_the_scene(cls, value: str, info: ValidationInfo) -> str:
+        folder = (info.context or {}).get("folder") or Path()
+        return str((Path(folder) / value).resolve())
+
+    @field_validator("frame", mode="before")
+    @classmethod
+    def _number_or_last(cls, value: Any) -> Any:
+        if value != LAST and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
+            msg = f"{shown(value)} is no frame; use its number, from 0, or {LAST}"
+            raise ValueError(msg)
+        return value
+
+    @field_validator("sha256")
+    @classmethod
+    def _a_hash(cls, value: str | None) -> str | None:
+        if value is not None and not re.fullmatch("[0-9a-f]{64}", value):
+            msg = f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in"
+            raise ValueError(msg)
+        return value
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _pinned(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """What is meant today: the number of the last frame, and the hash of its content."""
+        made = handler(data)
+        if made.sha256 is not None and made.frame != LAST:
+            return made
+        taken = take(Path(made.run), made.frame)
+        pinned = {"frame": taken.number, "sha256": made.sha256 or taken.sha256}
+        # What was filled in here was not said: another run in its place has a hash of its own.
+        return cast("Self", cls.model_construct(_fields_set=made.model_fields_set, **{**dict(made), **pinned}))
+
+    @cached_property
+    def taken(self) -> Taken:
+        """The frame.
+
+        Raises:
+            InputError: it is not there, or not what the scene was made from.
+        """
+        taken = take(Path(self.run), self.frame)
+        if taken.sha256 != self.sha256:
+            msg = (
+                f"sha256: {taken} has other poses than those that the scene was made from ({taken.sha256[:12]}… "
+                f"instead of {str(self.sha256)[:12]}…); put that run back, or leave sha256 out to take what is there"
+            )
+            raise InputError(msg)
+        return taken
+
+    def check(self, scene: SceneView, index: int) -> None:
+        """See `Phase.check`: the frame's smarticles are the scene's, and fit into its container.
+
+        A source that is gone is no reason to refuse a scene that was run; `ready` refuses to run one.
+        """
+        if scene.gravity_m_per_s2 == 0:
+            msg = "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
+            raise ValueError(msg)
+        try:
+            taken = self.taken
+        except InputError:
+            return
+        poses_of(scene, taken)
+
+    def ready(self, scene: SceneView) -> None:
+        """See `Phase.ready`."""
+        try:
+            taken = self.taken
+        except InputError as error:
+            msg = f"phases.0.{error}"
+            raise InputError(msg) from None
+        poses_of(scene, taken)
+
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """See `Phase.origin`."""
+        taken = self.taken
+        return {
+            "run": self.run,
+            "frame": self.frame,
+            "sha256": self.sha256,
+            "time_s": taken.frame.time,
+            "fastest_m_per_s": taken.fastest,
+            "scene_sha256": taken.run.scene_sha256,
+            "seed": taken.run.seed,
+            "engine": taken.run.engine,
+        }
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        """See `Phase.warnings`."""
+        try:
+            taken = self.taken
+        except InputError:
+            return ()
+        limit = self.settle.speed_m_per_s
+        if taken.fastest < limit:
+            return ()
+        return (
+            f"phases.0.frame: {taken} is not at rest, up to {taken.fastest:.3g} m/s (settle.speed_m_per_s is {limit:g} "
+            "m/s), and velocities are not taken over; use a frame at the end of a relax phase",
+        )
+
+    @property
+    def known_duration(self) -> None:
+        """See `Phase.known_duration`."""
+        return
+
+    def expected_duration(self, count: int) -> float:
+        """See `Phase.expected_duration`: nothing falls, so that little more than the hold is needed."""
+        return self.settle.hold_s + TAKEN_SECONDS
+
+    def begin(self, scene: SceneView, index: int) -> Stage:
+        """See `Phase.begin`."""
+        return TakingOver(self, scene)
+
+
+class TakingOver:
+    """All smarticles are put in at once, at rest; what overlaps is let apart without speed; then the pile settles."""
+
+    def __init__(self, phase: TakeOver, scene: SceneView) -> None:
+        self._phase = phase
+        self._scene = scene
+        # `task`: what is due; `stops`: how often smarticles were stopped; `height` [m] of their mean when they were put
+        # in; `waited` [s] since; `still` [s] that the pile has been.
+        self.memory: Memory = {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
+
+    def proceed(self, engine: Engine) -> float:
+        """See `Stage.proceed`."""
+        wait = self._do(engine)
+        self.memory["waited"] += wait
+        return wait
+
+    def _do(self, engine: Engine) -> float:
+        memory, settle, stride = self.memory, self._phase.settle, STRIDE * engine.time_step
+        if memory["task"] == "put":
+            self._phase.ready(self._scene)
+            engine.add(poses_of(self._scene, self._phase.taken))
+            memory.update(task="count", height=_mean_height(engine))
+            return engine.time_step
+        if memory["task"] == "count":
+            # Contacts are known from the first step on.
+            engine.account.take_in()
+            memory["task"] = "let apart"
+            return stride
+        if memory["task"] == "let apart":
+            fastest = float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
+            if fastest > settle.speed_m_per_s + stride * engine.gravity:
+                self._stop(engine, fastest)
+                return stride
+            memory["task"] = "settle"
+            self._tell(engine)
+        return 0.0 if has_settled(settle, memory, engine) else CHECK_INTERVAL
+
+    def _stop(self, engine: Engine, fastest: float) -> None:
+        settle: Settle = self._phase.settle
+        if self.memory["waited"] > settle.timeout_s:
+            msg = (
+                f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up to "
+                f"{fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
+                "phases.0.settle.speed_m_per_s, or pour on this engine"
+            )
+            raise RunError(msg)
+        engine.still()
+        self.memory["stops"] += 1
+
+    def _tell(self, engine: Engine) -> None:
+        memory = self.memory
+        if memory["stops"]:
+            memory["warning"] = (
+                f"poses of {self._phase.run} overlap as this scene has its links (engine, fidelity): smarticles were "
+                f"stopped {memory['stops']} times in {memory['waited']:.3g} s while contacts let them apart, and stand "
+                f"{1e3 * (_mean_height(engine) - memory['height']):.2g} mm higher on average"
+            )
+
+
+def _mean_height(engine: Engine) -> float:
+    return float(engine.state().positions[:, 2].mean())
+
+
+def poses_of(scene: SceneView, taken: Taken) -> Poses:
+    """The smarticles of a frame as poses of the scene's own.
+
+    Raises:
+        InputError: they are others, or do not fit into its container; one line with key, value and the way out.
+    """
+    if taken.run.planar:
+        msg = f"phases.0.run: {taken.run.directory} is a run in a plane; take over one in a container"
+        raise InputError(msg)
+    _check_smarticle(scene, taken)
+    _check_room(scene, taken)
+    poses, off = fitted_poses(scene.particle.boxes, taken.vertices)
+    if off.max() > MOST_OFF * scene.sphere_diameter:
+        _refuse_angles(scene, taken)
+    return poses
+
+
+def _check_smarticle(scene: SceneView, taken: Taken) -> None:
+    for key, name in _SHAPE.items():
+        here, there = getattr(scene.smarticle, key), getattr(taken.run, name)
+        if not math.isclose(here, there, rel_tol=1e-9):
+            unit = "" if key == "aspect_ratio" else " m"
+            msg = (
+                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run.directory}, which phases.0 "
+                "(take-over) takes over; use the same, or another run"
+            )
+            raise InputError(msg)
+    if taken.frame.count != scene.count:
+        whole = "" if taken.frame.count == taken.run.count else f" of {taken.run.count}, poured so far"
+        msg = (
+            f"count: {scene.count} here, but {taken}, which phases.0 (take-over) takes over, holds "
+            f"{taken.frame.count}{whole}; use the same, or another frame"
+        )
+        raise InputError(msg)
+    straight = scene.smarticle.aspect_ratio == 0 or scene.smarticle.angles_deg == (0.0, 0.0)
+    if straight and scene.fidelity.rows > 1:
+        msg = (
+            f"fidelity.rows: {scene.fidelity.rows}, but frames do not know how a straight smarticle is turned about "
+            "its length, which phases.0 (take-over) needs for more than 1; use 1, or angles_deg that are not 0"
+        )
+        raise InputError(msg)
+
+
+def _check_room(scene: SceneView, taken: Taken) -> None:
+    """No link's axis may lie outside the wall, under the floor or in a hook, from where no contact pushes it back."""
+    cylinder, vertices = scene.cylinder, taken.vertices
+    heights, off_axis = vertices[..., 2], np.hypot(vertices[..., 0], vertices[..., 1])
+    room = cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)
+    beyond = (off_axis > room).any(axis=1)
+    if beyond.any():
+        msg = (
+            f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, which phases.0 "
+            f"(take-over) takes over, reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider "
+            "container or another run"
+        )
+        raise InputError(msg)
+    if heights.max() > cylinder.height or heights.min() < 0:
+        msg = (
+            f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, which phases.0 (take-over) "
+            f"takes over, lie at {heights.min():.4g} to {heights.max():.4g} m; use a higher container or another run"
+        )
+        raise InputError(msg)
+    for name, cross in zip(("lower", "upper"), scene.hooks.crosses if scene.hooks else (), strict=False):
+        inside = _in_cross(cross, vertices)
+        if inside.any():
+            msg = (
+                f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, which phases.0 "
+                "(take-over) takes over, lie in this hook; take over a run that was poured with these hooks"
+            )
+            raise InputError(msg)
+
+
+def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
+    """(N,) whether the axis of a link of each smarticle passes through a bar, looked at in steps of a quarter of it."""
+    ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
+    longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
+    shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
+    points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
+    above = points - [0.0, 0.0, cross.height]
+    inside = [(np.abs(above) < extents).all(axis=-1).any(axis=-1) for extents in cross.half_extents]
+    found: NDArray[np.bool_] = np.logical_or.reduce(inside)
+    return found
+
+
+def _refuse_angles(scene: SceneView, taken: Taken) -> NoReturn:
+    angles = _angles(taken)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    told = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
+    here = scene.smarticle.angles_deg
+    middle = (low + high) / 2
+    # Of barbs that stand alike a scene can be made.
+    alike = float((high - low).max()) / 2 * math.pi / 180 * scene.particle.boxes.barb_length
+    way_out = (
+        f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
+        if alike < MOST_OFF * scene.sphere_diameter
+        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
+    )
+    msg = (
+        f"smarticle.angles_deg: ({here[0]:g}, {here[1]:g}) here, but the barbs of {taken}, which phases.0 (take-over) "
+        f"takes over, stand at {told}; {way_out}"
+    )
+    raise InputError(msg)
+
+
+def _angles(taken: Taken) -> Array:
+    """(N, 2) angles of the barbs [deg]; of a run whose frames do not tell them without their sign."""
+    recorded = taken.frame.cell_data.get("angle_rad")
+    if recorded is not None:
+        told: Array = np.degrees(recorded[:, [0, 2]])
+        return told
+    tip_1, hinge_1, hinge_2, tip_2 = np.moveaxis(taken.vertices, 1, 0)
+    along = hinge_2 - hinge_1
+    cosines = [
+        np.einsum("ni,ni->n", way, barb) / np.linalg.norm(way, axis=1) / np.linalg.norm(barb, axis=1)
+        for way, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
+    ]
+    seen: Array = np.degrees(np.arccos(np.clip(cosines, -1, 1))).T
+    return seen

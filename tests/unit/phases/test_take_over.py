@@ -1,0 +1,429 @@
+"""Another run's smarticles taken over: how a scene names them, what is refused, and what the stage tells an engine."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+import yaml
+from double import EngineDouble, KindDouble
+from numpy.typing import NDArray
+from scenes import SMALL, changed
+
+from dem.body.fitting import fitted_poses
+from dem.engine.interface import Engine
+from dem.errors import InputError, RunError
+from dem.phases.take_over import STRIDE, TakeOver
+from dem.plan.outlook import plan
+from dem.record.frame import Frame, frame_mesh
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
+from dem.record.rundir import claimed
+from dem.run.run import run_scene
+from dem.run.simulation import Simulation
+from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.scene import Scene
+
+DT = 2e-4
+RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04}
+RELAX = {"type": "relax", "duration_s": 0.1}
+SHAKE = {"type": "shake", "duration_s": 0.1, "frequency_hz": 30, "peak_acceleration_g": 2}
+
+
+@pytest.fixture(autouse=True)
+def kind(monkeypatch: pytest.MonkeyPatch) -> KindDouble:
+    """The engine of every scene is the double."""
+    kind = KindDouble()
+    monkeypatch.setattr("dem.engine.yade.kind.YadeKind", lambda: kind)
+    return kind
+
+
+@pytest.fixture(scope="module")
+def poured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("take-over") / "pour"
+    data = changed(SMALL, {"phases.1": RELAX, "phases.2": SHAKE, "recording": RECORDING})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dem.engine.yade.kind.YadeKind", KindDouble)
+        run_scene(parse_scene(data, source="pour"), out, command="test", progress=False)
+    return out
+
+
+@pytest.fixture
+def pour(poured: Path, tmp_path: Path) -> Path:
+    """A run that is done: poured, rested, shaken."""
+    return shutil.copytree(poured, tmp_path / "pour")
+
+
+def data_of(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
+    """A scene that begins from a run; `more` keys of the first phase."""
+    first = {"type": "take-over", "run": str(run), **(more or {})}
+    return changed(SMALL, {"phases": [first, RELAX, SHAKE], "recording": RECORDING, **changes})
+
+
+def scene_of(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> Scene:
+    return parse_scene(data_of(run, more, **changes), source="bad.yaml")
+
+
+def refused(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> str:
+    with pytest.raises(InputError) as caught:
+        scene_of(run, more, **changes)
+    line = str(caught.value)
+    assert len(line.splitlines()) == 1
+    assert line.startswith("bad.yaml: ")
+    return line.removeprefix("bad.yaml: ")
+
+
+def first(scene: Scene) -> TakeOver:
+    phase = scene.phases[0]
+    assert isinstance(phase, TakeOver)
+    return phase
+
+
+def above_floor(frame: Frame) -> NDArray[np.float64]:
+    return frame.vertices - [0.0, 0.0, frame.floor_z]
+
+
+def rewrite(run: Path, number: int, change: Callable[[meshio.Mesh], None]) -> None:
+    path = read_frames(run).paths[number]
+    mesh = meshio.vtu.read(str(path))
+    change(mesh)
+    mesh.write(path, file_format="vtu")
+
+
+# -- what is taken -----------------------------------------------------------------------------------------------------
+
+
+def shaken(pour: Path) -> int:
+    """A frame in the middle of shaking, the container on its way."""
+    frames = read_frames(pour)
+    return max(range(len(frames)), key=lambda k: abs(frames[k].floor_z))
+
+
+@pytest.mark.parametrize("which", ["last", "shaken"])
+def test_a_run_begins_with_the_poses_of_the_frame_above_its_floor(
+    kind: KindDouble, pour: Path, tmp_path: Path, which: str
+) -> None:
+    number = shaken(pour) if which == "shaken" else len(read_frames(pour)) - 1
+    run_scene(
+        scene_of(pour, {"frame": "last" if which == "last" else number}),
+        tmp_path / "on",
+        command="test",
+        progress=False,
+    )
+    source, taken = read_frames(pour)[number], read_frames(tmp_path / "on")[0]
+    assert which == "last" or abs(source.floor_z) > 1e-4
+    assert taken.floor_z == 0
+    # In the double what stands stays where it is.
+    np.testing.assert_allclose(taken.vertices, above_floor(source), atol=1e-12)
+    assert kind.built[-1].told.count(("add", 10)) == 1
+    assert ("still",) not in kind.built[-1].told
+
+
+def test_the_manifest_says_whose_smarticles_they_are(pour: Path, tmp_path: Path) -> None:
+    run_scene(scene_of(pour), tmp_path / "deep" / "on", command="test", progress=False)
+    manifest, source = read_run(tmp_path / "deep" / "on"), read_run(pour)
+    assert manifest.taken_over is not None
+    told = dict(manifest.taken_over)
+    assert (tmp_path / "deep" / "on" / told.pop("run")).resolve() == pour
+    frames = read_frames(pour)
+    assert (told["frame"], told["time_s"]) == (len(frames) - 1, frames[-1].time)
+    assert (told["scene_sha256"], told["seed"], told["engine"]) == (source.scene_sha256, source.seed, source.engine)
+    assert told["fastest_m_per_s"] == np.linalg.norm(frames[-1].link_velocity, axis=-1).max() > 0
+    assert [phase.type for phase in manifest.phases] == ["take-over", "relax", "shake"]
+    assert source.taken_over is None
+
+
+def test_poses_that_move_are_told(pour: Path) -> None:
+    rested = max(k for k, frame in enumerate(read_frames(pour)) if frame.phase == 1)
+    assert plan(scene_of(pour, {"frame": rested})).warnings == ()
+    speeds = [float(np.linalg.norm(frame.link_velocity, axis=-1).max()) for frame in read_frames(pour)]
+    number = max(range(rested + 1, len(speeds)), key=speeds.__getitem__)
+    (warning,) = plan(scene_of(pour, {"frame": number})).warnings
+    assert warning.startswith(
+        f"phases.0.frame: frame {number} of {pour} is not at rest, up to {speeds[number]:.3g} m/s"
+    )
+
+
+# -- how a scene is resolved -------------------------------------------------------------------------------------------
+
+
+def test_the_hash_is_of_what_is_taken_and_not_of_where_it_lies(pour: Path, tmp_path: Path) -> None:
+    shutil.copytree(pour, tmp_path / "copy")
+    here, there = scene_of(pour), scene_of(tmp_path / "copy")
+    assert first(here).frame == len(read_frames(pour)) - 1
+    assert scene_hash(here) == scene_hash(there)
+    assert scene_hash(here) != scene_hash(scene_of(pour, {"frame": shaken(pour)}))
+    assert scene_hash(here) != scene_hash(parse_scene(changed(SMALL, {"recording": RECORDING}), source="x"))
+
+    def move(mesh: meshio.Mesh) -> None:
+        mesh.points[0, 0] += 1e-15
+
+    rewrite(tmp_path / "copy", -1, move)
+    assert scene_hash(here) != scene_hash(scene_of(tmp_path / "copy"))
+
+
+def test_a_directory_is_seen_from_the_scene_s_file(pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "scenes").mkdir()
+    file = tmp_path / "scenes" / "on.yaml"
+    file.write_text(yaml.safe_dump(data_of("../pour")), encoding="utf-8")
+    scene = load_scene(file)
+    assert first(scene).run == str(pour)
+    # Resolved, it is seen from wherever it is written to; both may be moved together.
+    moved = tmp_path / "moved"
+    (tmp_path / "runs" / "a").mkdir(parents=True)
+    (tmp_path / "runs" / "a" / "scene.yaml").write_text(dump_scene(scene, tmp_path / "runs" / "a"), encoding="utf-8")
+    moved.mkdir()
+    for name in ("runs", "pour"):
+        (tmp_path / name).rename(moved / name)
+    again = load_scene(moved / "runs" / "a" / "scene.yaml")
+    assert str(tmp_path) not in dump_scene(again, moved / "runs" / "a")
+    assert first(again).run == str(moved / "pour")
+    assert scene_hash(again) == scene_hash(scene)
+    first(again).ready(again)
+    # In Python it is seen from the working directory.
+    monkeypatch.chdir(moved)
+    assert first(Scene(**{key: value for key, value in data_of("pour").items() if key != "schema_version"})).run == str(
+        moved / "pour"
+    )
+
+
+def test_a_link_on_the_way_does_not_lead_astray(pour: Path, tmp_path: Path) -> None:
+    (tmp_path / "far" / "away").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "far" / "away")
+    folder = tmp_path / "link"
+    (folder / "scene.yaml").write_text(dump_scene(scene_of(pour), folder), encoding="utf-8")
+    assert first(load_scene(folder / "scene.yaml")).run == str(pour)
+
+
+def test_a_run_is_read_and_told_where_its_source_is_gone_but_not_run_again(pour: Path, tmp_path: Path) -> None:
+    scene = scene_of(pour)
+    run_scene(scene, tmp_path / "on", command="test", progress=False)
+    pour.rename(tmp_path / "elsewhere")
+    again = load_scene(tmp_path / "on" / "scene.yaml")
+    assert scene_hash(again) == scene_hash(scene)
+    assert plan(again).warnings == ()
+    assert run_scene(again, tmp_path / "on", command="test", progress=False, resume=True) is None
+    with pytest.raises(InputError, match=r"^phases\.0\.run: cannot read run directory .*pour: no such directory; give"):
+        run_scene(again, tmp_path / "anew", command="test", progress=False)
+    assert not (tmp_path / "anew").exists()
+
+
+def test_a_run_goes_on_from_its_checkpoint_without_its_source(
+    pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = scene_of(pour)
+    run_scene(scene, tmp_path / "straight", command="test", progress=False)
+    taken = Simulation._checkpoint
+
+    def checkpoint(simulation: Simulation) -> None:
+        taken(simulation)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "_checkpoint", checkpoint)
+        with pytest.raises(KeyboardInterrupt):
+            run_scene(scene, tmp_path / "stopped", command="test", progress=False)
+    pour.rename(tmp_path / "elsewhere")
+    run_scene(scene, tmp_path / "stopped", command="test", progress=False, resume=True)
+    ends = [read_frames(tmp_path / name)[-1].vertices for name in ("straight", "stopped")]
+    assert np.array_equal(*ends)
+
+
+def test_a_source_that_has_changed_is_noticed(pour: Path, tmp_path: Path) -> None:
+    (tmp_path / "pinned.yaml").write_text(dump_scene(scene_of(pour), tmp_path), encoding="utf-8")
+
+    def move(mesh: meshio.Mesh) -> None:
+        mesh.points[:, 0] += 1e-9
+
+    rewrite(pour, -1, move)
+    scene = load_scene(tmp_path / "pinned.yaml")
+    with pytest.raises(InputError, match=r"^phases\.0\.sha256: frame \d+ of .* has other poses .* leave sha256 out"):
+        run_scene(scene, tmp_path / "on", command="test", progress=False)
+
+
+def test_what_was_not_said_is_filled_in_anew(pour: Path, tmp_path: Path) -> None:
+    """Who changes the run of a scene that was read gets that run's last frame, not a hash that cannot be."""
+    said = scene_of(pour).model_dump(exclude_unset=True)["phases"][0]
+    assert said == {"type": "take-over", "run": str(pour)}
+
+
+def test_the_schema_knows_it() -> None:
+    keys = json_schema()["$defs"]["TakeOver"]
+    assert keys["required"] == ["type", "run"]
+    assert set(keys["properties"]) == {"type", "run", "frame", "sha256", "settle"}
+
+
+# -- what is refused ---------------------------------------------------------------------------------------------------
+
+
+def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
+    frames = read_frames(pour)
+    assert refused(tmp_path / "none").startswith("phases.0.run: cannot read run directory")
+    (tmp_path / "sweep").mkdir()
+    (tmp_path / "sweep" / "sweep.json").write_text("{}")
+    assert "it is a sweep; give one of its runs" in refused(tmp_path / "sweep")
+    assert refused(pour, {"frame": 99}) == (
+        f"phases.0.frame: 99, but the frames of {pour} are 0 … {len(frames) - 1}; use one of them, or last"
+    )
+    for bad, told in (("first", "'first'"), (-1, "-1"), (1.5, "1.5"), (True, "true"), (None, "null")):
+        assert told in (line := refused(pour, {"frame": bad})), bad
+        assert line.startswith("phases.0")
+    assert refused(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
+    assert refused(pour, {"run": ""}).startswith("phases.0.run: ")
+
+
+def test_damaged_frames(pour: Path) -> None:
+    path = read_frames(pour).paths[-1]
+    path.write_bytes(path.read_bytes()[:-200])
+    line = refused(pour)
+    assert line.startswith(f"phases.0.frame: cannot read frame {path}: truncated")
+    (pour / "frames.pvd").unlink()
+    assert refused(pour).startswith("phases.0.run: cannot read list of frames")
+
+
+def test_runs_that_are_not_done(pour: Path) -> None:
+    with claimed(pour, resume=True):
+        for frame in ("last", 7):
+            assert refused(pour, {"frame": frame}).startswith(f"phases.0.run: {pour} is still being computed; wait")
+    (pour / "done.json").unlink()
+    assert refused(pour) == (
+        f"phases.0.frame: last, but {pour} is unfinished; go on with it (smarticles resume {pour}), or give the number "
+        "of a frame"
+    )
+    assert first(scene_of(pour, {"frame": 7})).frame == 7
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"smarticle.aspect_ratio": 0.71}, "smarticle.aspect_ratio: 0.71 here, but 0.7 in"),
+        ({"smarticle.middle_length_m": 0.0118}, "smarticle.middle_length_m: 0.0118 m here, but 0.0117 m in"),
+        ({"smarticle.thickness_normal_m": 1e-3}, "smarticle.thickness_normal_m: 0.001 m here, but 0.00127 m in"),
+        ({"smarticle.thickness_in_plane_m": 6e-4}, "smarticle.thickness_in_plane_m: 0.0006 m here, but 0.0005 m in"),
+        ({"count": 9}, "count: 9 here, but frame "),
+        ({"smarticle.angles_deg": [90, 80]}, "smarticle.angles_deg: (90, 80) here, but the barbs of frame"),
+        ({"container.radius_m": 0.012}, "container.radius_m: 0.012 m; "),
+        ({"gravity_m_per_s2": 0}, "gravity_m_per_s2: 0 m/s²"),
+        ({"phases.1": {"type": "take-over", "run": "."}}, "phases"),
+        ({"phases.1": {"type": "deposit"}}, "phases: got take-over, deposit, shake; a run starts with one"),
+    ],
+)
+def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) -> None:
+    told = refused(pour, **changes)
+    assert told.startswith(line)
+    assert "; " in told
+
+
+def test_barbs_that_all_stand_alike_name_the_scene_that_would_do(pour: Path) -> None:
+    assert refused(pour, **{"smarticle.angles_deg": [90, 80]}).endswith("use smarticle.angles_deg: [90, 90]")
+
+
+def test_barbs_that_stand_apart_are_refused(pour: Path) -> None:
+    def bend(mesh: meshio.Mesh) -> None:
+        # One tip of one smarticle moves by 0.1 mm.
+        mesh.points[3] += 1e-4 * (mesh.points[1] - mesh.points[2]) / 0.0117
+
+    rewrite(pour, -1, bend)
+    line = refused(pour)
+    assert line.startswith("smarticle.angles_deg: (90, 90) here, but the barbs of frame")
+    assert line.endswith("smarticles of a scene begin in one shape: take a frame in which all barbs stand alike")
+
+
+def test_a_pile_that_is_not_poured_to_the_end(pour: Path) -> None:
+    frames = read_frames(pour)
+    few = next(k for k, frame in enumerate(frames) if frame.count < 10)
+    line = refused(pour, {"frame": few})
+    assert line.startswith(f"count: 10 here, but frame {few} of {pour}")
+    assert f"holds {frames[few].count} of 10, poured so far; use the same, or another frame" in line
+
+
+def test_a_wall_that_is_too_low_and_a_hook_in_the_pile(pour: Path) -> None:
+    def lift(mesh: meshio.Mesh) -> None:
+        mesh.points[:, 2] += 0.05
+
+    assert scene_of(pour, hooks={"lower_height_m": 0.03, "upper_height_m": 0.04}).hooks is not None  # above the pile
+    vertices = above_floor(read_frames(pour)[-1])
+    low = float(vertices[..., 2].mean())
+    line = refused(pour, hooks={"lower_height_m": low, "upper_height_m": 0.04, "length_m": 0.03, "side_m": 0.004})
+    assert line.startswith(f"hooks.lower_height_m: {low:g} m; ")
+    assert line.endswith("lie in this hook; take over a run that was poured with these hooks")
+    rewrite(pour, -1, lift)
+    assert refused(pour, **{"container.height_m": 0.05}).startswith("container.height_m: 0.05 m, but the smarticles of")
+
+
+def test_how_a_straight_smarticle_is_turned_is_unknown(tmp_path: Path) -> None:
+    straight = {"smarticle.aspect_ratio": 0, "recording": RECORDING}
+    source = parse_scene(changed(SMALL, straight), source="pour")
+    run_scene(source, tmp_path / "pour", command="test", progress=False)
+    assert scene_of(tmp_path / "pour", **{"smarticle.aspect_ratio": 0}).count == 10
+    line = refused(tmp_path / "pour", **{"smarticle.aspect_ratio": 0, "fidelity": "reference"})
+    assert line.startswith("fidelity.rows: 2, but frames do not know how a straight smarticle is turned")
+
+
+# -- the stage ---------------------------------------------------------------------------------------------------------
+
+
+class Pushing(EngineDouble):
+    """Smarticles that overlap so much that all fly apart, until they were stopped so many times."""
+
+    stops = 0
+
+    def advance(self, steps: int) -> None:
+        super().advance(steps)
+        if self.told.count(("still",)) < self.stops:
+            self.velocities[:, 0] = 0.3
+
+
+def perform(scene: Scene, engine: Engine) -> dict[str, Any]:
+    stage = scene.phases[0].begin(scene, 0)
+    while wait := stage.proceed(engine):
+        engine.advance(max(1, round(wait / engine.time_step)))
+        memory, stage = json.loads(json.dumps(stage.memory)), scene.phases[0].begin(scene, 0)
+        stage.memory = memory
+    return stage.memory
+
+
+@pytest.mark.parametrize("stops", [0, 1, 5])
+def test_what_overlaps_is_stopped_until_it_flies_no_more(pour: Path, stops: int) -> None:
+    scene = scene_of(pour)
+    engine = Pushing.of(scene, DT)
+    assert isinstance(engine, Pushing)
+    engine.stops = stops
+    memory = perform(scene, engine)
+    assert engine.told == [("add", 10), *[("still",)] * stops]
+    assert engine.account.dissipated >= stops * 0.5 * 10 * engine.particle.boxes.mass * 0.3**2 * (1 - 1e-12)
+    assert ("warning" in memory) == (stops > 0)
+    if stops:
+        assert f"smarticles were stopped {stops} times in {(1 + STRIDE * (stops + 1)) * DT:.3g} s" in memory["warning"]
+    # Then it must be still for `hold_s`.
+    assert engine.time > 0.05
+
+
+def test_what_never_comes_apart_fails(pour: Path) -> None:
+    scene = scene_of(pour, {"settle": {"timeout_s": 0.1}})
+    engine = Pushing.of(scene, DT)
+    assert isinstance(engine, Pushing)
+    engine.stops = 10**6
+    with pytest.raises(
+        RunError, match=r"still push each other apart 0\.1 s after .* up to 0\.3 m/s .*; raise phases\.0"
+    ):
+        perform(scene, engine)
+    assert engine.time < 0.11
+
+
+def test_poses_are_those_of_the_centres_of_mass(pour: Path) -> None:
+    scene = scene_of(pour)
+    engine = EngineDouble.of(scene, DT)
+    scene.phases[0].begin(scene, 0).proceed(engine)
+    vertices = above_floor(read_frames(pour)[-1])
+    assert np.array_equal(engine.positions, fitted_poses(scene.particle.boxes, vertices)[0].positions)
+    np.testing.assert_allclose(engine.state().vertices, vertices, atol=1e-15)
+    assert frame_mesh(engine.state(), contacts=np.zeros(10, np.int64), time=0, floor=0, phase=0).points == (
+        pytest.approx(vertices.reshape(-1, 3), abs=1e-15)
+    )
