@@ -78,17 +78,17 @@ def _draw_packing(
     figure, axes = figures.new_figure(width=_WIDE, height=3.4) if several else figures.new_figure(height=2.7)
     whose = TOLD.get(several[0], several[0]) if several else "simulation"
     for column, face, label in (
-        ("phi_initial", "white", r"experiment, $\phi_0$ before shaking"),
-        ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after shaking"),
+        ("phi_initial", "white", r"experiment, $\phi_0$ before"),
+        ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after"),
     ):
         # Without error bars: that of reading is less than the circles, and no error of ours.
         look = {**marker("o", figures.ORANGE, face), "markersize": 5.5, "linestyle": "none"}
         draw_means(axes, reference["l_over_w"], reference[column], None, look=look, label=label)
     blue, sky = figures.BLUE, figures.SKY
     for stage, shape, colour, face, label in (
-        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before shaking"),
+        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before"),
         ("phi_f relaxed", "^", sky, sky, rf"{whose}, $\phi_\mathrm{{f}}$ at rest again"),
-        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end of shaking"),
+        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end"),
     ):
         _draw_means(axes, judging(summary), f"{stage} {definition}", marker(shape, colour, face), label)
     for engine in several[1:]:

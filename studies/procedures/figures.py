@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 _SHOWN_ASPECT = 0.7
 """Aspect ratio whose heights are drawn against time, as in the paper [-]."""
 
-_PHI_LABEL = r"packing fraction $\phi_\mathrm{f}$ at the end of the activity [-]"
+_PHI_LABEL = "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]"
 _ENERGY_LABEL = "energy per smarticle [J]"
 _INTERNAL_LABEL = rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°"
 _LABELS = {

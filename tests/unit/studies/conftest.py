@@ -28,7 +28,8 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def looked_at() -> Iterator[None]:
     """Every figure that a test of a study draws is held against what holds for all of them.
 
-    A footer is short and whole, error bars are of one kind that is named once, and no limit of an axis cuts anything.
+    A footer is short and whole, error bars are of one kind that is named once, no limit of an axis cuts anything, and
+    no label or legend leaves the figure.
     """
     add_footer, save = figures.add_footer, figures.save
 
@@ -39,6 +40,7 @@ def looked_at() -> Iterator[None]:
     def saved(figure: Figure, path: Path, **formats: Sequence[str]) -> list[Path]:
         look_at_bars(figure)
         look_at_limits(figure)
+        look_at_edges(figure)
         return save(figure, path, **formats)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -94,6 +96,21 @@ def look_at_limits(figure: Figure) -> None:
                 room = 1e-9 * max(map(abs, limits))
                 assert limits[0] - room <= values.min(), f"{values.min()} is cut by {limits}"
                 assert values.max() <= limits[1] + room, f"{values.max()} is cut by {limits}"
+
+
+def look_at_edges(figure: Figure) -> None:
+    """Whether labels and legends are whole."""
+    figure.draw_without_rendering()
+    width, height = figure.get_size_inches() * figure.dpi
+    words = [*figure.legends, *figure.texts]
+    for axes in figure.axes:
+        words += [axes.xaxis.label, axes.yaxis.label, axes.title, *filter(None, [axes.get_legend()])]
+    for word in words:
+        if not getattr(word, "get_text", lambda: "a legend")():
+            continue
+        box = word.get_window_extent()
+        whole = box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1 and box.y1 <= height + 1
+        assert whole, f"{word} leaves the figure: {box} of {width:g} × {height:g}"
 
 
 def drawn(axes: object, k: int) -> NDArray[np.float64]:
