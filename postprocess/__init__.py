@@ -11,7 +11,13 @@ from dem.record.manifest import PhaseRecord, RunManifest, read_run
 from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.contacts import ContactPairs, contact_pairs, neighbours_in_contact, touching_pairs
+from postprocess.measures.contacts import (
+    ContactPairs,
+    contact_pairs,
+    neighbours_in_contact,
+    pairs_in_contact,
+    touching_pairs,
+)
 from postprocess.measures.entanglement import (
     CrossingPairs,
     Entanglement,
@@ -64,6 +70,7 @@ __all__ = [
     "packing_change",
     "packing_fraction",
     "packing_profile",
+    "pairs_in_contact",
     "profile_table",
     "read_frame",
     "read_frames",

@@ -15,10 +15,9 @@ from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
-from postprocess.measures.clusters import Clusters, contact_clusters, entanglement_clusters
+from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.registry import in_space
-from postprocess.measures.spread import TOUCHING
 from postprocess.pictures.colouring import COLOURINGS
 
 if TYPE_CHECKING:
@@ -149,8 +148,8 @@ FIELDS: tuple[Field, ...] = (
         name="contact_cluster",
         unit="-",
         kind="name",
-        meaning=f"number of its cluster of touching ones, 0 the largest; touching: axes within {TOUCHING} diameters",
-        take=_labels(lambda frame, run: contact_clusters(frame.vertices, TOUCHING * run.sphere_diameter)),
+        meaning="number of its cluster of touching ones, 0 the largest; touching: the engine's spheres or strands do",
+        take=_labels(contact_graph),
     ),
     Field(
         name="entanglement_cluster",

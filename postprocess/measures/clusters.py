@@ -14,7 +14,7 @@ from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices
-from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, touching_pairs
+from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact, touching_pairs
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
 from postprocess.measures.registry import FrameMeasure, Quantity
@@ -77,7 +77,7 @@ def entanglement_clusters(vertices: ArrayLike) -> Clusters:
 
 
 def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
-    """Smarticles joined by contact as the engine sees them, see `contacts.touching_pairs`.
+    """Smarticles joined by contact where each is what a sphere sweeps along its links, see `contacts.touching_pairs`.
 
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
@@ -92,6 +92,17 @@ def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
     """
     pairs = touching_pairs(vertices, diameter)
     return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+
+
+def contact_graph(frame: Frame, run: RunManifest) -> Clusters:
+    """Smarticles joined by contact by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
+
+    Raises:
+        InputError: Bad vertices, or the scene of the run cannot be read.
+        UndefinedMeasureError: There is no smarticle.
+    """
+    pairs = pairs_in_contact(frame, run)
+    return _clusters(frame.count, pairs.i, pairs.j)
 
 
 def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, floor_z: float) -> bool:
@@ -184,7 +195,7 @@ MEASURES = tuple(
         costly=True,
     )
     for name, take in (
-        ("contact", lambda f, run: _spans_of(touching_clusters(f.vertices, run.sphere_diameter), f, run)),
+        ("contact", lambda f, run: _spans_of(contact_graph(f, run), f, run)),
         ("crossing", lambda f, run: _spans_of(entanglement_clusters(f.vertices), f, run)),
     )
 )

@@ -25,7 +25,10 @@ TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
 
 Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
-centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles."""
+centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles.
+
+It tells nearness more than contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
+1.9 to 2.1 at rest after shaking, 6 while shaken; see `contacts.pairs_in_contact`, which finds those that touch."""
 
 OUTSIDE = 0.5
 """How far beyond the wall that was, in w, a centre of mass must be to have come off the pile [-].

@@ -79,7 +79,11 @@ _STYLE: dict[Any, Any] = {
 
 _FOOTER_SIZE = 4.6
 _FOOTER_LINE = 0.082  # inch per line of footer
+_FOOTER_MARGIN = 0.06  # inch above and below it together
 _FOOTER_COLUMNS = 97  # characters of that size across one column width
+
+FOOTER_SHARE = 0.2
+"""The most of a figure's height that its footer takes [-]: what a figure is of stands beside it, see `add_footer`."""
 
 
 @contextmanager
@@ -129,20 +133,22 @@ def pixels(figure: Figure) -> NDArray[np.uint8]:
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
     """Put the provenance below the axes; the figure grows by the height of the text.
 
+    The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which tells where
+    the rest is to be read, and the others are cut at "…".
+
     Args:
         figure: drawn completely; its layout is settled here.
         lines: one statement each; a long one is broken.
     """
     width, height = figure.get_size_inches()
-    columns = int(_FOOTER_COLUMNS * width / COLUMN_WIDTH)
-    text = [part for line in lines for part in textwrap.wrap(line, columns) or [""]]
-    below = _FOOTER_LINE * len(text) + 0.06
+    text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
+    below = _FOOTER_LINE * len(text) + _FOOTER_MARGIN
     figure.set_size_inches(width, height + below)
     base = below / (height + below)
     figure.set_layout_engine("constrained", rect=(0.0, base, 1.0, 1.0 - base))
     figure.text(
         0.015,
-        0.03 / (height + below),
+        _FOOTER_MARGIN / 2 / (height + below),
         "\n".join(text),
         fontsize=_FOOTER_SIZE,
         color=GREY,
@@ -151,6 +157,25 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
         linespacing=1.25,
         parse_math=False,
     )
+
+
+def _most_lines(height: float) -> int:
+    """How many lines of footer a figure of some height [inch] bears, one at least."""
+    room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
+    return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
+
+
+def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
+    """Statements broken at a number of columns, and cut but for the last where there are more lines than `most`."""
+    broken = [textwrap.wrap(line, columns, break_on_hyphens=False) or [""] for line in lines]
+    text = [part for parts in broken for part in parts]
+    if len(text) <= most:
+        return text
+    last = broken[-1][:most]
+    kept = text[: most - len(last)]
+    if kept:
+        kept[-1] = f"{kept[-1][: columns - 2].rstrip()} …"
+    return [*kept, *last]
 
 
 def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:

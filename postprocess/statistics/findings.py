@@ -22,11 +22,6 @@ CRITERION = (
 """How verdicts come about, for footers."""
 
 
-def without_criterion(footer: Sequence[str]) -> list[str]:
-    """A footer for figures: how verdicts come about is no matter of theirs."""
-    return [line for line in footer if not line.startswith(CRITERION)]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Finding:
     """A finding of the paper and what our runs say of it.

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from postprocess.report import figures
+from postprocess.report.limits import hold_everything
 from smarticles.verification.hard.onset import onsets
 from studies.base.figures import finished
 
@@ -88,7 +89,7 @@ def draw_orders(path: Path, *, trajectories: pd.DataFrame, orders: pd.DataFrame,
             axes.legend(
                 loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title=f"scheme of {order} order: observed order"
             )
-        return finished(figure, path, footer)
+        return finished(figure, path, (), footer)
 
 
 def draw_clumps(path: Path, *, clumps: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -143,7 +144,7 @@ def draw_clumps(path: Path, *, clumps: pd.DataFrame, footer: Sequence[str]) -> l
             else:
                 axes.set_yscale("log")
                 _plain_ticks(axes.yaxis, table[measured].to_numpy() * unit)
-        return finished(figure, path, footer)
+        return finished(figure, path, (), footer)
 
 
 def draw_onset(out: Path) -> Path:
@@ -188,9 +189,11 @@ def draw_onset(out: Path) -> Path:
         axes.set_xlabel("time step over the stable step [1]")
         figure.legend(loc="outside upper center", ncols=3)
         seeds = sorted(runs["seed"].unique())
+        hidden = hold_everything(figure)
         figures.add_footer(
             figure,
             [
+                *hidden,
                 "Bars: from the last step without to the first step with, over all seeds. Chatter: smarticles that "
                 "rest at half the stable step move at more than 1 mm/s (root mean square); scenes that are not at rest "
                 "then tell nothing of it. Blow-up: energy from nowhere that could lift all smarticles by a sphere's "

@@ -60,8 +60,8 @@ def draw(path: Path, *, table: pd.DataFrame, footer: Sequence[str]) -> list[Path
         }
         if shown:
             figure.legend(shown.values(), shown.keys(), loc="outside upper center", ncols=math.ceil(len(shown) / 2))
-        told = "Hollow: references. Bars: 95 % over seeds, of costs standard errors. Band: median of the bars."
-        return finished(figure, path, [told, *footer])
+        told = "Hollow: references. Band: median of the error bars."
+        return finished(figure, path, [told], footer, pooled=True)
 
 
 def _draw_panel(axes: Axes, name: str, table: pd.DataFrame) -> None:
@@ -87,10 +87,9 @@ def _draw_panel(axes: Axes, name: str, table: pd.DataFrame) -> None:
             look = marker(shape if not own or shape != "x" else "o", colour, face) | {"linestyle": "none"}
             # A reference has no error of its own: its scatter is in the bands of the others.
             high = np.full(len(part), math.nan) if own else part[bands].to_numpy()
-            wide = part[marked(COST, "SE")].to_numpy()
+            wide = part[marked(COST, "95 %")].to_numpy()
             label = "_nolegend_" if own else f"{knob} (sensitivity)" if rows["sensitivity"].any() else knob
-            axes.errorbar(part[COST] * shift, part[errors], xerr=wide, linestyle="none", color=colour, elinewidth=0.5)
-            draw_means(axes, part[COST] * shift, part[errors], high, look=look, label=label)
+            draw_means(axes, part[COST] * shift, part[errors], high, across=wide, look=look, label=label)
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:g}"))

@@ -199,6 +199,8 @@ def _rung_row(
     for name in _AVERAGED:
         mean = mean_over_seeds(group[name])
         row[name], row[marked(name, "SE")] = mean.value, mean.standard_error
+        if name == COST:
+            row[marked(name, "95 %")] = mean.half_width
     own = reference is not None and reference.setting == rung.setting
     clear, known = [], []
     for name, column in COMPARED.items():

@@ -126,6 +126,12 @@ class Accuracy(Study[Advice]):
             *table_lines(*self.table(analysis)),
         ]
 
+    def about_points(self, analysis: Analysis[Advice]) -> str:
+        """Seeds, what is done, and what errors are of."""
+        runs = analysis.tables["runs"]
+        seeds = told_seeds(runs, runs.groupby(VARIANT, sort=False).size(), "setting")
+        return f"{seeds}; activity: {runs[ACTIVITY].iloc[0]}; φ by {DEFINITION}; errors against the knob's reference."
+
     def draw(self, output: Path, analysis: Analysis[Advice], footer: Sequence[str]) -> Sequence[Path]:
         """Errors against costs."""
         return figures.draw(output / "accuracy", table=analysis.tables[TABLE], footer=footer)

@@ -1,4 +1,8 @@
-"""What the figures of studies share: means with their error bars, and histories averaged over seeds."""
+"""What the figures of studies share: means with their error bars, and histories averaged over seeds.
+
+Error bars are of one kind in all of them, 95 % confidence of a mean over seeds: `draw_means` draws them, `finished`
+says so in one sentence. Where a band is something else, such as the range of the seeds, the figure has no error bars.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,12 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.container import ErrorbarContainer
 
 from postprocess.report import figures
+from postprocess.report.limits import hold_everything
 from studies.base.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
+from studies.base.runs import BARS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +29,8 @@ if TYPE_CHECKING:
 ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
 CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
 
+_CONFIDENCE = "_95 %"  # label of the lines of error bars; those that begin with _ stay out of legends
+
 COLOURS: Mapping[str, str] = MappingProxyType(
     {SHAPE: figures.ORANGE, EXTERNAL: figures.BLUE, INTERNAL: figures.SKY, STATIC: figures.GREY}
 )
@@ -29,6 +38,9 @@ COLOURS: Mapping[str, str] = MappingProxyType(
 
 SHAPES: Mapping[str, str] = MappingProxyType({SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"})
 """Marker of each procedure, the same in all studies."""
+
+BAND = "band: lowest to highest seed, no error"
+"""What the bands of histories are, for footers."""
 
 _LEAST_BIN = 0.1  # s: three periods of shaking at 30 Hz
 _BINS = 100
@@ -97,10 +109,7 @@ def draw_history(
 
 def told_histories(width: float, what: str) -> str:
     """What lines, bands and broken lines are, for footers; `what` begins and ends at the broken lines."""
-    return (
-        f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed. "
-        f"{what} begins and ends at the broken lines."
-    )
+    return f"Line: mean over seeds of means over {width:.2g} s; {BAND}. {what} begins and ends at the broken lines."
 
 
 def draw_ends(axes: Axes, ends: Sequence[float]) -> None:
@@ -110,10 +119,40 @@ def draw_ends(axes: Axes, ends: Sequence[float]) -> None:
 
 
 def draw_means(
-    axes: Axes, x: ArrayLike, values: ArrayLike, half_widths: ArrayLike, *, look: Mapping[str, Any], label: str
+    axes: Axes,
+    x: ArrayLike,
+    y: ArrayLike,
+    half_widths: ArrayLike | None,
+    *,
+    look: Mapping[str, Any],
+    label: str,
+    across: ArrayLike | None = None,
 ) -> None:
-    """Means over seeds with their error bars; a mean over one seed has none."""
-    axes.errorbar(x, values, yerr=half_widths, **{"markersize": 3.4, "linewidth": 0.7, **look}, label=label)
+    """Means over seeds with their error bars; a mean over one seed has none.
+
+    Args:
+        axes: To draw in.
+        x: (n,) places, or means.
+        y: (n,) means, or places.
+        half_widths: (n,) of the 95 % intervals of `y`, NaN where there is none; None: `y` are no means.
+        look: Marker and line, see `marker`.
+        label: For the legend.
+        across: (n,) the same of `x`.
+    """
+    styled = {"markersize": 3.4, "linewidth": 0.7, **look}
+    bars = axes.errorbar(x, y, yerr=half_widths, xerr=across, **styled, label=label)
+    known = [np.isfinite(np.asarray(part, dtype=np.float64)) for part in (half_widths, across) if part is not None]
+    if any(part.any() for part in known):
+        for lines in bars.lines[2]:
+            lines.set_label(_CONFIDENCE)
+
+
+def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, look: Mapping[str, Any]) -> None:
+    """Lower bounds: markers with an arrow upwards of some length, which is no error; NaN are left out."""
+    at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
+    known = np.isfinite(from_)
+    if known.any():
+        axes.errorbar(at[known], from_[known], yerr=long[known], lolims=True, **{**look, "linestyle": "none"})
 
 
 def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
@@ -140,7 +179,32 @@ def legend_above(axes: Axes) -> None:
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
-def finished(figure: Figure, path: Path, footer: Sequence[str]) -> list[Path]:
-    """Puts the footer below a figure and writes it; gives the files."""
-    figures.add_footer(figure, footer)
+def finished(
+    figure: Figure, path: Path, told: Sequence[str], footer: Sequence[str], *, pooled: bool = False
+) -> list[Path]:
+    """Puts what is to be known below a figure and writes it; no limit of an axis hides anything.
+
+    Args:
+        figure: Drawn completely.
+        path: Without suffix.
+        told: What is to be known of this figure.
+        footer: Origin, see `Origin.below_figures`.
+        pooled: Whether the scatter behind error bars is that of all points together.
+
+    Returns:
+        The files.
+    """
+    hidden = hold_everything(figure)
+    bars = [f"{BARS}, scatter pooled over all points." if pooled else f"{BARS}."] if _has_bars(figure) else []
+    figures.add_footer(figure, [*told, *bars, *hidden, *footer])
     return figures.save(figure, path)
+
+
+def _has_bars(figure: Figure) -> bool:
+    return any(
+        lines.get_label() == _CONFIDENCE
+        for axes in figure.axes
+        for bars in axes.containers
+        if isinstance(bars, ErrorbarContainer)
+        for lines in bars.lines[2]
+    )

@@ -56,16 +56,45 @@ class Origin:
     command: str
     reference: Reference
 
+    @property
+    def told_note(self) -> str:
+        """How the runs used differ from the full study, those that are missing among it."""
+        if not self.missing:
+            return self.note
+        used, total = len(self.manifests), len(self.manifests) + len(self.missing)
+        return f"only {used} of {total} runs of what is planned: {self.note}"
+
+    @property
+    def _told_runs(self) -> str:
+        lacking = f", {len(self.missing)} missing" if self.missing else ""
+        used, total = len(self.manifests), len(self.manifests) + len(self.missing)
+        fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
+        engines = _told_engines(list(dict.fromkeys(run.engine for run in self.manifests)))
+        return f"Study {self.study}, fidelity {fidelities}{engines}: {used} of {total} runs{lacking}"
+
+    def below_figures(self, points: str, text_name: str) -> tuple[str, ...]:
+        """What every figure says about its origin; it is short, for a figure is to be looked at.
+
+        Args:
+            points: Which runs there are; goes on from "… of … runs; ".
+            text_name: Name of the Markdown file that tells the rest.
+        """
+        # Of a variant the first words say that it is one; how it differs in everything is told elsewhere.
+        first, *more = (f"planned: {self.note}" if self.missing else self.note).split("; ")
+        commits = sorted({run.versions.get("git", "unknown") for run in self.manifests})
+        made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
+        return (
+            f"{self._told_runs}; {points}",
+            f"{first[0].upper()}{first[1:]}{' and more' if more else ''}. {made}. More: {text_name}, provenance.json.",
+        )
+
     def footer(self, points: str, *statements: str) -> tuple[str, ...]:
-        """What every table and figure says about its origin, one statement each.
+        """What every table and text says about its origin, one statement each.
 
         Args:
             points: Which runs there are; goes on from "… of … runs; ".
             statements: What else is to be known, such as definitions.
         """
-        lacking = f", {len(self.missing)} missing" if self.missing else ""
-        used, total = len(self.manifests), len(self.manifests) + len(self.missing)
-        fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
         versions = []
         engines = list(dict.fromkeys(run.engine for run in self.manifests))
         for name in ("smarticles", "git", *engines):
@@ -73,11 +102,10 @@ class Origin:
             found = sorted({run.versions.get(name, "unknown") for run in by_it})
             versions.append(f"{name} {', '.join(found)}")
         return (
-            f"Study {self.study}, fidelity {fidelities}{_told_engines(engines)}: {used} of {total} runs{lacking}; "
-            f"{points}",
+            f"{self._told_runs}; {points}",
             *statements,
             f"Reference: {self.reference.statement}.",
-            f"Note: {self.note}",
+            f"Note: {self.told_note}",
             f"Versions: {'; '.join(versions)}. Command: {self.command}",
         )
 
@@ -128,7 +156,7 @@ def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str])
     content = {
         "format": 1,
         "study": origin.study,
-        "note": origin.note,
+        "note": origin.told_note,
         "command": origin.command,
         "footer": list(footer),
         "analysed_with": {"smarticles": version},
@@ -179,11 +207,18 @@ def missing_table(missing: Sequence[MissingRun]) -> pd.DataFrame:
 
 
 def markdown_ending(missing: Sequence[MissingRun], footer: Sequence[str]) -> list[str]:
-    """The lines that end a report: missing runs and footer."""
+    """The lines that end a report: missing runs, a line per cause, and footer."""
     lines = []
     if missing:
-        rows = [(run.directory, run.status, run.cause) for run in missing]
-        lines += ["", "## Missing runs", "", *table_lines(["run", "status", "cause"], rows)]
+        rows: dict[tuple[str, str], list[str]] = {}
+        for run in missing:
+            rows.setdefault((run.status, run.common_cause), []).append(run.directory)
+        cells = [
+            (str(len(runs)), f"{runs[0]}{', …' if len(runs) > 1 else ''}", status, cause)
+            for (status, cause), runs in rows.items()
+        ]
+        lines += ["", "## Missing runs", "", "One by one in `missing.csv`.", ""]
+        lines += table_lines(["runs", "which", "status", "cause"], cells)
     return [*lines, "", "---", "", *(f"{line}  " for line in footer), ""]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import pandas as pd
 
 from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
-from postprocess.statistics.findings import CRITERION, Finding, findings_table, without_criterion
+from postprocess.statistics.findings import CRITERION, Finding, findings_table
 from postprocess.statistics.points import ToldTable, told_means
 from studies.base.references import SAVOIE, Reference
 from studies.base.study import Analysis, Study, Tables
@@ -60,10 +60,6 @@ class PaperStudy(Study[Finding]):
     @abstractmethod
     def about_runs(self, analysis: Analysis[Finding]) -> tuple[str, ...]:
         """Statements for footers, see `Study.statements`, but for how verdicts come about."""
-
-    def below_figures(self, footer: Sequence[str]) -> Sequence[str]:
-        """All but how verdicts come about."""
-        return without_criterion(footer)
 
     def table(self, analysis: Analysis[Finding]) -> ToldTable:
         """Means over seeds with their standard errors."""

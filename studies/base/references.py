@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
@@ -63,6 +63,9 @@ SAVOIE = Reference(
 )
 
 
+_SYMBOLS: Mapping[str, str] = MappingProxyType({"phi_0": "φ_0", "phi_f": "φ_f"})
+
+
 def read_reference() -> pd.DataFrame:
     """Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final`.
 
@@ -83,3 +86,28 @@ def reference_at(reference: pd.DataFrame, aspect: float, stage: str) -> float:
     """
     same = np.isclose(reference["l_over_w"], aspect, rtol=0, atol=1e-6)
     return float(reference.loc[same, COLUMNS[stage]].iloc[0]) if same.any() else math.nan
+
+
+def told_reference(aspects: Sequence[float], stages: Iterable[str]) -> str:
+    """What Gravish's points are, and which there are none of, for figures that show them.
+
+    Args:
+        aspects: The l/w of a figure [-].
+        stages: Keys of `COLUMNS`.
+    """
+    reference = read_reference()
+    lacking = {
+        stage: [aspect for aspect in aspects if math.isnan(reference_at(reference, aspect, stage))] for stage in stages
+    }
+    gaps = told_gaps({_SYMBOLS[stage]: without for stage, without in lacking.items()})
+    return f"{CITATION}, read to ±{DIGITISING_ERROR:g}; {gaps}."
+
+
+def told_gaps(lacking: Mapping[str, Sequence[float]]) -> str:
+    """`no φ_0 at l/w = 0.5, 0.8; no φ_f at l/w = 0.85`: which points were never digitised.
+
+    Args:
+        lacking: The l/w [-] of each quantity that has no point there.
+    """
+    known = {name: ", ".join(f"{aspect:g}" for aspect in without) for name, without in lacking.items()}
+    return "; ".join(f"no {name} at l/w = {told}" for name, told in known.items() if told) or "at every l/w shown"

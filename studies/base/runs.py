@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,6 +27,9 @@ ENGINES = ("links", "yade")
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction that is compared with Gravish's."""
 
+BARS = "Error bars: 95 % confidence of the mean over seeds, Student's t"
+"""What error bars are in all figures of studies; the ± of tables says for itself what it is."""
+
 # Runs without a relaxation at the end lack columns, and would put them behind these.
 _TAIL = ["escaped at the end [-]", "frames averaged [-]", "scene_sha256", "run"]
 
@@ -45,6 +48,11 @@ class MissingRun:
     directory: str
     status: str
     cause: str
+
+    @property
+    def common_cause(self) -> str:
+        """The cause without the name of the directory: the same for all runs that lack the same."""
+        return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -231,14 +239,29 @@ def told_bars(counts: pd.Series, point: str) -> str:
         point: What a point of the study is called, e.g. "l/w".
     """
     if counts.max() > 1:
-        return "Error bars: 95 % confidence of the mean over seeds, Student's t"
+        return BARS
     return f"One seed per {point}: no error bars"
 
 
 def told_seeds(runs: pd.DataFrame, counts: pd.Series, point: str) -> str:
     """Which seeds there are and how many per point, for footers; arguments as in `told_bars`."""
-    seeds = " ".join(map(str, sorted(set(runs[SEED]))))
-    return f"seeds {seeds} ({told_range(counts)} per {point})"
+    return f"seeds {told_numbers(runs[SEED])} ({told_range(counts)} per {point})"
+
+
+def told_numbers(numbers: Iterable[int]) -> str:
+    """`1 2 3`, or `1 to 8` where five or more follow each other.
+
+    Example:
+        >>> told_numbers([1, 2, 3, 4, 5, 9])
+        '1 to 5 9'
+    """
+    rows: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if rows and number == rows[-1][-1] + 1:
+            rows[-1].append(number)
+        else:
+            rows.append([number])
+    return " ".join(f"{row[0]} to {row[-1]}" if len(row) > 4 else " ".join(map(str, row)) for row in rows)
 
 
 def told_range(counts: pd.Series) -> str:

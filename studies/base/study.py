@@ -40,7 +40,8 @@ class Study(ABC, Generic[Judgement]):
     """A study: what is measured of each of its runs, and what is made of all of them together.
 
     `analyse` is the recipe, the same for all. What a study answers for itself are the methods that it calls, in this
-    order: `measure`, `refuse`, `tabulate`, `judge`, `reference_of`, `statements`, `text`, `draw`, `table`, `told`.
+    order: `measure`, `refuse`, `tabulate`, `judge`, `reference_of`, `statements`, `text`, `about_points`, `draw`,
+    `table`, `told`.
 
     Attributes:
         name: Of the study.
@@ -65,7 +66,7 @@ class Study(ABC, Generic[Judgement]):
         Args:
             run_dirs: Run directories; any subset of the study.
             output: Folder for the results; made if needed.
-            note: How these runs differ from the full study; stands in every footer.
+            note: How these runs differ from the full study, if all of them were there; stands in every footer.
             command: Command line to state as the origin.
 
         Returns:
@@ -101,7 +102,7 @@ class Study(ABC, Generic[Judgement]):
             tables={**tables, **self.judged_tables(judged)},
             text=(self.text_name, self.text(analysis)),
         )
-        drawn = self.draw(output, analysis, self.below_figures(footer))
+        drawn = self.draw(output, analysis, origin.below_figures(self.about_points(analysis), self.text_name))
         header, rows = self.table(analysis)
         return Report(
             header=header,
@@ -155,9 +156,9 @@ class Study(ABC, Generic[Judgement]):
     def text(self, analysis: Analysis[Judgement]) -> Sequence[str]:
         """Lines of the Markdown file; missing runs and footer are put below."""
 
-    def below_figures(self, footer: Sequence[str]) -> Sequence[str]:
-        """The part of the footer that figures show."""
-        return footer
+    @abstractmethod
+    def about_points(self, analysis: Analysis[Judgement]) -> str:
+        """Seeds of the points of figures and how else they come about: a sentence, see `Origin.below_figures`."""
 
     @abstractmethod
     def draw(self, output: Path, analysis: Analysis[Judgement], footer: Sequence[str]) -> Sequence[Path]:

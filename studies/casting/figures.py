@@ -86,7 +86,7 @@ def _draw_tiers(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list
         axes.set_ylabel(label)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
-    return finished(figure, path, footer)
+    return finished(figure, path, (), footer)
 
 
 def _draw_overlaps(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -95,7 +95,7 @@ def _draw_overlaps(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> l
     axes.set_xticks(range(len(_OVERALL)), labels=list(_OVERALL))
     axes.set_ylabel("common volume over that of both [-]")
     legend_above(axes)
-    return finished(figure, path, footer)
+    return finished(figure, path, (), footer)
 
 
 def _draw_places(axes: Axes, points: pd.DataFrame, columns: Sequence[str]) -> None:
@@ -134,4 +134,4 @@ def _draw_pictures(
     if not rows:
         return []
     columns = ("before the walls go", "0.1 s after", f"{AFTER:g} s after")
-    return [draw_strip(rows, path, columns=columns, footer=[_COLOURS, footer[0], footer[-1]])]
+    return [draw_strip(rows, path, columns=columns, footer=[_COLOURS, *footer])]

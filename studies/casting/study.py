@@ -93,6 +93,10 @@ class Casting(PaperStudy):
             f"{told_bars(counts, 'procedure')}.",
         )
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds."""
+        return f"{told_seeds(analysis.tables['runs'], analysis.tables['points'][SEEDS], 'procedure')}."
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Shares by tier, overlaps, and pictures."""
         return figures.draw(

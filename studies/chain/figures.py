@@ -65,7 +65,7 @@ def draw(
         ):
             figure = _draw_curves(label, value, runs, pulls)
             told = f"One line per trial, means over {_BIN:g} of strain, up to the fracture; thick: first trials."
-            written += finished(figure, output / name, [told, *footer])
+            written += finished(figure, output / name, [told], footer)
         written += _draw_confinement(output / "confinement", points, footer)
         if len(changes):
             written += _draw_sensitivity(output / "sensitivity", changes, footer)
@@ -114,7 +114,7 @@ def _draw_confinement(path: Path, points: pd.DataFrame, footer: Sequence[str]) -
         axes.set_ylabel(quantity)
         axes.set_ylim(bottom=0)
         axes.legend(loc="lower right")
-    return finished(figure, path, ["Means over trials; bars: 95 % intervals (Student's t).", *footer])
+    return finished(figure, path, ["Means over trials, each with a seed of its own."], footer)
 
 
 def _draw_sensitivity(path: Path, changes: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -123,12 +123,10 @@ def _draw_sensitivity(path: Path, changes: pd.DataFrame, footer: Sequence[str]) 
     for shift, quantity, look in ((0.14, PEAK, _LOOKS[2]), (-0.14, FRACTURE, _LOOKS[6])):
         part = changes[changes["quantity"] == quantity].set_index(VARIANT).loc[names]
         rows = -np.arange(len(names)) + shift
-        style = {"markersize": 3.4, "linestyle": "none", **look}
-        name = quantity.rpartition(" [")[0]
-        axes.errorbar(part["change [%]"], rows, xerr=part["change 95 % [%]"], label=name, **style)
+        name, bars = quantity.rpartition(" [")[0], part["change 95 % [%]"]
+        draw_means(axes, part["change [%]"], rows, None, across=bars, look={"linestyle": "none", **look}, label=name)
     axes.axvline(0, color=figures.GREY, linewidth=0.6)
     axes.set_yticks(-np.arange(len(names)), names)
     axes.set_xlabel("change against the baseline [%]")
     axes.legend(loc="best")
-    told = "Means over pairs of runs with the same servos; bars: 95 % intervals (Student's t). n = 2."
-    return finished(figure, path, [told, *footer])
+    return finished(figure, path, ["Means over pairs of runs with the same servos, n = 2."], footer)

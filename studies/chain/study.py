@@ -117,6 +117,10 @@ class Chain(PaperStudy):
             *table_lines(["variant", *(name.rpartition(" [")[0] for name in names)], rows),
         ]
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """How many trials."""
+        return f"{told_range(analysis.tables['points'][SEEDS])} trials per point."
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Force and width against strain, peaks against confinement, changes by variant."""
         return figures.draw(

@@ -12,10 +12,20 @@ import numpy as np
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from studies.base.collapse.column import COM, CORE, REMAINING, column_history, vibration
-from studies.base.figures import ASPECT_LABEL, History, bin_width, draw_history, draw_means, finished, marker
+from studies.base.figures import (
+    ASPECT_LABEL,
+    BAND,
+    History,
+    bin_width,
+    draw_bounds,
+    draw_history,
+    draw_means,
+    finished,
+    marker,
+)
 from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
 from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
-from studies.collapse.reference import ACCELERATIONS, read_collapse_reference
+from studies.collapse.reference import ACCELERATIONS, read_collapse_reference, told_points
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,10 +103,10 @@ def _draw_heights(
     fullest = max(grid, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
     fullest.legend(loc="upper right")
     told = (
-        f"Line: mean over seeds of means over {width:.2g} s; band: lowest to highest seed. Broken line: 1/e, which a "
-        "stretched exponential to 0 crosses at τ whatever its exponent."
+        f"Line: mean over seeds of means over {width:.2g} s; {BAND}. Broken line: 1/e, which a stretched exponential "
+        "to 0 crosses at τ whatever its exponent."
     )
-    return finished(figure, path, [told, *footer])
+    return finished(figure, path, [told], footer)
 
 
 def _histories(runs: Sequence[RunManifest], gamma: float) -> list[History]:
@@ -130,7 +140,7 @@ def _draw_law(path: Path, levels: pd.DataFrame, activations: pd.DataFrame, foote
             look=look,
             label=rf"$l/w$ = {aspect:g}",
         )
-        _draw_bounds(axes, 1 / part[GAMMA] + place, part[LOG].where(part[CENSORED] > 0), look)
+        _draw_open(axes, 1 / part[GAMMA] + place, part[LOG].where(part[CENSORED] > 0), look)
         if math.isfinite(deltas[aspect]):
             axes.plot([0, end], [0, deltas[aspect] * end], color=colour, linewidth=0.7)
     axes.set_xlim(0, end)
@@ -139,19 +149,15 @@ def _draw_law(path: Path, levels: pd.DataFrame, activations: pd.DataFrame, foote
     axes.set_ylabel(r"collapse time $\ln(f\tau)$ [-]")
     axes.legend(loc="upper left")
     told = (
-        "Points: means over seeds by the height `remaining`, set apart sideways by a little; lines: the law "
-        "τ = (1/f) exp(Δ/Γ) with the Δ of each l/w. Open, with an arrow: a run did not collapse, the mean is a bound."
+        "By the height `remaining`, set apart sideways by a little. Lines: τ = (1/f) exp(Δ/Γ) with the Δ of each l/w. "
+        "Open, with an arrow: a run did not collapse, the mean is a bound."
     )
-    return finished(figure, path, [told, *footer])
+    return finished(figure, path, [told], footer)
 
 
-def _draw_bounds(axes: Axes, x: Any, values: Any, look: Mapping[str, Any]) -> None:
-    """Lower bounds: open markers with an arrow upwards; NaN are left out."""
-    known = np.isfinite(np.asarray(values, dtype=np.float64))
-    if known.any():
-        open_look = {"markersize": 3.4, **look, "markerfacecolor": "white", "linestyle": "none"}
-        at, bounds = np.asarray(x)[known], np.asarray(values)[known]
-        axes.errorbar(at, bounds, yerr=0.05 * np.abs(bounds) + 0.2, lolims=True, **open_look)
+def _draw_open(axes: Axes, x: pd.Series, least: pd.Series, look: Mapping[str, Any]) -> None:
+    """Lower bounds: open markers with an arrow upwards."""
+    draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={"markersize": 3.4, **look, "markerfacecolor": "white"})
 
 
 def _draw_activations(path: Path, activations: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -173,13 +179,12 @@ def _draw_activations(path: Path, activations: pd.DataFrame, footer: Sequence[st
         look = _LOOKS[name] | ({} if name == REMAINING else {"linewidth": 0.5, "linestyle": (0, (2, 1.5))})
         x = part[ASPECT] + _SHIFTS[name]
         draw_means(axes, x, part[ACTIVATION], part[HALF_WIDTH], look=look, label=f"here, {label}")
-        _draw_bounds(axes, x, part[AT_LEAST].where(part[ACTIVATION].isna()), look)
+        _draw_open(axes, x, part[AT_LEAST].where(part[ACTIVATION].isna()), look)
     axes.set_ylim(0, None)
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"activation $\Delta$ [-]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     told = (
-        "Points are set apart sideways by 0.012 in l/w. Gravish's have no error bars: theirs are unknown. Open circle "
-        "with an arrow: no acceleration at which all runs collapsed, a bound."
+        "Set apart sideways by 0.012 in l/w. Open, with an arrow: no acceleration at which all runs collapsed, a bound."
     )
-    return finished(figure, path, [told, *footer])
+    return finished(figure, path, [told, told_points(sorted(activations[ASPECT].unique()))], footer)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from importlib.resources import files
 from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
-from studies.base.references import Reference
+from studies.base.references import Reference, told_gaps
 
 _FILE = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 
@@ -34,3 +35,9 @@ def reference_delta(aspect: float) -> float:
     reference = read_collapse_reference()
     same = np.isclose(reference["l_over_w"], aspect, rtol=0, atol=1e-6)
     return float(reference.loc[same, "delta"].iloc[0]) if same.any() else math.nan
+
+
+def told_points(aspects: Sequence[float]) -> str:
+    """What Gravish's Δ are, and at which of these l/w [-] there is none, for figures."""
+    gaps = told_gaps({"Δ": [aspect for aspect in aspects if math.isnan(reference_delta(aspect))]})
+    return f"{COLLAPSE.statement}; {gaps}."

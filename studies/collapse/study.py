@@ -112,6 +112,10 @@ class Collapse(PaperStudy):
         """By which definition Δ is."""
         return f"By {REMAINING}: {DEFINITIONS[REMAINING]}. Others are in points.csv."
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds."""
+        return f"{told_seeds(analysis.tables['runs'], analysis.tables['times'][SEEDS], 'point')}."
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Heights against time, collapse times against Γ, Δ against l/w."""
         return figures.draw(

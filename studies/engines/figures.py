@@ -7,10 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from postprocess.report import figures
-from studies.base.figures import finished, marker
+from studies.base.figures import draw_means, finished, marker
 from studies.engines.findings import PITCH, REFINED, Equivalence, Verdict
 
 if TYPE_CHECKING:
@@ -47,9 +45,8 @@ def _draw_differences(path: Path, judged: Sequence[Equivalence], footer: Sequenc
     for place, one in enumerate(shown):
         colour, margin = _COLOURS[one.verdict], one.quantity.margin
         axes.barh(place, 2 * margin, left=-margin, height=0.62, color=figures.SKY, alpha=0.3, linewidth=0)
-        error = None if np.isnan(one.half_width) else one.half_width
-        look = {**marker("o", colour, colour), "markersize": 3.4}
-        axes.errorbar(one.percent, place, xerr=error, **look, linestyle="none")
+        look = {**marker("o", colour, colour), "linestyle": "none"}
+        draw_means(axes, [one.percent], [place], None, across=[one.half_width], look=look, label="_nolegend_")
     for verdict in dict.fromkeys(one.verdict for one in shown):
         axes.plot([], [], "o", color=_COLOURS[verdict], markersize=3.4, label=verdict)
     axes.axvline(0.0, color=figures.BLACK, linewidth=0.6)
@@ -58,7 +55,7 @@ def _draw_differences(path: Path, judged: Sequence[Equivalence], footer: Sequenc
     axes.set_xlabel("links less YADE over YADE's mean [%]")
     if shown:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    return finished(figure, path, ["Bands: margins, chosen beforehand.", *footer])
+    return finished(figure, path, ["Bands: margins, chosen beforehand."], footer)
 
 
 def _draw_pitch(path: Path, pitch: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -75,19 +72,10 @@ def _draw_pitch(path: Path, pitch: pd.DataFrame, footer: Sequence[str]) -> list[
         limit = float(part.loc[part[PITCH] == 0, "mean [-]"].iloc[0])
         x = part[PITCH] + 0.012 * (place - 2)
         values, errors = part["mean [-]"] / limit, part["mean 95 % [-]"].to_numpy() / limit
-        axes.errorbar(
-            x,
-            values,
-            yerr=errors,
-            **marker(shape, colours[name], colours[name]),
-            markersize=3.2,
-            linewidth=0.7,
-            label=name,
-        )
+        draw_means(axes, x, values, errors, look=marker(shape, colours[name], colours[name]), label=name)
     axes.axhline(1.0, color=figures.GREY, linewidth=0.6)
     axes.set_xlabel("pitch over sphere diameter; links at 0 [-]")
     axes.set_ylabel("mean over that of links [-]")
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    note = "Error bars: 95 % of each mean; that of links stands at 0. Points are set apart sideways."
-    return finished(figure, path, [note, *footer])
+    return finished(figure, path, ["Set apart sideways; the error bar of links' own mean stands at 0."], footer)

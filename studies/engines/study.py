@@ -14,7 +14,7 @@ from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import told_number
 from studies.base.references import Reference
-from studies.base.runs import Collected, MeasuredRun
+from studies.base.runs import Collected, MeasuredRun, told_numbers
 from studies.base.study import Analysis, Study, Tables
 from studies.engines import figures
 from studies.engines.findings import CRITERION, PITCH, Equivalence, equivalence_table, judged, refinement
@@ -68,9 +68,8 @@ class Engines(Study[Equivalence]):
         """Which runs, and how verdicts come about."""
         runs = analysis.tables["runs"]
         counts = ", ".join(f"{case} {len(part)}" for case, part in runs.groupby(CASE, sort=False))
-        seeds = " ".join(map(str, sorted(set(runs[SEED]))))
         return (
-            f"cases and their runs: {counts}; seeds {seeds}.",
+            f"cases and their runs: {counts}; seeds {told_numbers(runs[SEED])}.",
             f"{CRITERION}. One true difference in twenty lies outside its interval by chance.",
         )
 
@@ -104,6 +103,10 @@ class Engines(Study[Equivalence]):
             *table_lines(["quantity", "pitch", "seeds", "mean", "less links [%]"], pitch),
             *meaning_lines("runs.csv", COLUMNS),
         ]
+
+    def about_points(self, analysis: Analysis[Equivalence]) -> str:
+        """Seeds."""
+        return f"seeds {told_numbers(analysis.tables['runs'][SEED])}."
 
     def draw(self, output: Path, analysis: Analysis[Equivalence], footer: Sequence[str]) -> Sequence[Path]:
         """Differences against margins, and means against pitch."""

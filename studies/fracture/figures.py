@@ -14,10 +14,12 @@ from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
 from studies.base.figures import (
     ASPECT_LABEL,
+    BAND,
     COLOURS,
     SHAPES,
     THETA_LABEL,
     History,
+    draw_bounds,
     draw_history,
     draw_means,
     finished,
@@ -53,10 +55,7 @@ _LABELS = {
     INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
     STATIC: "static",
 }
-_HISTORIES = (
-    f"Line: mean over seeds of means over {WINDOW:g} s, as far as all of them go; band: lowest to highest seed; "
-    "in brackets: seeds."
-)
+_HISTORIES = f"Line: mean over seeds of means over {WINDOW:g} s, as far as all of them go; {BAND}; in brackets: seeds."
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,17 +92,17 @@ def draw(
     amplitudes, aspects = _amplitudes(runs), _aspects(runs)
     at_aspect, at_amplitude = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
     with figures.style():
-        written = _draw_forces(output / "force_time", _procedures(), runs, by_name, [at_aspect, *footer])
-        below = [f"{at_aspect} Without what goes from hook to hook.", *footer]
-        written += _draw_forces(output / "net_time", _procedures(), runs, by_name, below, net=True)
+        written = _draw_forces(output / "force_time", _procedures(), runs, by_name, footer, told=[at_aspect])
+        told = [f"{at_aspect} Without what goes from hook to hook."]
+        written += _draw_forces(output / "net_time", _procedures(), runs, by_name, footer, told=told, net=True)
         if len(amplitudes) > 1:
-            below = [f"Internal oscillation, {at_aspect}", *footer]
-            written += _draw_forces(output / "force_time_theta", amplitudes, runs, by_name, below)
-            written += _draw_peaks(output / "peak_theta", THETA, points, below)
+            told = [f"Internal oscillation, {at_aspect}"]
+            written += _draw_forces(output / "force_time_theta", amplitudes, runs, by_name, footer, told=told)
+            written += _draw_peaks(output / "peak_theta", THETA, points, told, footer)
         if len(aspects) > 1:
-            below = [f"Internal oscillation, {at_amplitude}", *footer]
-            written += _draw_forces(output / "force_time_aspect", aspects, runs, by_name, below)
-            written += _draw_peaks(output / "peak_aspect", ASPECT, points, below)
+            told = [f"Internal oscillation, {at_amplitude}"]
+            written += _draw_forces(output / "force_time_aspect", aspects, runs, by_name, footer, told=told)
+            written += _draw_peaks(output / "peak_aspect", ASPECT, points, told, footer)
         written += _draw_crossings(output / "peak_crossings", points, runs, footer)
     return written
 
@@ -156,6 +155,7 @@ def _draw_forces(
     by_name: Mapping[str, RunManifest],
     footer: Sequence[str],
     *,
+    told: Sequence[str],
     net: bool = False,
 ) -> list[Path]:
     figure, axes = figures.new_figure(height=2.8)
@@ -173,10 +173,10 @@ def _draw_forces(
     axes.set_xlabel(_TIME_LABEL)
     axes.set_ylabel(_NET_LABEL if net else _FORCE_LABEL)
     legend_above(axes)
-    return finished(figure, path, [f"{_HISTORIES} Broken line: weight of all smarticles.", *footer])
+    return finished(figure, path, [*told, f"{_HISTORIES} Broken line: weight of all smarticles."], footer)
 
 
-def _draw_peaks(path: Path, x: str, points: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
+def _draw_peaks(path: Path, x: str, points: pd.DataFrame, told: Sequence[str], footer: Sequence[str]) -> list[Path]:
     """Peak force of the internal oscillation over θ or l/w, and of the other procedures beside it."""
     figure, axes = figures.new_figure(height=2.6)
     internal = points[points[PROCEDURE] == INTERNAL]
@@ -187,11 +187,11 @@ def _draw_peaks(path: Path, x: str, points: pd.DataFrame, footer: Sequence[str])
     axes.set_xlabel(THETA_LABEL if x == THETA else ASPECT_LABEL)
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)
-    return finished(figure, path, footer)
+    return finished(figure, path, told, footer)
 
 
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
-    """Peak force against ⟨N⟩: every run, and the means with their standard errors."""
+    """Peak force against ⟨N⟩: every run, and the means."""
     figure, axes = figures.new_figure(height=2.8)
     for line in _all_points(runs):
         one, mean = line.part(runs), line.part(points)
@@ -199,22 +199,23 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
             continue
         axes.plot(one[CROSSINGS], one[PEAK], line.shape, color=line.colour, markersize=1.8, alpha=0.55)
         held = one[one[HELD_FAST] > 0]
-        arrow: dict[str, Any] = {
-            "yerr": 0.08 * float(runs[PEAK].max()),
-            "lolims": True,
-            "linestyle": "none",
-            "capsize": 1.6,
-        }
-        axes.errorbar(held[CROSSINGS], held[PEAK], **arrow, color=line.colour, elinewidth=0.6, alpha=0.55)
-        look = {"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"}
-        errors = {"xerr": mean[marked(CROSSINGS, "SE")], "yerr": mean[marked(PEAK, "SE")]}
-        axes.errorbar(mean[CROSSINGS], mean[PEAK], **errors, **look, label=line.label)
+        arrow = {"color": line.colour, "elinewidth": 0.6, "alpha": 0.55, "capsize": 1.6}
+        draw_bounds(axes, held[CROSSINGS], held[PEAK], 0.08 * float(runs[PEAK].max()), look=arrow)
+        draw_means(
+            axes,
+            mean[CROSSINGS],
+            mean[PEAK],
+            mean[marked(PEAK, "95 %")],
+            across=mean[marked(CROSSINGS, "95 %")],
+            look={"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"},
+            label=line.label,
+        )
     axes.set_xlabel(_CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)
     legend_above(axes)
-    told = "Small: single runs, with an arrow: held fast; large: means over seeds with standard errors, not 95 %."
-    return finished(figure, path, [told, *footer])
+    told = "Small: single runs, with an arrow: held fast, a lower bound; large: means over seeds."
+    return finished(figure, path, [told], footer)
 
 
 def _procedures() -> list[_Line]:

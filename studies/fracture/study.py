@@ -117,6 +117,11 @@ class Fracture(PaperStudy):
         account = f"`{ACCOUNT}` of `runs.csv`: ∫ F dz from the series over the work that the engine added up, less 1."
         return [*super().text(analysis), "", account]
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds, and how many piles held fast."""
+        runs = analysis.tables["runs"]
+        return " ".join([f"{told_seeds(runs, analysis.tables['points'][SEEDS], 'point')}.", *_told_held(runs)])
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Forces against time, and peaks against θ, l/w and ⟨N⟩."""
         return figures.draw(

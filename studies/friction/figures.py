@@ -11,8 +11,8 @@ import numpy as np
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
-from studies.base.figures import History, binned, draw_means, finished, marker
-from studies.base.references import DIGITISING_ERROR, SHAKE_TIME, read_reference, reference_at
+from studies.base.figures import BAND, History, binned, draw_means, finished, marker
+from studies.base.references import DIGITISING_ERROR, SHAKE_TIME, read_reference, reference_at, told_reference
 from studies.base.runs import MeasuredRun
 from studies.base.shaken import STAGES
 from studies.friction.measure import FRICTION, WINDOW, history_of
@@ -89,8 +89,8 @@ def _draw_packing(path: Path, points: pd.DataFrame, crossings: pd.DataFrame, foo
     panels[0].set_ylabel(_PHI_LABEL)
     panels[0].set_ylim(bottom=0)
     _legend(figure, panels)
-    bars = "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured."
-    return finished(figure, path, [bars, *footer])
+    told = "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured."
+    return finished(figure, path, [told, told_reference(ratios, ("phi_0", "phi_f"))], footer, pooled=True)
 
 
 def _draw_crossings(axes: Axes, crossings: pd.DataFrame) -> None:
@@ -125,9 +125,10 @@ def _draw_deviation(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> 
     _legend(figure, panels)
     steel = (
         "Green above the axis: published static coefficients of dry steel on steel, as it comes (line) and clean "
-        f"(thick). Points are set apart sideways by {_BESIDE:g}; error bars have that of reading Gravish's points."
+        f"(thick). Set apart sideways by {_BESIDE:g}; error bars have that of reading Gravish's points in them."
     )
-    return finished(figure, path, [steel, *footer])
+    told = [steel, told_reference(ratios, ("phi_0", "phi_f"))]
+    return finished(figure, path, told, footer, pooled=True)
 
 
 def _draw_steel(axes: Axes) -> None:
@@ -150,9 +151,7 @@ def _draw_history(path: Path, runs: Sequence[MeasuredRun], footer: Sequence[str]
                 _draw_growth(axes, seeds, colours[friction], f"{friction:g}")
         value = reference_at(read_reference(), ratio, "phi_f")
         if np.isfinite(value):
-            axes.errorbar(
-                SHAKE_TIME, value, yerr=DIGITISING_ERROR, **marker("o", figures.ORANGE, figures.ORANGE), zorder=5
-            )
+            axes.plot([SHAKE_TIME], [value], "o", color=figures.ORANGE, zorder=5)
         axes.set_xscale("log")
         axes.set_xticks([0.5, 1, 2, 5, 10, 20], labels=["0.5", "1", "2", "5", "10", "20"])
         axes.minorticks_off()
@@ -161,10 +160,8 @@ def _draw_history(path: Path, runs: Sequence[MeasuredRun], footer: Sequence[str]
     panels[0].set_ylabel(_PHI_LABEL)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, title=r"$\mu$", loc="outside right center")
-    told = (
-        f"Line: mean over seeds of means over {WINDOW:g} s; band: lowest to highest seed. Circle: Gravish after 20 s."
-    )
-    return finished(figure, path, [told, *footer])
+    told = f"Line: mean over seeds of means over {WINDOW:g} s; {BAND}. Circle: φ_f of Gravish after {SHAKE_TIME:g} s."
+    return finished(figure, path, [told, told_reference(ratios, ("phi_f",))], footer)
 
 
 def _draw_growth(axes: Axes, seeds: Sequence[History], colour: str, label: str) -> None:

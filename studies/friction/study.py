@@ -173,6 +173,12 @@ class Friction(Study[Question]):
             ),
         ]
 
+    def about_points(self, analysis: Analysis[Question]) -> str:
+        """Seeds, and what φ is."""
+        runs = analysis.tables["runs"]
+        counts = runs.groupby([ASPECT, FRICTION]).size()
+        return f"{told_seeds(runs, counts, 'point')}; shaken for {told_shaken(runs)}; φ by {DEFINITION}."
+
     def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
         """φ and its deviation against friction, and φ against time."""
         return figures.draw(

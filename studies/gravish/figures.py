@@ -23,6 +23,7 @@ from studies.base.figures import (
     marker,
     told_histories,
 )
+from studies.base.references import told_reference
 from studies.base.runs import ENGINES
 from studies.base.shaken import SHAKEN, packing_history
 
@@ -42,7 +43,6 @@ def draw(
     reference: pd.DataFrame,
     manifests: Sequence[RunManifest],
     definition: str,
-    reading_error: float,
     footer: Sequence[str],
 ) -> list[Path]:
     """Draws and writes all figures.
@@ -53,7 +53,6 @@ def draw(
         reference: See `references.read_reference`.
         manifests: The runs behind the summary.
         definition: Of the packing fraction that is compared.
-        reading_error: Of the reference's points [-].
         footer: Origin, one statement each.
 
     Returns:
@@ -61,14 +60,7 @@ def draw(
     """
     with figures.style():
         return [
-            *_draw_packing(
-                output / "phi",
-                summary,
-                reference,
-                footer,
-                definition=definition,
-                reading_error=reading_error,
-            ),
+            *_draw_packing(output / "phi", summary, reference, footer, definition=definition),
             *_draw_crossings(output / "crossings", summary, footer),
             *_draw_history(output / "phi_time", manifests, footer),
         ]
@@ -81,29 +73,22 @@ def _draw_packing(
     footer: Sequence[str],
     *,
     definition: str,
-    reading_error: float,
 ) -> list[Path]:
     several = engines_of(summary)
     figure, axes = figures.new_figure(width=_WIDE, height=3.4) if several else figures.new_figure(height=2.7)
     whose = TOLD.get(several[0], several[0]) if several else "simulation"
     for column, face, label in (
-        ("phi_initial", "white", r"experiment, $\phi_0$ before shaking"),
-        ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after shaking"),
+        ("phi_initial", "white", r"experiment, $\phi_0$ before"),
+        ("phi_final", figures.ORANGE, r"experiment, $\phi_\mathrm{f}$ after"),
     ):
-        axes.errorbar(
-            reference["l_over_w"],
-            reference[column],
-            yerr=reading_error,
-            **marker("o", figures.ORANGE, face),
-            markersize=5.5,
-            linestyle="none",
-            label=label,
-        )
+        # Without error bars: that of reading is less than the circles, and no error of ours.
+        look = {**marker("o", figures.ORANGE, face), "markersize": 5.5, "linestyle": "none"}
+        draw_means(axes, reference["l_over_w"], reference[column], None, look=look, label=label)
     blue, sky = figures.BLUE, figures.SKY
     for stage, shape, colour, face, label in (
-        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before shaking"),
+        ("phi_0", "D", blue, "white", rf"{whose}, $\phi_0$ before"),
         ("phi_f relaxed", "^", sky, sky, rf"{whose}, $\phi_\mathrm{{f}}$ at rest again"),
-        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end of shaking"),
+        ("phi_f", "D", blue, blue, rf"{whose}, $\phi_\mathrm{{f}}$ at the end"),
     ):
         _draw_means(axes, judging(summary), f"{stage} {definition}", marker(shape, colour, face), label)
     for engine in several[1:]:
@@ -119,11 +104,9 @@ def _draw_packing(
     axes.set_xlabel(ASPECT_LABEL)
     axes.set_ylabel(r"packing fraction $\phi$ [-]")
     axes.set_ylim(bottom=0)
-    if several:
-        legend_above(axes)
-    else:
-        axes.legend(loc="upper right")
-    return finished(figure, path, footer)
+    legend_above(axes)
+    ratios = sorted({*reference["l_over_w"].round(6), *summary[_ASPECT]})
+    return finished(figure, path, [told_reference(ratios, ("phi_0", "phi_f"))], footer)
 
 
 def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -144,7 +127,7 @@ def _draw_crossings(path: Path, summary: pd.DataFrame, footer: Sequence[str]) ->
         legend_above(axes)
     else:
         axes.legend(loc="best")
-    return finished(figure, path, ["Points are set apart sideways by 0.01 in l/w.", *footer])
+    return finished(figure, path, ["Set apart sideways by 0.01 in l/w."], footer)
 
 
 def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence[str]) -> list[Path]:
@@ -180,7 +163,7 @@ def _draw_history(path: Path, manifests: Sequence[RunManifest], footer: Sequence
         told.append(f"Dashed: {', '.join(others)}; lines without dashes: {TOLD.get(first, first)}.")
     if without:
         told.append(f"No time series of φ: {', '.join(without)}.")
-    return finished(figure, path, [*told, *footer])
+    return finished(figure, path, told, footer)
 
 
 def _draw_means(

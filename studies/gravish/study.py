@@ -30,7 +30,7 @@ from studies.base.engines import (
     told_engines,
 )
 from studies.base.questions import Question, questions_table
-from studies.base.references import DIGITISING_ERROR, GRAVISH, SHAKE_TIME, Reference, read_reference
+from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
 from studies.base.study import Analysis, Study, Tables
@@ -169,6 +169,14 @@ class Gravish(Study[Question]):
             *engine_lines(analysis.tables.get("engines"), {"l/w": lambda row: f"{row[ASPECT]:g}"}),
         ]
 
+    def about_points(self, analysis: Analysis[Question]) -> str:
+        """Seeds, and what φ is."""
+        every = analysis.tables["runs"]
+        runs = judging(every)
+        seeds = told_seeds(runs, runs.groupby(ASPECT).size(), "l/w")
+        others = _others_shaken(every) if told_engines(every) else []
+        return " ".join([f"{seeds}; shaken for {told_shaken(runs)}; φ by {DEFINITION}.", *others])
+
     def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
         """φ and crossings against l/w, and φ against time."""
         return figures.draw(
@@ -177,7 +185,6 @@ class Gravish(Study[Question]):
             reference=read_reference(),
             manifests=analysis.found.manifests,
             definition=DEFINITION,
-            reading_error=DIGITISING_ERROR,
             footer=footer,
         )
 

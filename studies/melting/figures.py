@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.figures import COLOURS, History, bin_width, draw_history, finished
+from studies.base.figures import BAND, COLOURS, History, bin_width, draw_history, finished
 from studies.base.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
 from studies.base.runs import MeasuredRun
@@ -104,9 +104,9 @@ def _draw_times(
     how = f"lifted at {lift:g} m/s" if lift else "gone at once"
     told = (
         f"l/w = {aspect:g}, wall {how}; time from when it began to. Line: mean over seeds of means over {width:.2g} s; "
-        "band: lowest to highest seed."
+        f"{BAND}."
     )
-    return finished(figure, path, [told, *footer])
+    return finished(figure, path, [told], footer)
 
 
 def _draw_pictures(
@@ -128,4 +128,4 @@ def _draw_pictures(
     if not rows:
         return []
     columns = ("before the wall goes", "0.1 s after", "at the end")
-    return [draw_strip(rows, path, columns=columns, footer=[_COLOURS, footer[0], footer[-1]])]
+    return [draw_strip(rows, path, columns=columns, footer=[_COLOURS, *footer])]

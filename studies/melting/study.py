@@ -117,9 +117,9 @@ class Melting(PaperStudy):
         """Says when they are taken as well."""
         return "Means over seeds ± standard error, at the end of the run."
 
-    def below_figures(self, footer: Sequence[str]) -> Sequence[str]:
-        """Not what error bars are: figures have bands, and say so."""
-        return [line for line in super().below_figures(footer) if not line.startswith("Error bars")]
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds."""
+        return f"{told_seeds(analysis.tables['runs'], analysis.tables['points'][SEEDS], 'point')}."
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Every measure against time, and pictures."""

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 _SHOWN_ASPECT = 0.7
 """Aspect ratio whose heights are drawn against time, as in the paper [-]."""
 
-_PHI_LABEL = r"packing fraction $\phi_\mathrm{f}$ at the end of the activity [-]"
+_PHI_LABEL = "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]"
 _ENERGY_LABEL = "energy per smarticle [J]"
 _INTERNAL_LABEL = rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°"
 _LABELS = {
@@ -61,7 +61,7 @@ _LABELS = {
 }
 # To keep error bars apart.
 _SHIFTS = {SHAPE: -0.006, EXTERNAL: 0.006, INTERNAL: 0.0, STATIC: 0.0}
-_APART = "Points are set apart sideways by 0.006 in l/w."
+_APART = "Set apart sideways by 0.006 in l/w."
 
 
 def draw(
@@ -175,7 +175,7 @@ def _draw_panel(path: Path, panel: _Panel, points: pd.DataFrame, footer: Sequenc
         axes.set_ylim(bottom=0)
     legend_above(axes)
     shifted = any(line.shift for line in lines)
-    return finished(figure, path, [*([_APART] if shifted else []), *footer])
+    return finished(figure, path, [_APART] if shifted else [], footer)
 
 
 def _draw_beside(axes: Axes, panel: _Panel, points: pd.DataFrame, engine: str) -> None:
@@ -223,4 +223,4 @@ def _draw_heights(
     told = [f"l/w = {aspect:g}. {told_histories(width, 'Each activity')}"]
     if without:
         told.append(f"No time series of the height: {', '.join(without)}.")
-    return finished(figure, path, [*told, *footer])
+    return finished(figure, path, told, footer)

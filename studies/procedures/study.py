@@ -111,6 +111,12 @@ class Procedures(PaperStudy):
             "swings to 90° + θ/2 · 0.7/(l/w), 105° at most, so θ is at most 30° (l/w)/0.7.",
         ]
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds, and what φ is."""
+        points_ = judging(analysis.tables["points"])
+        seeds = told_seeds(judging(analysis.tables["runs"]), points_[SEEDS], "point")
+        return f"{seeds}; φ_f by {DEFINITION} over the last 20 frames of the activity."
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Heights against time, and means against l/w and θ."""
         return figures.draw(

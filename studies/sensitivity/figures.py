@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from postprocess.report import figures
-from studies.base.references import DIGITISING_ERROR
+from studies.base.figures import draw_means, finished, marker
+from studies.base.references import DIGITISING_ERROR, told_reference
 from studies.base.runs import DEFINITION
 from studies.base.shaken import STAGES
 
@@ -20,6 +21,7 @@ _WIDTH = 1.5 * figures.COLUMN_WIDTH
 _ROW = 0.19  # inch per variant
 _BELOW = 0.28  # rows by which single runs stand below their mean
 _MARGIN = 0.85  # inch for title, axis and legend
+_LEAST = 2.2  # inch: a footer is a fifth of the figure at most
 _SYMBOLS = {"phi_0": r"$\phi_0$", "phi_f": r"$\phi_\mathrm{f}$"}
 
 
@@ -28,6 +30,7 @@ def draw(
     *,
     runs: pd.DataFrame,
     summary: pd.DataFrame,
+    aspect: float,
     reference: Mapping[str, float],
     footer: Sequence[str],
 ) -> list[Path]:
@@ -37,6 +40,7 @@ def draw(
         path: Without suffix.
         runs: See `measure.sensitivity_row`.
         summary: See `measure.summarise_variants`; its first row is the baseline.
+        aspect: Aspect ratio of the runs [-].
         reference: Gravish's value of each stage, NaN without one [-].
         footer: Origin, one statement each.
 
@@ -44,7 +48,7 @@ def draw(
         The files written.
     """
     with figures.style():
-        figure = figures.blank_figure(_WIDTH, _MARGIN + _ROW * len(summary))
+        figure = figures.blank_figure(_WIDTH, max(_MARGIN + _ROW * len(summary), _LEAST))
         panels = figure.subplots(1, len(reference), sharey=True)
         for axes, (stage, value) in zip(panels, reference.items(), strict=True):
             _draw_panel(axes, stage, runs, summary, value)
@@ -55,8 +59,7 @@ def draw(
             label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
         figure.legend(shown.values(), shown.keys(), loc="outside upper center", ncols=len(shown))
-        figures.add_footer(figure, ["Small dots: single runs.", *footer])
-        return figures.save(figure, path)
+        return finished(figure, path, ["Small dots: single runs.", told_reference([aspect], list(reference))], footer)
 
 
 def _draw_panel(axes: Axes, stage: str, runs: pd.DataFrame, summary: pd.DataFrame, reference: float) -> None:
@@ -74,18 +77,8 @@ def _draw_panel(axes: Axes, stage: str, runs: pd.DataFrame, summary: pd.DataFram
     places = {variant: row for row, variant in enumerate(summary["variant"])}
     below = runs["variant"].map(places) + _BELOW
     axes.plot(runs[column], below, linestyle="none", marker=".", markersize=2.4, color=figures.GREY)
-    axes.errorbar(values, rows, xerr=bars, **_marker(), label="mean over seeds, 95 %")
+    look = {**marker("D", figures.BLUE, figures.BLUE), "linestyle": "none"}
+    draw_means(axes, values, rows, None, across=bars, look=look, label="mean over seeds")
     axes.set_xlabel(f"{_SYMBOLS[stage]} {STAGES[stage]} [-]")
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)
-
-
-def _marker() -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "marker": "D",
-        "markersize": 3.2,
-        "color": figures.BLUE,
-        "elinewidth": 0.8,
-        "capthick": 0.8,
-    }

@@ -84,12 +84,19 @@ class Sensitivity(Study[Never]):
             *table_lines(header, [list(map(str, row)) for row in cells]),
         ]
 
+    def about_points(self, analysis: Analysis[Never]) -> str:
+        """Seeds, and what φ is."""
+        runs = analysis.tables["runs"]
+        seeds = told_seeds(runs, runs.groupby(VARIANT, sort=False).size(), VARIANT)
+        return f"{seeds}; baseline {_baseline(analysis)}; φ by {DEFINITION}."
+
     def draw(self, output: Path, analysis: Analysis[Never], footer: Sequence[str]) -> Sequence[Path]:
         """φ before and after shaking, one row per variant."""
         return figures.draw(
             output / "sensitivity",
             runs=analysis.tables["runs"],
             summary=analysis.tables["summary"],
+            aspect=round(analysis.found.manifests[0].aspect_ratio, 6),
             reference=_gravish(analysis),
             footer=footer,
         )

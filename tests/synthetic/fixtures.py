@@ -34,6 +34,7 @@ def make_run(tmp_path_factory):
         directory = tmp_path_factory.mktemp("run")
         made = SyntheticRun(name="pile", seed=7, count=6, phases=PHASES)
         write_manifest(directory, made, scene_sha256="abc")
+        (directory / "scene.yaml").write_text("schema_version: 1\nfidelity: {rows: 1, pitch: 1.0}\n", encoding="utf-8")
         pile = random_scene(6, 3, box=1.5, width=W, angles=(90, 90)) - [W / 2, W / 2, 0]
         frames = FrameWriter(directory)
         for number, (phase, lift) in enumerate(plan):

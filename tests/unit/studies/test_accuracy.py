@@ -46,13 +46,16 @@ RESTITUTIONS = [
 COSTS = {"base": 1.0, "half": 2.0, "quarter": 4.0, "bouncy": 3.0}
 
 
-def table_of(phi_f, rungs=STEPS, *, phi_0=None):
-    """The table of work and precision of runs whose φ_f is given by setting, one value per seed."""
+def table_of(phi_f, rungs=STEPS, *, phi_0=None, apart=0.0):
+    """The table of work and precision of runs whose φ_f is given by setting, one value per seed.
+
+    Costs of a setting rise by a share, `apart`, from seed to seed.
+    """
     rows = [
         {
             **{VARIANT: setting, SEED: seed, ASPECT: 0.7, COUNT: 60, ACTIVITY: "shake", TIME_STEP: 1e-5, SPHERES: 18},
             ENGINE: "yade",
-            **{COST: COSTS[setting], WALL: 10.0, EXPECTED: 1.0, RESIDUAL: math.nan, GAP: math.nan},
+            **{COST: COSTS[setting] * (1 + apart * seed), WALL: 10.0, EXPECTED: 1.0, RESIDUAL: math.nan, GAP: math.nan},
             **{COMPARED["phi_0"]: (phi_0 or {}).get(setting, 0.1) + 1e-3 * seed, COMPARED["phi_f"]: value},
             COMPARED["height"]: 3e-3 + 1e-4 * seed,
             COMPARED["crossings"]: 3.0 + 0.1 * seed,
@@ -80,6 +83,14 @@ def test_errors_and_bands_are_those_put_in():
     assert table.loc["base", marked(PHI_F, "SE")] == pytest.approx(0.001 / math.sqrt(3))
     assert table.loc["half", "seeds [-]"] == 0
     assert math.isnan(table.loc["half", "phi_f error [%]"])
+
+
+def test_error_bars_of_costs_are_of_the_kind_of_all_others():
+    """Not one standard error across beside 95 % upright."""
+    table = table_of({"base": [0.132, 0.133], "quarter": [0.120, 0.121]}, apart=0.01).set_index(VARIANT)
+    # Two seeds 1 % apart; t(0.975; 1).
+    assert table.loc["base", marked(COST, "SE")] == pytest.approx(0.005)
+    assert table.loc["base", marked(COST, "95 %")] == pytest.approx(0.005 * 12.706205)
 
 
 def test_pure_scatter_is_not_resolved():
@@ -234,9 +245,10 @@ def test_footers_tell_of_seeds_and_of_every_reference(ladder):
     report = ladder[2]
     words = ["Study accuracy, fidelity draft, standard: 10 of 12 runs, 2 missing", "2 to 3 per setting"]
     words += ["activity: shake", DEFINITION, "pooled over all settings", "time-step 0.225, restitution 0.7"]
+    assert not [word for word in words if word not in " ".join(report.footer)]
     svg = ElementTree.parse(report.files["accuracy.svg"]).getroot()
-    for text in (" ".join(report.footer), " ".join(" ".join(svg.itertext()).split())):
-        assert not [word for word in words if word not in text]
+    shown = " ".join(" ".join(svg.itertext()).split())
+    assert not [word for word in [*words[:4], "scatter pooled over all points"] if word not in shown]
     origin = json.loads(report.files["provenance.json"].read_text())
     assert origin["reference"] == {"time-step": "quarter", "restitution": "base"}
 

@@ -4,6 +4,7 @@ import csv
 import math
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -312,6 +313,16 @@ def test_figures_have_colours_in_every_panel(study):
             part = pixels[: int(0.8 * pixels.shape[0]), panel * width : (panel + 1) * width]
             assert (np.ptp(part, axis=2) > 60).mean() > 0.002, (name, panel)
     assert "Gravish, " in report.files["phi_friction.svg"].read_text()
+
+
+def test_figures_tell_which_points_gravish_has_not(study):
+    for name, told in {
+        "phi_friction": "no φ_0 at l/w = 1.",
+        "deviation_friction": "no φ_0 at l/w = 1.",
+        "phi_time": "at every l/w shown.",
+    }.items():
+        svg = ElementTree.parse(study[2].files[f"{name}.svg"]).getroot()
+        assert told in " ".join(" ".join(svg.itertext()).split()), name
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -235,13 +235,23 @@ def test_footers_tell_of_seeds_and_of_the_reference(study):
     _, _, report = study
     words = ["l/w 0.4 0.5 0.7, seeds 1 2 (1 to 2 per l/w); shaken for 20 s (Gravish: 20 s).", DEFINITION]
     words += [f"error of reading taken as ±{DIGITISING_ERROR:g}", ORIGIN["note"], ORIGIN["command"]]
+    short = ["seeds 1 2 (1 to 2 per l/w); shaken for 20 s", DEFINITION, "More: deviations.md, provenance.json."]
     assert not [word for word in words if word not in " ".join(report.footer)]
     assert len(json.loads(report.files["provenance.json"].read_text())["reference"]["sha256"]) == 64
     # In an SVG each line of the footer is an element of its own, and long statements are broken.
     for name in ("phi", "crossings", "phi_time"):
         root = ElementTree.parse(report.files[f"{name}.svg"]).getroot()
         drawn = " ".join(" ".join(root.itertext()).split())
-        assert not [word for word in words if word not in drawn]
+        assert not [word for word in short if word not in drawn]
+
+
+def test_a_point_that_was_never_digitised_is_told(study):
+    """Of l/w 0.5 and beyond 0.7 there is no φ_0: an empty place of the figure is no result."""
+    svg = ElementTree.parse(study[2].files["phi.svg"]).getroot()
+    shown = " ".join(" ".join(svg.itertext()).split())
+    assert "read to ±0.003; no φ_0 at l/w = 0.5, 0.8, 0.9, 1, 1.1, 1.2." in shown
+    # Its only error bars are ours: that of reading is told, and no second kind is drawn.
+    assert shown.count("Error bars:") == 1
 
 
 def test_figures_are_drawn_at_column_width(study):

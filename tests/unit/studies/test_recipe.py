@@ -53,8 +53,8 @@ class Toy(Study[str]):
     def text(self, analysis: Analysis[str]) -> Sequence[str]:
         return ["# Toys", "", *analysis.judged]
 
-    def below_figures(self, footer: Sequence[str]) -> Sequence[str]:
-        return footer[1:]
+    def about_points(self, analysis: Analysis[str]) -> str:
+        return "two toys."
 
     def draw(self, output: Path, analysis: Analysis[str], footer: Sequence[str]) -> Sequence[Path]:
         # What is drawn last can look at what was written before.
@@ -109,14 +109,19 @@ def test_every_output_names_its_origin(runs: list[Path], tmp_path: Path) -> None
         "Study toy, fidelity draft: 2 of 7 runs, 5 missing; 2 counted.",
         "Counts are exact.",
         "Reference: none.",
-        "Note: the full study as shipped",
+        "Note: only 2 of 7 runs of what is planned: the full study as shipped",
         "Versions: smarticles 0.1.0; git 0e4b151; yade 2023.02a. Command: smarticles study toy --out 'my toy'",
     )
     for name in ("runs.csv", "sums.csv", "missing.csv", "toy.md"):
         assert all(line in report.files[name].read_text() for line in report.footer)
-    assert report.files["toy.png"].read_text().splitlines() == list(report.footer[1:])
+    # Figures are to be looked at: they say which runs, and where all the rest is.
+    assert report.files["toy.png"].read_text().splitlines() == [
+        "Study toy, fidelity draft: 2 of 7 runs, 5 missing; two toys.",
+        "Planned: the full study as shipped. Commit 0e4b151. More: toy.md, provenance.json.",
+    ]
     origin = json.loads(report.files["provenance.json"].read_text())
-    assert (origin["study"], origin["note"], origin["command"]) == ("toy", ORIGIN["note"], ORIGIN["command"])
+    assert (origin["study"], origin["command"]) == ("toy", ORIGIN["command"])
+    assert origin["note"] == f"only 2 of 7 runs of what is planned: {ORIGIN['note']}"
     assert [run["directory"] for run in origin["runs"]] == list(map(str, runs[:2]))
     assert origin["reference"] == {"what": "nothing"}
     # Of φ only where a table has any.
@@ -135,7 +140,36 @@ def test_missing_runs_are_listed_with_their_cause(runs: list[Path], tmp_path: Pa
         f"{runs[5]}: is odd",
     ]
     text = report.files["toy.md"].read_text()
-    assert all(f"| {run.directory} | {run.status} |" in text for run in report.missing)
+    assert all(f"| 1 | {run.directory} | {run.status} | {run.common_cause} |" in text for run in report.missing)
+
+
+def test_a_study_that_is_whole_says_so(runs: list[Path], tmp_path: Path) -> None:
+    report = Toy().analyse(runs[:2], tmp_path / "out", **ORIGIN)
+    assert "Note: the full study as shipped" in report.footer
+    assert "The full study as shipped. Commit" in report.files["toy.png"].read_text()
+
+
+def test_of_a_variant_figures_say_that_it_is_one(runs: list[Path], tmp_path: Path) -> None:
+    note = "not the full study: 2 runs instead of 9; l_over_w: only 0.7 of 0.4, 0.7; shake_s: 1.5 instead of 5.0"
+    report = Toy().analyse(runs[:2], tmp_path / "out", note=note, command="x")
+    assert "Not the full study: 2 runs instead of 9 and more. Commit" in report.files["toy.png"].read_text()
+    assert f"Note: {note}" in report.footer
+
+
+def test_runs_that_are_missing_for_one_cause_are_one_line(runs: list[Path], tmp_path: Path) -> None:
+    absent = [tmp_path / f"absent{k}" for k in range(150)]
+    report = Toy().analyse([*runs[:2], *absent, runs[2]], tmp_path / "out", **ORIGIN)
+    text = report.files["toy.md"].read_text().split("## Missing runs")[1].split("---\n\n")[0]
+    rows = [line for line in text.splitlines() if line.startswith("| ")][2:]
+    assert len(rows) == 2
+    assert rows[0].startswith(
+        f"| 150 | {absent[0]}, … | not started | cannot read run directory RUN: no such directory;"
+    )
+    assert rows[1] == f"| 1 | {runs[2]} | failed | a smarticle escaped |"
+    # One by one they are in the table.
+    table = pd.read_csv(report.files["missing.csv"], comment="#")
+    assert table["directory"].tolist() == [str(path) for path in (*absent, runs[2])]
+    assert "`missing.csv`" in text
 
 
 def test_an_analysis_replaces_an_earlier_one(runs: list[Path], tmp_path: Path) -> None:

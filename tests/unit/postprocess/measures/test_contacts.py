@@ -1,11 +1,16 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
+from scipy.spatial.transform import Rotation
 
+from dem.body.particle import HINGE_CLEARANCE, Boxes, Particle, SphereChain
 from dem.errors import InputError
-from postprocess import contact_pairs, measure_run, neighbours_in_contact
+from postprocess import contact_pairs, measure_run, neighbours_in_contact, pairs_in_contact, read_frames, read_run
+from postprocess.geometry import chains
 from postprocess.geometry.links import swept_axes
-from postprocess.measures.contacts import segment_distances, without_support
+from postprocess.measures.contacts import chain_of, pairs_of_spheres, segment_distances, without_support
 
 
 def oracle_distance(p0, p1, q0, q1):
@@ -122,3 +127,72 @@ def test_swept_axes_end_a_radius_before_the_tips(shape):
     bar = swept_axes(shape(0.01, 0.0)[None], 1e-3)[0]
     assert np.ptp(bar[:, 0]) == pytest.approx(9e-3)
     assert np.ptp(swept_axes(shape(0.01, 0.7, (0.0, 0.0))[None], 1e-3)[0][:, 0]) == pytest.approx(23e-3)
+
+
+# -- what engines see ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("aspect_ratio", [0.0, 0.03, 0.1, 0.7, 1.1])
+@pytest.mark.parametrize(("rows", "pitch"), [(1, 1.3), (1, 0.5), (2, 1.0), (3, 0.7)])
+def test_spheres_are_where_the_simulator_puts_them(aspect_ratio, rows, pitch, turned):
+    w, d, t1 = 0.0117, 0.5e-3, 1.27e-3
+    boxes = Boxes(
+        middle_length=w, barb_length=aspect_ratio * w, thickness_normal=t1, thickness_in_plane=d, density=7850.0
+    )
+    if aspect_ratio == 0.0 and rows > 1:
+        pytest.skip("a straight bar has no plane that a frame could tell")
+    particle = Particle(boxes, SphereChain(rows=rows, diameter=d, pitch=pitch * d))
+    turn, shift = turned
+    found = chains.spheres(
+        (boxes.vertices @ turn.T + shift)[None], chains.Chain(diameter=d, rows=rows, width=t1, pitch=pitch * d)
+    )[0]
+    expected = particle.centres @ turn.T + shift
+    assert found.shape == expected.shape
+    # In whatever order.
+    apart = np.linalg.norm(found[:, None] - expected, axis=2)
+    assert apart.min(axis=0).max() < 1e-12
+    assert apart.min(axis=1).max() < 1e-12
+    assert chains._CLEARANCE == HINGE_CLEARANCE
+
+
+@pytest.fixture
+def turned():
+    return Rotation.from_euler("xyz", [0.3, -1.1, 2.0]).as_matrix(), np.array([0.01, -0.02, 0.03])
+
+
+def test_beads_rest_in_the_gaps_of_the_other_chain():
+    """Two rows of beads a diameter apart, shifted by half of it: they touch at √(3)/2 of a diameter, not at one."""
+    beads = np.array([[k, 0.0, 0.0] for k in range(8)])
+    for height, touch in ((0.87, False), (0.86, True)):
+        pairs = pairs_of_spheres(np.array([beads, beads + np.array([0.5, height, 0.0])]), 1.0)
+        assert (len(pairs.i) == 1) is touch
+    assert pairs.distance[0] == pytest.approx(np.hypot(0.5, 0.86))
+    # Head to head they do so at one, and spheres of one smarticle do not count.
+    assert len(pairs_of_spheres(np.array([beads, beads + np.array([0.0, 0.99, 0.0])]), 1.0).i) == 1
+    assert len(pairs_of_spheres(0.5 * beads[None], 1.0).i) == 0
+
+
+def test_strands_side_by_side_are_wider_than_one(shape):
+    """Two strands of 0.5 mm, 1.27 mm wide together: planes of two U touch at 1.27 mm, those of one strand at 0.5 mm."""
+    u = shape(0.01, 0.7)
+    for rows, limit in ((1, 0.5e-3), (2, 1.27e-3)):
+        chain = chains.Chain(diameter=0.5e-3, rows=rows, width=1.27e-3, pitch=0.0)
+        for gap, touch in ((0.99 * limit, True), (1.01 * limit, False)):
+            first, second = chains.strands(np.array([u, u + np.array([0, 0, gap])]), chain)
+            found = contact_pairs(np.concatenate([first, second]), chain.diameter)
+            assert any(i < rows <= j for i, j in zip(found.i, found.j, strict=True)) is touch
+
+
+def test_the_shapes_of_a_run_are_those_of_its_scene(make_run):
+    """YADE's chains have a pitch, the strands of links have none."""
+    run = make_run()
+    (run / "scene.yaml").write_text("fidelity: {rows: 2, pitch: 1.3}\n", encoding="utf-8")
+    manifest = read_run(run)
+    chain = chain_of(manifest)
+    assert (chain.rows, chain.pitch) == (2, pytest.approx(1.3 * manifest.sphere_diameter))
+    assert chain_of(dataclasses.replace(manifest, engine="links")).pitch == 0
+    pairs = pairs_in_contact(read_frames(run)[-1], manifest)
+    assert (pairs.i < pairs.j).all()
+    (run / "scene.yaml").write_text("fidelity: {rows: two}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"fidelity\.rows must be a finite number above 0: got 'two'"):
+        chain_of(manifest)

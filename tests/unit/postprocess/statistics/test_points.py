@@ -11,7 +11,6 @@ import pytest
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.bisection import least_reaching
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.findings import CRITERION, without_criterion
 from postprocess.statistics.pairs import compared, mean_difference, pairs, told_less
 from postprocess.statistics.points import averaged, marked, ordered, seeds_of, told_means, told_number
 from postprocess.statistics.seeds import mean_over_seeds
@@ -93,10 +92,6 @@ def test_one_must_be_clearly_beyond_each_of_the_others() -> None:
     assert compared({"a": far}, -1)[1] == "not found"
     ours, (_, verdict) = told_less({"a": far, "b": near}, ", "), compared({"a": far, "b": near}, 1)
     assert (", less b" in ours, verdict) == (True, "not resolved")
-
-
-def test_figures_do_not_say_how_verdicts_come_about() -> None:
-    assert without_criterion(["a", f"{CRITERION}.", "b"]) == ["a", "b"]
 
 
 def test_a_level_is_found_to_rounding() -> None:

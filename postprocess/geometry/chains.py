@@ -1,0 +1,87 @@
+"""What engines see of smarticles in place of their boxes: chains of spheres, or strands that a sphere sweeps.
+
+Frames hold the centrelines alone. Where each sphere is follows from them, from the chain's rows and pitch, and, of
+several rows, from the plane of the smarticle; a straight smarticle has none, and some plane through it is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postprocess.geometry.links import link_lengths, plane_frames, swept_axes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_CLEARANCE = 0.01  # `dem.body.particle.HINGE_CLEARANCE`; a test holds the two together
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain:
+    """How spheres stand for a smarticle.
+
+    Attributes:
+        diameter: Of the spheres [m].
+        rows: Rows, or strands, side by side along the smarticle's normal.
+        width: Of the rows together, along the normal [m].
+        pitch: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links.
+    """
+
+    diameter: float
+    rows: int
+    width: float
+    pitch: float
+
+    @property
+    def _offsets(self) -> NDArray[np.float64]:
+        reach = (self.width - self.diameter) / 2 if self.rows > 1 else 0.0
+        return np.linspace(-reach, reach, self.rows) if self.rows > 1 else np.zeros(1)
+
+
+def strands(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+    """What a sphere is swept along: (N, R, 4, 3) [m] for (N, 4, 3) [m] vertices and R strands."""
+    return _side_by_side(swept_axes(vertices, chain.diameter), vertices, chain)
+
+
+def spheres(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+    """Centres of the spheres: (N, S, 3) [m] for (N, 4, 3) [m] vertices.
+
+    Source:
+        `dem.body.particle`: the hinges' spheres belong to the middle link; a barb's begin a diameter and a little from
+        there, and end where the last one's surface is the tip.
+    """
+    lengths = link_lengths(vertices).mean(axis=0)
+    parts = []
+    for link, (start, end) in enumerate(((1, 0), (1, 2), (2, 3))):
+        along = vertices[:, end] - vertices[:, start]
+        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+        stations = _stations(float(lengths[link]), chain, middle=link == 1, barbs=bool(lengths[[0, 2]].any()))
+        parts.append(vertices[:, start, None] + stations[:, None] * along[:, None])
+    return _side_by_side(np.concatenate(parts, axis=1), vertices, chain).reshape(len(vertices), -1, 3)
+
+
+def _side_by_side(points: NDArray[np.float64], vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+    """Points (N, P, 3) of smarticles once per row: (N, R, P, 3)."""
+    if chain.rows == 1:
+        return points[:, None]
+    normals = plane_frames(vertices)[:, 2]
+    shifted: NDArray[np.float64] = points[:, None] + (chain._offsets[:, None] * normals[:, None])[:, :, None]
+    return shifted
+
+
+def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> NDArray[np.float64]:
+    """Distances of the centres along a link from its hinge [m]."""
+    if middle:
+        inset = 0.0 if barbs else chain.diameter / 2
+        start, end = inset, length - inset
+    else:
+        start, end = chain.diameter * (1 + _CLEARANCE), length - chain.diameter / 2
+        if end <= 0:
+            return np.empty(0)
+        if end <= start:
+            return np.array([end])
+    return np.linspace(start, end, max(2, math.ceil((end - start) / chain.pitch - 1e-9) + 1))
