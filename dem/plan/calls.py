@@ -94,10 +94,12 @@ def hooks(scene: Scene) -> Call:
     if hooks is None:
         return False, "no key hooks"
     pulls = _told(scene, EffectName.HOOKS)
+    grid = f", the lower one of {hooks.lower_bars} each way over {1e3 * hooks.lower_length_m:.3g} mm"
+    below = grid if hooks.lower_bars > 1 else ""
     return (
         True,
         f"crosses at {1e3 * hooks.lower_height_m:.3g} and {1e3 * hooks.upper_height_m:.3g} mm, bars of "
-        f"{1e3 * hooks.side_m:.3g} mm; {', '.join(pulls) or 'no phase pulls one'}",
+        f"{1e3 * hooks.side_m:.3g} mm{below}; {', '.join(pulls) or 'no phase pulls one'}",
     )
 
 

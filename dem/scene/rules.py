@@ -142,8 +142,15 @@ def _check_recording(scene: SceneView) -> None:
 
 
 def _check_bars(hooks: Hooks) -> None:
-    if hooks.side_m > hooks.length_m:
-        msg = f"hooks.side_m: {hooks.side_m:g} m is more than length_m = {hooks.length_m:g} m; bars are long and thin"
+    for key, length in (("length_m", hooks.length_m), ("lower_length_m", hooks.lower_length_m)):
+        if hooks.side_m > length:
+            msg = f"hooks.side_m: {hooks.side_m:g} m is more than {key} = {length:g} m; bars are long and thin"
+            raise ValueError(msg)
+    if hooks.side_m * hooks.lower_bars > hooks.lower_length_m / 2:
+        msg = (
+            f"hooks.lower_bars: {hooks.lower_bars} bars of side_m = {hooks.side_m:g} m leave no room between them over "
+            f"lower_length_m = {hooks.lower_length_m:g} m; use fewer"
+        )
         raise ValueError(msg)
     if hooks.lower_height_m < hooks.side_m / 2:
         msg = (
@@ -179,11 +186,15 @@ def _check_room(scene: SceneView, hooks: Hooks) -> None:
     # A tier is narrower than those below it: what fits into the highest one that a hook reaches fits into all.
     raised = sum(phase.raises for phase in scene.phases)
     free = float(cylinder.inner_radii(np.array([top + raised]))[0])
-    reach = hooks.crosses[1].reach
-    if reach >= free:
-        most = 2 * math.sqrt(max(0.0, free**2 - (hooks.side_m / 2) ** 2))
-        msg = (
-            f"hooks.length_m: {hooks.length_m:g} m is inside the wall, whose flats are {free:.4g} m from the axis; use "
-            f"less than {most:.4g} m"
-        )
-        raise ValueError(msg)
+    lowest = float(cylinder.inner_radii(np.array([hooks.lower_height_m + hooks.side_m / 2]))[0])
+    lower, upper = hooks.crosses
+    for key, cross, room in (("length_m", upper, free), ("lower_length_m", lower, lowest)):
+        # Several bars end at the disc, and their corners half a side beyond it.
+        beyond = hooks.side_m / 2 if cross.count > 1 else 0.0
+        if cross.reach + beyond >= room:
+            most = 2 * math.sqrt(max(0.0, (room - 2 * beyond) ** 2 - (hooks.side_m / 2) ** 2))
+            msg = (
+                f"hooks.{key}: {cross.length:g} m is inside the wall, whose flats are {room:.4g} m from the axis; use "
+                f"less than {most:.4g} m"
+            )
+            raise ValueError(msg)

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to roun
 class Hooks(Part):
     """Two horizontal crosses on the axis, each of two square bars at right angles; in place before the pour.
 
-    They rub and damp like the container, and move with it.
+    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container, and
+    move with it.
     """
 
     side_m: Length = Field(..., description="side of the bars' square section [m]; default: thickness_in_plane_m, t2")
@@ -34,15 +35,21 @@ class Hooks(Part):
     upper_height_m: Length = Field(
         ..., description="height of the upper cross's centre above the floor at the start [m]; default: 20 t2"
     )
+    lower_length_m: Length = Field(
+        ..., description="length of the lower cross's bars, diameter of a grid of several [m]; default: length_m"
+    )
+    lower_bars: int = Field(
+        1,
+        ge=1,
+        le=16,
+        description="bars of the lower cross along x, and as many along y, evenly spaced over a disc [1]",
+    )
 
     @property
     def crosses(self) -> tuple[Cross, Cross]:
         """The lower and the upper cross."""
-        lower, upper = (
-            Cross(height=height, side=self.side_m, length=self.length_m)
-            for height in (self.lower_height_m, self.upper_height_m)
-        )
-        return lower, upper
+        lower = Cross(height=self.lower_height_m, side=self.side_m, length=self.lower_length_m, count=self.lower_bars)
+        return lower, Cross(height=self.upper_height_m, side=self.side_m, length=self.length_m)
 
 
 # Widths w and thicknesses t2 that the keys are by default.
@@ -51,7 +58,8 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
     """Data of `Hooks` with the keys filled in that follow from the smarticle; anything else is left to validation."""
-    return with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
+    filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
+    return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
@@ -62,6 +70,13 @@ def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle:
     return {key: a * w + b * t2 for key, (a, b) in defaults.items()} | dict(data)
 
 
+class Bar(NamedTuple):
+    """One bar of a hook: where its middle is from the axis, (x, y), and its half edges along x, y, z [m]."""
+
+    middle: tuple[float, float]
+    half: tuple[float, float, float]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cross:
     """One hook as the engine builds it. Lengths in m.
@@ -69,31 +84,45 @@ class Cross:
     Args:
         height: of the centre above the floor.
         side: of the bars' square section.
-        length: of the bars, which lie along x and y.
+        length: of the bars, which lie along x and y; of several, diameter of the disc that they end at.
+        count: bars along x, and as many along y, evenly spaced.
     """
 
     height: float
     side: float
     length: float
+    count: int = 1
 
     @property
-    def half_extents(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Half edges of the two bars along x, y, z [m]."""
-        long, thick = self.length / 2, self.side / 2
-        return (long, thick, thick), (thick, long, thick)
+    def bars(self) -> tuple[Bar, ...]:
+        """The bars, one along x and one along y in turn."""
+        found: list[Bar] = []
+        for k in range(self.count):
+            place = self.length * ((k + 1) / (self.count + 1) - 0.5)
+            long, thick = math.sqrt((self.length / 2) ** 2 - place**2), self.side / 2
+            found += [Bar((0.0, place), (long, thick, thick)), Bar((place, 0.0), (thick, long, thick))]
+        return tuple(found)
+
+    @property
+    def half_extents(self) -> tuple[tuple[float, float, float], ...]:
+        """Half edges of the bars along x, y, z [m]."""
+        return tuple(bar.half for bar in self.bars)
 
     @property
     def reach(self) -> float:
         """Largest distance [m] of the bars from the axis: that of the corners at their ends."""
-        return math.hypot(self.length, self.side) / 2
+        return max(math.hypot(abs(x) + a, abs(y) + b) for (x, y), (a, b, _) in self.bars)
 
     def obstacles(self, diameter: float) -> Array:
         """(n, 3) points [m] such that a sphere of `diameter` [m] centred a diameter from all touches no bar."""
         # A grid through the bars. No point of a bar is farther than √3/2 of the spacing from the grid, which is less
         # than the radius that spheres keep away beyond their own.
         points: list[tuple[float, ...]] = []
-        for extents in self.half_extents:
-            axes = [np.linspace(-half, half, 1 + math.ceil(2 * half / (diameter / 2))) for half in extents]
+        for bar in self.bars:
+            axes = [
+                middle + np.linspace(-half, half, 1 + math.ceil(2 * half / (diameter / 2)))
+                for middle, half in zip((*bar.middle, 0.0), bar.half, strict=True)
+            ]
             points += list(itertools.product(*axes))
         grid: Array = np.array(points) + np.array([0.0, 0.0, self.height])
         return grid

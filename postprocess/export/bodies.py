@@ -22,7 +22,7 @@ from postprocess.export.fields import Field, link_values
 from postprocess.measures.entanglement import link_passages
 from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.strings import ChainStrings, read_strings
-from postprocess.pictures.surroundings import DrawnHooks, Surroundings, read_surroundings
+from postprocess.pictures.surroundings import Bounds, Surroundings, read_surroundings
 from postprocess.scene_file import read_phases, read_scene
 
 if TYPE_CHECKING:
@@ -199,9 +199,10 @@ class Bodies:
         hooks = self._around.hooks
         if hooks is None:
             return None
-        heights = hooks.heights(frame.time)
-        mesh = _joined(cross(hooks, frame.floor_z + height) for height in heights)
-        mesh.cell_data["hook"] = np.repeat([0, 1], mesh.n_cells // 2)
+        heights, both = hooks.heights(frame.time), hooks.bars
+        crosses = [cross(bars, frame.floor_z + height) for bars, height in zip(both, heights, strict=True)]
+        mesh = _joined(crosses)
+        mesh.cell_data["hook"] = np.repeat([0, 1], [one.n_cells for one in crosses])
         return mesh
 
     def _lines(self, frame: Frame) -> pv.PolyData | None:
@@ -230,10 +231,9 @@ class Bodies:
         return mesh
 
 
-def cross(hooks: DrawnHooks, height: float) -> pv.PolyData:
-    """One hook, its centre at a height [m]; twelve quadrilaterals."""
-    long, thick = hooks.length / 2, hooks.side / 2
-    return _joined(pv.Box((-x, x, -y, y, height - thick, height + thick)) for x, y in ((long, thick), (thick, long)))
+def cross(bars: Sequence[Bounds], height: float) -> pv.PolyData:
+    """One hook, its centre at a height [m]; six quadrilaterals for each bar."""
+    return _joined(pv.Box((*bar[:4], height + bar[4], height + bar[5])) for bar in bars)
 
 
 def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:

@@ -33,7 +33,7 @@ from postprocess.pictures.camera import (
     millimetres_per_pixel,
     wall_corners,
 )
-from postprocess.pictures.surroundings import DrawnHooks, Surroundings
+from postprocess.pictures.surroundings import Bounds, Surroundings
 
 with warnings.catch_warnings():
     # PyVista imports pyplot: see postprocess.report.figures.
@@ -218,9 +218,8 @@ class Canvas:
             else:
                 self._add_container(around, self._run.container_radius * MILLIMETRE, float(extent[:, 2].max()))
             if around.hooks is not None:
-                mesh = _cross(around.hooks)
                 look = {"color": _FIXTURE, "ambient": 0.25, "diffuse": 0.8, "render": False}
-                self._hooks = [plotter.add_mesh(mesh, **look) for _ in range(2)]
+                self._hooks = [plotter.add_mesh(_cross(bars), **look) for bars in around.hooks.bars]
         width, height = self._look.panel
         position, focus = fitted_camera(extent, axes, width / height)
         self._light(position, focus)
@@ -343,11 +342,10 @@ def _outline(rims: NDArray[np.float64]) -> pv.PolyData:
     return mesh
 
 
-def _cross(hooks: DrawnHooks) -> pv.PolyData:
-    """The two bars of a hook, centred at the origin [mm]."""
-    long, thick = MILLIMETRE * hooks.length / 2, MILLIMETRE * hooks.side / 2
-    bars = [pv.Box((-x, x, -y, y, -thick, thick)) for x, y in ((long, thick), (thick, long))]
-    mesh: pv.PolyData = bars[0].append_polydata(bars[1])
+def _cross(bars: Sequence[Bounds]) -> pv.PolyData:
+    """The bars of a hook, centred at the origin [mm]."""
+    first, *rest = (pv.Box(tuple(MILLIMETRE * bound for bound in bar)) for bar in bars)
+    mesh: pv.PolyData = first.append_polydata(*rest)
     return mesh
 
 

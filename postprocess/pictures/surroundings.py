@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Self
@@ -21,6 +22,21 @@ if TYPE_CHECKING:
 _REMOVAL = "remove-container"
 
 
+Bounds = tuple[float, float, float, float, float, float]
+"""Least and largest x, y and z of a box [m]."""
+
+
+def _bars(length: float, side: float, count: int) -> tuple[Bounds, ...]:
+    """As `dem.setting.hooks.Cross` has them: evenly spaced along x and y, up to a disc."""
+    thick, found = side / 2, []
+    for k in range(count):
+        place = length * ((k + 1) / (count + 1) - 0.5)
+        long = math.sqrt((length / 2) ** 2 - place**2)
+        found.append((-long, long, place - thick, place + thick, -thick, thick))
+        found.append((place - thick, place + thick, -long, long, -thick, thick))
+    return tuple(found)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawnHooks:
     """Two crosses of two square bars each.
@@ -28,6 +44,8 @@ class DrawnHooks:
     Attributes:
         side: Of the bars [m].
         length: Of the bars [m].
+        lower_length: Of those of the lower cross, or the diameter of a grid of several [m].
+        lower_bars: Bars of the lower cross along x, and as many along y.
         lower: Height of the lower cross above the floor [m].
         times: (n,) at which the upper cross's height is known [s].
         upper: (n,) height of the upper cross above the floor [m].
@@ -35,6 +53,8 @@ class DrawnHooks:
 
     side: float
     length: float
+    lower_length: float
+    lower_bars: int
     lower: float
     times: NDArray[np.float64] = field(repr=False)
     upper: NDArray[np.float64] = field(repr=False)
@@ -48,10 +68,18 @@ class DrawnHooks:
         return cls(
             side=settings.number("side_m"),
             length=settings.number("length_m"),
+            # Older scenes have two crosses alike, and do not say so.
+            lower_length=settings.number("lower_length_m" if "lower_length_m" in settings.values else "length_m"),
+            lower_bars=round(settings.number("lower_bars")) if "lower_bars" in settings.values else 1,
             lower=settings.number("lower_height_m"),
             times=times,
             upper=upper,
         )
+
+    @property
+    def bars(self) -> tuple[tuple[Bounds, ...], tuple[Bounds, ...]]:
+        """Bars of the lower and of the upper hook, as their corners about the hook's centre."""
+        return _bars(self.lower_length, self.side, self.lower_bars), _bars(self.length, self.side, 1)
 
     def heights(self, time: float) -> tuple[float, float]:
         """Heights of the lower and the upper cross above the floor at a time [m]."""

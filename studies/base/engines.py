@@ -131,6 +131,15 @@ def _differences(effect: SeedMean, base: float) -> dict[str, float]:
     }
 
 
+def told_by_engine(
+    points: pd.DataFrame, named: Mapping[str, Callable[[pd.Series], str]]
+) -> Mapping[str, Callable[[pd.Series], str]]:
+    """What tells a point from others, the engine first where there are several; see `points.told_means`."""
+    if not engines_of(points):
+        return named
+    return {"engine": lambda point: str(point[ENGINE]), **named}
+
+
 def engine_lines(table: pd.DataFrame | None, named: Mapping[str, Callable[[pd.Series], str]]) -> list[str]:
     """The part of a text that compares engines; nothing without several.
 

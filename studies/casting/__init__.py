@@ -1,4 +1,4 @@
-"""The study `casting`: smarticles cast in a mould of three tiers, against Savoie et al."""
+"""The studies `casting` and `casting-code`: smarticles cast in a mould, by the paper's text and by its code."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 def _load(*, quick: bool) -> Casting:
     from studies.casting.study import Casting  # noqa: PLC0415  (pandas, matplotlib)
 
-    return Casting()
+    return Casting("casting")
+
+
+def _load_code(*, quick: bool) -> Casting:
+    from studies.casting.study import Casting  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Casting("casting-code")
 
 
 SHIPPED = Shipped(
@@ -25,4 +31,14 @@ SHIPPED = Shipped(
     about="""\
 smarticles of l/w = 0.8 poured into a mould of three tiers, each narrower than the one below, and activated; the
 walls go at once: how well each tier is filled before, and what is kept 1 s later. --quick takes minutes.""",
+)
+
+CODE = Shipped(
+    name="casting-code",
+    folder=Path(__file__).parent,
+    load=_load_code,
+    pictured={"procedure": "internal"},
+    about="""\
+the same by the rules of the paper's own code: a motor at its torque limit goes on at half the speed and stops after
+20 findings in a row, friction 0.2.""",
 )

@@ -13,6 +13,16 @@ from dem.record.manifest import RunManifest
 from postprocess.geometry.outline import BALL
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
+from postprocess.statistics.points import ToldTable, told_means
+from studies.base.engines import (
+    by_engine,
+    compared_engines,
+    engine_lines,
+    engines_of,
+    judging,
+    told_by_engine,
+    told_engines,
+)
 from studies.base.paper import PaperStudy
 from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
@@ -38,9 +48,13 @@ from studies.casting.measure import (
 
 
 class Casting(PaperStudy):
-    """Runs of a pour into a mould, one activity or none, and the removal of the mould."""
+    """Runs of a pour into a mould, one activity or none, and the removal of the mould.
 
-    name = "casting"
+    Args:
+        name: Of the study: by the paper's text, or by its code.
+    """
+
+    one_engine = False
     title = "Casts of smarticles"
     quantities = QUANTITIES
     named = MappingProxyType(
@@ -61,6 +75,9 @@ class Casting(PaperStudy):
         }
     )
 
+    def __init__(self, name: str = "casting") -> None:
+        self.name = name
+
     def measure(self, run: RunManifest) -> MeasuredRun:
         """How the mould was filled, and what is left of its shape."""
         return MeasuredRun(manifest=run, rows=[casting_row(run)])
@@ -74,21 +91,27 @@ class Casting(PaperStudy):
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
         runs = in_order(found.table(), [SEED])
-        return {"runs": runs, "points": means(runs, [PROCEDURE], list(QUANTITIES))}
+        tables = {"runs": runs, "points": by_engine(runs, lambda part: means(part, [PROCEDURE], list(QUANTITIES)))}
+        if engines_of(runs):
+            tables["engines"] = compared_engines(runs, [PROCEDURE], QUANTITIES)
+        return tables
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
-        """The findings, by runs."""
-        return findings(tables["runs"])
+        """The findings, by runs of the engine that judges."""
+        return findings(judging(tables["runs"]))
 
     def about_runs(self, analysis: Analysis[Finding]) -> tuple[str, ...]:
         """Which runs of which mould, and what the inside of a pile is."""
-        counts = analysis.tables["points"].set_index(PROCEDURE)[SEEDS]
+        every = analysis.tables["runs"]
+        runs, others = judging(every), told_engines(every)
+        counts = judging(analysis.tables["points"]).set_index(PROCEDURE)[SEEDS]
         one = analysis.found.manifests[0]
         sizes = ", ".join(f"r = {1e3 * tier.radius:.3g} mm" for tier in mould(one))
         return (
             f"l/w {one.aspect_ratio:g}, {one.count} smarticles in tiers of {sizes} (assumed: the paper gives none), "
             f"each {1e3 * mould(one)[0].top:.3g} mm high, below a neck as wide as the top one; "
-            f"{told_seeds(analysis.tables['runs'], counts, 'procedure')}.",
+            f"{told_seeds(runs, counts, 'procedure')}.",
+            *([others] if others else []),
             f"Inside the pile is what a ball of radius {BALL:g} w that rolls around links and floor cannot reach.",
             f"{told_bars(counts, 'procedure')}.",
         )
@@ -97,12 +120,23 @@ class Casting(PaperStudy):
         """Seeds."""
         return f"{told_seeds(analysis.tables['runs'], analysis.tables['points'][SEEDS], 'procedure')}."
 
+    def table(self, analysis: Analysis[Finding]) -> ToldTable:
+        """Means over seeds with their standard errors, engine by engine where there are several."""
+        points = analysis.tables["points"]
+        return told_means(points, told_by_engine(points, self.named), self.shown)
+
+    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
+        """The engines compared, if there are several."""
+        return engine_lines(
+            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
+        )
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Shares by tier, overlaps, and pictures."""
         return figures.draw(
             output,
-            points=analysis.tables["points"],
-            runs=analysis.tables["runs"],
+            points=judging(analysis.tables["points"]),
+            runs=judging(analysis.tables["runs"]),
             manifests=analysis.found.manifests,
             footer=footer,
         )

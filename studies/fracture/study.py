@@ -18,6 +18,15 @@ from postprocess.measures.pull import END, FREE, WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
+from studies.base.engines import (
+    by_engine,
+    compared_engines,
+    engine_lines,
+    engines_of,
+    judging,
+    told_by_engine,
+    told_engines,
+)
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
 from studies.base.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
@@ -43,9 +52,13 @@ from studies.fracture.measure import (
 
 
 class Fracture(PaperStudy):
-    """Runs of a pour, one activity or none, and a pull."""
+    """Runs of a pour, one activity or none, and a pull.
 
-    name = "fracture"
+    Args:
+        name: Of the study: by the paper's text, or by its code.
+    """
+
+    one_engine = False
     title = "A hook pulled out of a pile, against the findings of Savoie et al."
     remarks = (
         "Of how the force depends on θ or on l/w by itself the paper's text says nothing; it has figures.",
@@ -72,6 +85,9 @@ class Fracture(PaperStudy):
         }
     )
 
+    def __init__(self, name: str = "fracture") -> None:
+        self.name = name
+
     def measure(self, run: RunManifest) -> MeasuredRun:
         """The pile before the pull, and what the hook felt."""
         return MeasuredRun(manifest=run, rows=[fracture_row(run)])
@@ -83,17 +99,21 @@ class Fracture(PaperStudy):
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
-        runs = runs_table(found).sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
-        return {"runs": runs, "points": points(runs, QUANTITIES)}
+        runs = runs_table(found).sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True, kind="stable")
+        tables = {"runs": runs, "points": by_engine(runs, lambda part: points(part, QUANTITIES))}
+        if engines_of(runs):
+            tables["engines"] = compared_engines(runs, [PROCEDURE, THETA, ASPECT], QUANTITIES)
+        return tables
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
-        """The findings, by runs."""
-        return findings(tables["runs"])
+        """The findings, by runs of the engine that judges."""
+        return findings(judging(tables["runs"]))
 
     def about_runs(self, analysis: Analysis[Finding]) -> tuple[str, ...]:
         """Which runs, what a peak is, and how many piles held fast."""
-        runs = analysis.tables["runs"]
-        counts = analysis.tables["points"].set_index([PROCEDURE, ASPECT, THETA])[SEEDS]
+        every = analysis.tables["runs"]
+        runs, others = judging(every), told_engines(every)
+        counts = judging(analysis.tables["points"]).set_index([PROCEDURE, ASPECT, THETA])[SEEDS]
         ratios = ", ".join(
             f"{ratio:g} ({count})" for ratio, count in runs.groupby(ASPECT)["smarticles [-]"].first().items()
         )
@@ -101,6 +121,7 @@ class Fracture(PaperStudy):
         times = ", ".join(f"{name} {time:.3g} s" for name, time in active.items()) or "none"
         return (
             f"l/w (smarticles) {ratios}, {told_seeds(runs, counts, 'point')}; active for: {times}.",
+            *([others] if others else []),
             f"Peak: largest mean over {WINDOW:g} s of the force that raises the hook, over the weight n W_s of all "
             f"smarticles; free: below {FREE:g} of it for good; load at the end: mean over the last {END:g} s. ⟨N⟩: "
             f"links of others through a smarticle's plane at rest before the pull. {told_bars(counts, 'point')}.",
@@ -110,7 +131,13 @@ class Fracture(PaperStudy):
     def table(self, analysis: Analysis[Finding]) -> ToldTable:
         """Means over seeds, the displacement in millimetres."""
         means, raised = analysis.tables["points"], [PEAK_RAISED, marked(PEAK_RAISED, "SE")]
-        return told_means(means.assign(**(1e3 * means[raised])), self.named, self.shown)
+        return told_means(means.assign(**(1e3 * means[raised])), told_by_engine(means, self.named), self.shown)
+
+    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
+        """The engines compared, if there are several."""
+        return engine_lines(
+            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
+        )
 
     def text(self, analysis: Analysis[Finding]) -> Sequence[str]:
         """Ends with what a column of the runs is."""
@@ -126,8 +153,8 @@ class Fracture(PaperStudy):
         """Forces against time, and peaks against θ, l/w and ⟨N⟩."""
         return figures.draw(
             output,
-            points=analysis.tables["points"],
-            runs=analysis.tables["runs"],
+            points=judging(analysis.tables["points"]),
+            runs=judging(analysis.tables["runs"]),
             manifests=analysis.found.manifests,
             footer=footer,
         )

@@ -15,6 +15,16 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.spread import OUTSIDE, TOUCHING
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
+from postprocess.statistics.points import ToldTable, told_means
+from studies.base.engines import (
+    by_engine,
+    compared_engines,
+    engine_lines,
+    engines_of,
+    judging,
+    told_by_engine,
+    told_engines,
+)
 from studies.base.paper import PaperStudy
 from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
@@ -41,9 +51,13 @@ _KEYS = [LIFT, ASPECT, PROCEDURE]
 
 
 class Melting(PaperStudy):
-    """Runs of a pour, one activity or none, and the removal of the wall."""
+    """Runs of a pour, one activity or none, and the removal of the wall.
 
-    name = "melting"
+    Args:
+        name: Of the study: by the paper's text, or by its code.
+    """
+
+    one_engine = False
     title = "Piles whose wall is taken away"
     quantities = QUANTITIES
     named = MappingProxyType(
@@ -68,6 +82,9 @@ class Melting(PaperStudy):
         }
     )
 
+    def __init__(self, name: str = "melting") -> None:
+        self.name = name
+
     def measure(self, run: RunManifest) -> MeasuredRun:
         """The pile before, in the end, and against time since the wall began to go."""
         return measure_melting(run)
@@ -83,19 +100,24 @@ class Melting(PaperStudy):
         """Runs, points, and every measure of every run against time."""
         runs = in_order(found.table(), [LIFT, ASPECT, SEED])
         times = [pd.DataFrame({"run": run.name, **run.history}) for run in found.runs]
-        return {
+        tables = {
             "runs": runs,
-            "points": means(runs, _KEYS, list(QUANTITIES)),
+            "points": by_engine(runs, lambda part: means(part, _KEYS, list(QUANTITIES))),
             "times": pd.concat(times, ignore_index=True),
         }
+        if engines_of(runs):
+            tables["engines"] = compared_engines(runs, _KEYS, QUANTITIES)
+        return tables
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
-        """The findings, by runs."""
-        return findings(tables["runs"])
+        """The findings, by runs of the engine that judges."""
+        return findings(judging(tables["runs"]))
 
     def about_runs(self, analysis: Analysis[Finding]) -> tuple[str, ...]:
         """Which runs, and what is measured."""
-        counts = analysis.tables["points"].set_index(_KEYS)[SEEDS]
+        every = analysis.tables["runs"]
+        runs, others = judging(every), told_engines(every)
+        counts = judging(analysis.tables["points"]).set_index(_KEYS)[SEEDS]
         manifests = analysis.found.manifests
         sizes = ", ".join(
             f"{count} smarticles in r = {radius:g} m at l/w {aspect:g}"
@@ -104,12 +126,24 @@ class Melting(PaperStudy):
             )
         )
         return (
-            f"{sizes}; {told_seeds(analysis.tables['runs'], counts, 'point')}.",
+            f"{sizes}; {told_seeds(runs, counts, 'point')}.",
+            *([others] if others else []),
             f"Clusters: centrelines within {TOUCHING:g} sphere diameters, or links through planes. Sloughed: centre of "
             f"mass farther from the pile's middle (median) than the wall was, by {OUTSIDE:g} w. Tilt: of the line to "
             "the centre of mass from the floor below where it was before. Toppled: centre of mass beyond the radius "
             "that held 95 % before.",
             f"{told_bars(counts, 'point')}.",
+        )
+
+    def table(self, analysis: Analysis[Finding]) -> ToldTable:
+        """Means over seeds with their standard errors, engine by engine where there are several."""
+        points = analysis.tables["points"]
+        return told_means(points, told_by_engine(points, self.named), self.shown)
+
+    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
+        """The engines compared, if there are several."""
+        return engine_lines(
+            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
         )
 
     @property
@@ -123,4 +157,4 @@ class Melting(PaperStudy):
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Every measure against time, and pictures."""
-        return figures.draw(output, runs=analysis.tables["runs"], melted=analysis.found.runs, footer=footer)
+        return figures.draw(output, runs=judging(analysis.tables["runs"]), melted=analysis.found.runs, footer=footer)

@@ -137,6 +137,54 @@ def test_a_smarticle_hangs_on_a_hook_with_its_weight() -> None:
     assert made.fixtures.upper_height == pytest.approx(0.042)
 
 
+SIDE = 0.5e-3
+GRID = Cross(height=5e-3, side=SIDE, length=20e-3, count=3)
+
+
+def test_each_bar_of_a_grid_carries_what_hangs_on_it() -> None:
+    hooks = (replace(GRID, height=20e-3), Cross(height=40e-3, side=SIDE, length=builds.W))
+    made = builds.engine(gravity=9.81, hooks=hooks, dt=2e-5, law=replace(builds.LAW, wall_friction=0.8))
+    turn = Rotation.from_euler("x", -90, degrees=True)
+    com = builds.boxes().plain_centre_of_mass[1]
+    # Bars along y lie at x = -5, 0 and 5 mm, those along x likewise: one on the outermost bar along y, clear of others.
+    made.add(builds.at([5e-3, 2.5e-3, 20e-3 + SIDE / 2 + RADIUS - com], [turn]))
+    made.advance(25000)
+    sums = made.fixtures.hook_sums
+    made.advance(1000)
+    mean = (made.fixtures.hook_sums - sums) / 1000
+    # What holds it is a bar that only a grid has; the other grip is empty.
+    assert mean[0, 2] == pytest.approx(-MASS * 9.81, rel=1e-3)
+    assert np.abs(mean[1]).max() == 0.0
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_smarticle_that_bridges_both_grips_is_two_springs_in_a_row(count: int) -> None:
+    """Its barbs lie across the lower grid's and the upper hook's bars, one above the other, so that it does not turn."""
+    inside, gap, raised = builds.W - 2 * RADIUS, 2e-5, 1e-4
+    lower = replace(GRID, count=count)
+    upper = Cross(height=lower.height + inside - gap - SIDE, side=SIDE, length=builds.W)
+    made = builds.engine(hooks=(lower, upper), dt=2e-5)
+    com = builds.boxes().plain_centre_of_mass[1]
+    across = Rotation.from_euler("y", -90, degrees=True)
+    # Off the bars along y.
+    made.add(builds.at([2.5e-3, com - 0.35 * builds.W, (lower.height + upper.height) / 2], [across]))
+    made.advance(100)
+    assert np.abs(made.fixtures.hook_sums).max() == 0.0
+    made.fixtures.raise_upper(0.01)
+    made.advance(round(raised / 0.01 / 2e-5))
+    made.fixtures.stop()
+    made.advance(20000)
+    sums = made.fixtures.hook_sums
+    made.advance(1000)
+    mean = (made.fixtures.hook_sums - sums) / 1000
+    # Each barb lies on a bar over its width, which adds to the one spring of a point what `meet_bar` says; each of the
+    # two contacts gives way by half of the way. The tolerance: one step of raising is 0.25 % of it.
+    along = SIDE / (2 * RADIUS)
+    stiffness = 500.0 * (1 + along * along * (3 - 2 * along))
+    assert mean[1, 2] == pytest.approx(-stiffness * (raised - gap) / 2, rel=3e-3)
+    assert mean[0, 2] == pytest.approx(-mean[1, 2], rel=1e-6)
+
+
 def test_a_ceiling_between_tiers_stops_what_rises() -> None:
     made = builds.engine(radius=0.0234, upper=((0.03, 0.01),), height=0.1)
     made.add(builds.at([0.016, 0, 0.02], [FLAT]))

@@ -193,14 +193,18 @@ class Ground(NamedTuple):
 
 
 class Hooks(NamedTuple):
-    """Two hooks of two bars each, lying along x and y; their heights are in `Ground.place`.
+    """Two hooks of two bars or more each, lying along x and y; their heights are in `Ground.place`.
 
     Args:
-        halves: (2, 2, 3) half edges of the bars of the lower and the upper hook [m].
-        slip: (N S, 2, 2, SLOTS, 4) stretch of the tangential springs of links at the bars [m], and their energy [J].
-        used: (N S, 2, 2) which of the points touched in the last step, as bits.
+        counts: (2,) bars of the lower and the upper hook; the arrays have room for B, those of the one with more.
+        middles: (2, B, 2) where the bars' middles are from the axis [m].
+        halves: (2, B, 3) half edges of the bars [m].
+        slip: (N S, 2, B, SLOTS, 4) stretch of the tangential springs of links at the bars [m], and their energy [J].
+        used: (N S, 2, B) which of the points touched in the last step, as bits.
     """
 
+    counts: NDArray[np.int64]
+    middles: Array
     halves: Array
     slip: Array
     used: NDArray[np.uint8]

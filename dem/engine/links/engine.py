@@ -89,7 +89,7 @@ class LinksEngine:
         )
         self._world.rims = tier_rims(cylinder, channel)
         if hooks is not None:
-            self._world.add_hooks(np.array([cross.half_extents for cross in hooks]))
+            self._world.add_hooks([cross.bars for cross in hooks])
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
         self.account = LinksAccount(self._world)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,6 +41,7 @@ from dem.engine.links.stepping import advance
 from dem.engine.links.team.team import Team
 from dem.errors import refuse
 from dem.physics.contact import ContactLaw
+from dem.setting.hooks import Bar
 
 Array = NDArray[np.float64]
 
@@ -185,9 +186,14 @@ class World:
         if self.rims is not None:
             self.rims = self.rims._replace(slip=longer(self.rims.slip, links), used=longer(self.rims.used, links))
 
-    def add_hooks(self, halves: Array) -> None:
-        """Add the two hooks, with (2, 2, 3) half edges of their bars [m]."""
-        self.hooks = Hooks(halves, np.zeros((0, 2, 2, SLOTS, 4)), np.zeros((0, 2, 2), np.uint8))
+    def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
+        """Add the bars of the lower and the upper hook."""
+        counts = np.array([len(bars) for bars in hooks])
+        most = int(counts.max())
+        middles, halves = np.zeros((2, most, 2)), np.zeros((2, most, 3))
+        for k, bars in enumerate(hooks):
+            middles[k, : len(bars)], halves[k, : len(bars)] = zip(*bars, strict=True)
+        self.hooks = Hooks(counts, middles, halves, np.zeros((0, 2, most, SLOTS, 4)), np.zeros((0, 2, most), np.uint8))
         self._make_room_at_fixtures()
 
     def add_rim(self, height: float, radius: float) -> None:
@@ -344,7 +350,8 @@ class World:
         self.bodies, self.pairs, self.ends = group(Bodies, "bodies"), group(Pairs, "pairs"), group(Ends, "ends")
         fixed: dict[str, Any] = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
         self.ground = self.ground._replace(**fixed)
-        self.hooks = group(Hooks, "hooks") if "hooks.slip" in arrays else None
+        if self.hooks is not None:
+            self.hooks = self.hooks._replace(slip=arrays["hooks.slip"], used=arrays["hooks.used"])
         self.rims = group(Rims, "rims") if "rims.slip" in arrays else None
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
         self.make_room()

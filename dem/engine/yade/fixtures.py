@@ -37,7 +37,7 @@ class YadeFixtures:
         self._planar = channel is not None
         self.container = add_container(yade, cylinder) if channel is None else add_channel(yade, channel)
         """Ids of the container's bodies that are there, the floor last."""
-        self.hooks: tuple[tuple[int, int], ...] = tuple(_add_cross(yade, cross) for cross in hooks or ())
+        self.hooks: tuple[tuple[int, ...], ...] = tuple(_add_cross(yade, cross) for cross in hooks or ())
         """Ids of the bars of the lower and the upper hook; empty in scenes without."""
         self._upper_start = hooks[1].height if hooks else 0.0
         # Bodies whose forces are added up step by step, together for each hook or wall of a channel.
@@ -224,16 +224,19 @@ class YadeFixtures:
         return None if height > self._top else max(0.0, height - self._upper_start)
 
 
-def _add_cross(yade: Yade, cross: Cross) -> tuple[int, int]:
-    """Add the two bars of a hook.
+def _add_cross(yade: Yade, cross: Cross) -> tuple[int, ...]:
+    """Add the bars of a hook.
 
     Boxes, not rows of spheres: the faces are flat and the edges square as asked for, a sphere has one contact with a
     bar wherever it touches it, and forces are those of two bodies.
     """
-    one, other = (
-        yade.omega.bodies.append(
-            yade.utils.box(yade.vector(0, 0, cross.height), yade.vector(*half), material=WALL_MATERIAL, fixed=True)
+    return tuple(
+        int(
+            yade.omega.bodies.append(
+                yade.utils.box(
+                    yade.vector(*bar.middle, cross.height), yade.vector(*bar.half), material=WALL_MATERIAL, fixed=True
+                )
+            )
         )
-        for half in cross.half_extents
+        for bar in cross.bars
     )
-    return int(one), int(other)

@@ -53,12 +53,16 @@ def test_the_full_study_is_the_papers() -> None:
         assert rest.duration_s == again.duration_s == 0.5
 
 
-@pytest.mark.parametrize("name", ["gravish", "procedures"])
+CODES = ("procedures", "fracture", "melting", "casting")
+AGAIN = {"gravish": 9, "procedures": 6, "fracture": 8, "melting": 8, "casting": 6}
+
+
+@pytest.mark.parametrize("name", sorted(AGAIN))
 def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
     found = expand(load_sweep(study_file(name)))
     again = [point for point in found if point.again]
     assert again == found[-len(again) :]
-    assert len(again) == {"gravish": 9, "procedures": 6}[name]
+    assert len(again) == AGAIN[name]
     for point in again:
         assert point.scene.engine == "yade"
         twin = next(p for p in found if p.name == point.name.replace("yade", "links"))
@@ -77,6 +81,28 @@ def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
     found = expand(on_engine(sweep, engine))
     assert {point.scene.engine for point in found} == {engine}
     assert not any(point.again for point in found)
+
+
+@pytest.mark.parametrize("quick", [False, True])
+@pytest.mark.parametrize("name", CODES)
+def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str, quick: bool) -> None:
+    """Point by point, in the same order: what else differs in the scene is what the protocol says."""
+    text, code = (expand(load_sweep(study_file(one, quick=quick))) for one in (name, f"{name}-code"))
+    assert len(text) == len(code) > 0
+    for one, other in zip(text, code, strict=True):
+        assert one.name == other.name
+        alike = {"protocol": "code", "title": f"{name}-code"}
+        assert {**one.values, **alike} == other.values
+        assert (one.scene.protocol, other.scene.protocol) == ("text", "code")
+        assert (one.scene.motor.law, other.scene.motor.law) == ("halt", "ease")
+        assert (one.scene.contact.friction_smarticle, other.scene.contact.friction_smarticle) == (0.4, 0.2)
+        assert (one.scene.contact.friction_wall, other.scene.contact.friction_wall) == (0.4, 0.2)
+        for phase, twin in zip(one.scene.phases, other.scene.phases, strict=True):
+            if isinstance(phase, Shake) and isinstance(twin, Shake):
+                assert (phase.moves, twin.moves) == ("container", "floor")
+            else:
+                assert phase == twin
+        assert one.scene.seed_for("poses") == other.scene.seed_for("poses")
 
 
 def test_the_study_of_engines_pairs_every_run() -> None:

@@ -188,9 +188,11 @@ def push_hooks(
     for hook in range(2):
         height = ground.place[LOWER + hook]
         for p in range(each * begin, each * stop):
-            x, y, z = segments[p, 0], segments[p, 1], segments[p, 2] - height
-            ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
-            for bar in range(2):
+            z, uz = segments[p, 2] - height, segments[p, 5]
+            ux, uy = segments[p, 3], segments[p, 4]
+            for bar in range(hooks.counts[hook]):
+                east, north = hooks.middles[hook, bar, 0], hooks.middles[hook, bar, 1]
+                x, y = segments[p, 0] - east, segments[p, 1] - north
                 half, now = hooks.halves[hook, bar], 0
                 if (
                     min(z, z + uz) < half[2] + radius
@@ -208,7 +210,8 @@ def push_hooks(
                             rub(
                                 shape, law, bodies, ground, hinged, ledger, dt, p, LOWER + hook, row[6], row[8],
                                 hooks.slip[p, hook, bar, slot],
-                                row[0] - arm * row[3], row[1] - arm * row[4], row[2] - arm * row[5] + height,
+                                row[0] - arm * row[3] + east, row[1] - arm * row[4] + north,
+                                row[2] - arm * row[5] + height,
                                 row[3], row[4], row[5],
                             )  # fmt: skip
                     if now:

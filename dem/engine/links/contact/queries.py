@@ -115,8 +115,9 @@ def look_at_fixtures(
                     squares += found * found
         if hooks is not None:
             for hook in range(2):
-                for bar in range(2):
-                    x, y, z = segments[p, 0], segments[p, 1], segments[p, 2] - ground.place[LOWER + hook]
+                for bar in range(hooks.counts[hook]):
+                    x, y = segments[p, 0] - hooks.middles[hook, bar, 0], segments[p, 1] - hooks.middles[hook, bar, 1]
+                    z = segments[p, 2] - ground.place[LOWER + hook]
                     points = meet_bar(x, y, z, segments[p], hooks.halves[hook, bar], radius, stiffness, out)
                     if points:
                         touches[i] += points
