@@ -11,10 +11,12 @@ from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
 from studies.base.activity import HEIGHT
+from studies.base.figures import draw_means, finished, legend_above, marker
 from studies.base.procedures import CROSSINGS
 
 _SHOWN = {CROSSINGS: r"$\langle N \rangle$ after the shape change [-]", HEIGHT: r"height over $h_0$ after it [-]"}
-_MARKERS = ("o", "s", "^", "D")
+_MARKERS = (("o", figures.BLUE, figures.BLUE), ("s", figures.ORANGE, "white"), ("^", figures.GREY, "white"))
+_APART = 0.16  # of the aspect ratios' places, so that bars do not lie on each other
 
 
 def draw(
@@ -38,21 +40,18 @@ def draw(
     with figures.style():
         figure = figures.blank_figure(7.0, 0.9 + 0.32 * max(len(order), 2))
         for axes, (quantity, label) in zip(figure.subplots(1, 2, sharey=True), _SHOWN.items(), strict=True):
-            for shift, (aspect, group) in enumerate(rows.sort_values("_order").groupby(ASPECT)):
-                places = [order.index(one) + 0.14 * (shift - 0.5) for one in group["_order"]]
-                axes.errorbar(
-                    group[quantity], places, xerr=group[marked(quantity, "95 %")], fmt=_MARKERS[shift % 4],
-                    capsize=2, label=f"l/w = {aspect:g}",
-                )  # fmt: skip
+            for number, (aspect, group) in enumerate(rows.sort_values("_order").groupby(ASPECT)):
+                places = [order.index(one) + _APART * (number - 0.5) for one in group["_order"]]
+                look = {**marker(*_MARKERS[number % len(_MARKERS)]), "linestyle": "none"}
+                bars = group[marked(quantity, "95 %")]
+                draw_means(axes, group[quantity], places, None, look=look, label=f"l/w = {aspect:g}", across=bars)
             axes.set_xlabel(label)
-            axes.grid(visible=True, axis="y", alpha=0.3)
-        axes.legend()
         first = figure.axes[0]
         first.set_yticks(range(len(order)), names)
         first.invert_yaxis()
+        legend_above(first)
         figure.tight_layout()
-        figures.add_footer(figure, footer)
-        return figures.save(figure, output / "factors")
+        return finished(figure, output / "factors", [], footer)
 
 
 def _named(row: pd.Series) -> str:

@@ -121,6 +121,11 @@ class Factors(PaperStudy):
             "of the other two; pairs begin with piles of the same random poses.",
         )
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds."""
+        counts = analysis.tables["points"][SEEDS]
+        return f"{told_seeds(analysis.tables['runs'], counts, 'combination')}."
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """⟨N⟩ and height of every combination."""
         return factor_figures.draw(output, points=analysis.tables["points"], factors=FACTORS, footer=footer)
