@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validate verify bench stability test lint types unit engine docs format lock clean
+.PHONY: help setup demo validate paper claims verify bench stability test lint types unit engine docs format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -23,6 +23,16 @@ demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 mi
 
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
+
+PAPER := procedures procedures-code factors melting melting-code casting casting-code fracture fracture-code collapse chain friction
+
+paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (days; goes on where it was stopped)
+	for study in $(PAPER); do $(BIN)/smarticles study $$study --out out/paper/$$study || exit 1; done
+	$(BIN)/smarticles study gravish --out out/paper/gravish-links
+	$(BIN)/python -m studies.claims out/paper
+
+claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, from the tables in results/ (seconds)
+	$(BIN)/python -m studies.claims results
 
 verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
 	$(BIN)/smarticles verify --engine both --out out/verify-$(STAMP)

@@ -34,6 +34,9 @@ _FOUND: Mapping[str, Verdict] = {
 }
 _COUNT = "smarticles [-]"
 
+RESULTS = "results"
+"""Folder of the results within that of a study which has been run."""
+
 ON_YADE = "-yade"
 """What the folder of a study's results on YADE is called beside that of its results on links."""
 
@@ -139,8 +142,7 @@ class _Tables:
         if named is None:
             return None
         study, finding = named
-        if study not in self._found:
-            self._found[study], self._bases[study] = self._read(study), _basis(self._results / study)
+        self._open(study)
         try:
             ours, verdict, criterion = self._found[study][finding]
         except KeyError:
@@ -153,20 +155,27 @@ class _Tables:
         if named is None or not (self._results / f"{named[0]}{ON_YADE}").is_dir():
             return None
         study, finding = f"{named[0]}{ON_YADE}", named[1]
-        if study not in self._found:
-            self._found[study], self._bases[study] = self._read(study), _basis(self._results / study)
+        self._open(study)
         return self.tested((study, finding)) if finding in self._found[study] else None
 
-    def _read(self, study: str) -> dict[str, Sequence[str]]:
-        """Numbers, verdict and criterion by finding; a study of questions has no criterion but the question."""
-        for name, order in (("findings.csv", (1, 2, 3)), ("verdicts.csv", (2, 1, 0))):
-            path = self._results / study / name
-            if path.is_file():
-                with path.open(encoding="utf-8", newline="") as file:
-                    rows = [row for row in csv.reader(file) if not row[0].startswith("# ")][1:]
-                return {row[0]: [row[column] for column in order] for row in rows}
-        msg = f"{self._results / study}: has neither findings.csv nor verdicts.csv; analyse the study first"
-        raise InputError(msg)
+    def _open(self, study: str) -> None:
+        """Read a study, if it has not been; a study that has been run has its results in a folder of its own."""
+        if study not in self._found:
+            inside = self._results / study / RESULTS
+            folder = inside if inside.is_dir() else self._results / study
+            self._found[study], self._bases[study] = _read(folder), _basis(folder)
+
+
+def _read(folder: Path) -> dict[str, Sequence[str]]:
+    """Numbers, verdict and criterion by finding; a study of questions has no criterion but the question."""
+    for name, order in (("findings.csv", (1, 2, 3)), ("verdicts.csv", (2, 1, 0))):
+        path = folder / name
+        if path.is_file():
+            with path.open(encoding="utf-8", newline="") as file:
+                rows = [row for row in csv.reader(file) if not row[0].startswith("# ")][1:]
+            return {row[0]: [row[column] for column in order] for row in rows}
+    msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
+    raise InputError(msg)
 
 
 def _basis(folder: Path) -> str:
