@@ -126,7 +126,7 @@ def test_threads_that_do_not_pay_are_told() -> None:
     assert thread_warnings(few, 1) == ()
     assert thread_warnings(many, 2) == ()
     (told,) = thread_warnings(few, 2)
-    assert told.startswith("--threads 2: 10 smarticles gain little by more than one thread, from about 1000 on they do")
+    assert told.startswith("--threads 2: 10 smarticles gain little by more than one thread, from about 500 on they do")
 
 
 @pytest.mark.parametrize(("said", "threads"), [(None, 1), ("", 1), ("3", 3), ("0", 1), ("4,2", 1)])
