@@ -26,7 +26,7 @@ class LinksKind:
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
     # Two threads against one, piles at equal height, least of eight, 2026-11-22: 1.06 times as fast at 270, 1.56 at
-    # 1000. A step takes 0.31 us per smarticle on one thread, 28 us and 0.18 us on two: 1.35 times at 500.
+    # 1000. A line through both, 28 us a step and 0.18 us per smarticle, makes it 1.35 at 500, where it was not run.
     threads_pay_from = 500
 
     def version(self) -> str:
