@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dem.errors import InputError
 from smarticles import queueing
-from smarticles.parsing import Commands, add_slots
+from smarticles.parsing import Commands, add_slots, positive_int
 from smarticles.scenes import run_here
 from smarticles.sweeps import complete_and_tell
 
@@ -37,6 +37,12 @@ For a study, give the study's command again: it also makes the tables and figure
         default="local",
         help="local: run on this machine (default); slurm: submit a job; none: with --cluster, write its script",
     )
+    resume.add_argument(
+        "--threads",
+        type=positive_int,
+        metavar="N",
+        help="threads of one run; default: what it began with. Another number is told and goes on with other last bits",
+    )
     add_slots(resume)
     queueing.add_options(resume)
 
@@ -52,8 +58,12 @@ def resume_sweep(arguments: argparse.Namespace) -> int:
         if queue:
             msg = f"{directory}: is one run; give the directory of its sweep to submit it, or leave --submit out"
             raise InputError(msg)
-        return run_here(directory / "scene.yaml", directory, arguments, resume=True)
+        return run_here(directory / "scene.yaml", directory, arguments, resume=True, threads=arguments.threads)
     folder = open_folder(directory)
+    if arguments.threads is not None:
+        given = f"--threads {arguments.threads}"
+        msg = f"{given}: is for one run, and {directory} is a sweep, of runs of one thread; leave it out"
+        raise InputError(msg)
     if queue:
         if arguments.submit == "slurm":
             require_sbatch()

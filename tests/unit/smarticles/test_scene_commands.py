@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -129,7 +130,9 @@ def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
     out.mkdir()
     write_manifest(manifest(scene, out, steps=steps, command="", made_by=("links", "1"), threads=3))
     assert smarticles("run", scene_file, "--out", out, "--resume", *options).status == 0
-    assert seen == [threads]
+    shutil.copy(scene_file, out / "scene.yaml")
+    assert smarticles("resume", out, *options).status == 0
+    assert seen == [threads, threads]
 
 
 @pytest.mark.parametrize("number", ["0", "-1", "two"])

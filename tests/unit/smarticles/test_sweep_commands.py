@@ -139,6 +139,16 @@ def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: P
     assert said.out.startswith(f"{out}: all 2 runs are done")
 
 
+def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    said = smarticles("resume", out, "--threads", "2")
+    assert said.status == 2
+    assert said.err == (
+        f"smarticles: error: --threads 2: is for one run, and {out} is a sweep, of runs of one thread; leave it out\n"
+    )
+
+
 def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     """The real command of a run, given a scene that it refuses before YADE is needed."""
     out = tmp_path / "out"
