@@ -222,11 +222,11 @@ def test_a_sweep_sees_directories_from_its_template_and_its_scenes_from_themselv
 
 def test_a_scene_whose_keys_vary_sees_directories_from_its_own_file(pour: Path, tmp_path: Path) -> None:
     (tmp_path / "scenes").mkdir()
-    (tmp_path / "scratch").mkdir()
+    (tmp_path / "deep" / "scratch").mkdir(parents=True)
     file = tmp_path / "scenes" / "on.yaml"
     file.write_text(yaml.safe_dump(data_of("../pour")), encoding="utf-8")
     for scene in (file, load_scene(file)):
-        points = expand(load_sweep(write_sweep(scene, {"seed": [3, 4]}, tmp_path / "scratch")))
+        points = expand(load_sweep(write_sweep(scene, {"seed": [3, 4]}, tmp_path / "deep" / "scratch")))
         assert [first(point.scene).run for point in points] == [str(pour)] * 2
 
 
