@@ -1,7 +1,7 @@
 """What it does to a pile to be taken over: `python -m benchmarks.take_over`.
 
-Piles poured on each engine go on on each, at rest. Told are how far smarticles move until they rest again, and what that
-does to the packing fraction. Nothing here is timed.
+Piles poured on each engine go on on each, at rest. Told are how far smarticles move until they rest again, and what
+that does to the packing fraction. Nothing here is timed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""export: true bodies of a run as files for other programs."""
+"""export: true bodies of a run as files for other programs; a scene as input of another simulator."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from dem.errors import InputError
 from smarticles.parsing import Commands
 
 _FORMATS = ("vtp", "stl", "obj", "gltf", "glb")
+_LAMMPS = "lammps"
 
 # One line each; tests hold this table against `postprocess.export`, which is slow to import.
 _FIELDS = """\
@@ -34,13 +36,17 @@ def add(commands: Commands) -> None:
     export = commands.add(
         "export",
         export_run,
-        summary="write true bodies of a run for ParaView, Blender, printers",
+        summary="write bodies of a run for ParaView, Blender, printers; a scene for LAMMPS",
         text=f"""
 Boxes of all links, wall, tiers, floor, hooks and strings where they are at a time, in metres.
 vtp: a folder for ParaView, all fields below in it; open it with `paraview --script=show_in_paraview.py`
 there, or open the .pvd files. gltf, glb: y upwards, colours by one field, every field that has a value
 everywhere as an attribute; Blender opens it. obj: colours. stl: shape alone. A file that exists is
 never replaced.
+
+lammps takes a scene file that begins with take-over, and writes a folder with a commented input deck: its
+poses at rest, contact law, time step, and phases relax, shake and remove-container (at once). What cannot be
+carried over is refused by name.
 
 bodies: smarticles, wall, floor, hooks, strings; crossings with --with crossings: a point and a
 direction where a link passes through another smarticle's plane.
@@ -51,11 +57,17 @@ fields, of each box:
   smarticles export runs/a --to glb                        last frame, runs/a/export.glb
   smarticles export runs/a --to vtp --all --with crossings   runs/a/export-vtp, for ParaView
   smarticles export runs/a --to stl --time 1.5 --without wall,floor --output pile.stl
+  smarticles export on.yaml --to lammps                    on-lammps/in.lammps and what it reads
 """,
     )
-    export.add_argument("directory", type=Path, metavar="DIR", help="run directory")
-    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join(_FORMATS))
-    export.add_argument("--output", type=Path, metavar="PATH", help="default: DIR/export.FORMAT or DIR/export-FORMAT")
+    export.add_argument("directory", type=Path, metavar="DIR", help="run directory; for lammps a scene file")
+    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join((*_FORMATS, _LAMMPS)))
+    export.add_argument(
+        "--output",
+        type=Path,
+        metavar="PATH",
+        help="default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps beside the scene",
+    )
     export.add_argument("--time", type=float, metavar="S", help="simulated time [s], nearest frame; default: end")
     export.add_argument("--all", action="store_true", help="all frames: a folder of numbered files")
     export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings")
@@ -71,8 +83,36 @@ def _names(text: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
+def _export_scene(arguments: argparse.Namespace) -> int:
+    from dem.deck.lammps import DECK, write_deck  # noqa: PLC0415
+    from smarticles.scenes import read_scene  # noqa: PLC0415
+
+    scene: Path = arguments.directory
+    for name, value in (
+        ("--time", arguments.time),
+        ("--all", arguments.all or None),
+        ("--with", arguments.wanted or None),
+        ("--without", arguments.unwanted or None),
+        ("--color-by", arguments.color_by),
+    ):
+        if value is not None:
+            msg = f"{name}: is of frames of a run, and --to {_LAMMPS} writes a scene; leave it out"
+            raise InputError(msg)
+    folder: Path = arguments.output or scene.with_name(f"{scene.stem}-{_LAMMPS}")
+    try:
+        write_deck(read_scene(scene, ()), folder)
+    except InputError as error:
+        told = str(error)
+        msg = told if told.startswith((f"{scene}: ", "--output")) else f"{scene}: {told}"
+        raise InputError(msg) from None
+    print(f"{folder}: run it there: lmp -in {DECK}")
+    return 0
+
+
 def export_run(arguments: argparse.Namespace) -> int:
     """`smarticles export`."""
+    if arguments.to == _LAMMPS:
+        return _export_scene(arguments)
     from postprocess.export import export  # noqa: PLC0415  (imports PyVista)
 
     watched = sys.stderr.isatty()

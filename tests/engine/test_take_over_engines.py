@@ -11,6 +11,8 @@ import taking
 
 pytestmark = pytest.mark.engine
 
+TIMEOUT = 900  # s of wall time, for a busy machine on which links compiles first
+
 
 @pytest.fixture(scope="module")
 def pours(worker: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
@@ -18,7 +20,7 @@ def pours(worker: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory)
     folder = tmp_path_factory.mktemp("pours")
     made = {engine: str(Path(folder, engine)) for engine in ("yade", "links")}
     for engine, out in made.items():
-        worker.submit(taking.pour, engine, out).result(300)
+        worker.submit(taking.pour, engine, out).result(TIMEOUT)
     return made
 
 
@@ -27,7 +29,7 @@ def pours(worker: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory)
 def test_poses_are_handed_over_and_the_pile_stays(
     worker: ProcessPoolExecutor, pours: dict[str, str], poured: str, onto: str
 ) -> None:
-    told: dict[str, Any] = worker.submit(taking.taken_over, onto, pours[poured]).result(300)
+    told: dict[str, Any] = worker.submit(taking.taken_over, onto, pours[poured]).result(TIMEOUT)
     assert told["off"] < 1e-15  # rounding of 0.1 m
     assert told["speeds"] == 0
     moved = told["moved"] / told["diameter"]

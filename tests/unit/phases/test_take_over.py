@@ -29,6 +29,10 @@ from dem.run.run import run_scene
 from dem.run.simulation import Simulation
 from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
+from smarticles.scene_sweep import write_sweep
+from templates.sweep.expand import expand
+from templates.sweep.folder import create_folder
+from templates.sweep.sweep_file import load_sweep
 
 DT = 2e-4
 RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04}
@@ -191,6 +195,39 @@ def test_a_directory_is_seen_from_the_scene_s_file(pour: Path, tmp_path: Path, m
     assert first(Scene(**{key: value for key, value in data_of("pour").items() if key != "schema_version"})).run == str(
         moved / "pour"
     )
+
+
+def test_a_sweep_sees_directories_from_its_template_and_its_scenes_from_themselves(pour: Path, tmp_path: Path) -> None:
+    (tmp_path / "sweeps").mkdir()
+    data = data_of("../pour") | {"seed": "SEED"}
+    text = yaml.safe_dump(data).replace("SEED", "{{ seed }}")
+    (tmp_path / "sweeps" / "on.yaml.j2").write_text(text, encoding="utf-8")
+    content = {
+        "template": "on.yaml.j2",
+        "run_name": "s{{ seed }}",
+        "points": {"list": [{}]},
+        "repeats": {"seeds": [1, 2]},
+    }
+    file = tmp_path / "sweeps" / "on.yaml"
+    file.write_text(yaml.safe_dump({"schema_version": 1, "name": "on", **content}), encoding="utf-8")
+    sweep = load_sweep(file)
+    points = expand(sweep)
+    folder = create_folder(tmp_path / "out", sweep, points, command="test", versions={}, expected_s=lambda _: 1.0)
+    for entry, point in zip(folder.entries, points, strict=True):
+        scene = load_scene(folder.scene(entry))
+        assert first(scene).run == str(pour)
+        assert scene_hash(scene) == entry.scene_sha256 == point.scene_sha256
+        assert str(tmp_path) not in folder.scene(entry).read_text(encoding="utf-8")
+
+
+def test_a_scene_whose_keys_vary_sees_directories_from_its_own_file(pour: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "deep" / "scratch").mkdir(parents=True)
+    file = tmp_path / "scenes" / "on.yaml"
+    file.write_text(yaml.safe_dump(data_of("../pour")), encoding="utf-8")
+    for scene in (file, load_scene(file)):
+        points = expand(load_sweep(write_sweep(scene, {"seed": [3, 4]}, tmp_path / "deep" / "scratch")))
+        assert [first(point.scene).run for point in points] == [str(pour)] * 2
 
 
 def test_a_link_on_the_way_does_not_lead_astray(pour: Path, tmp_path: Path) -> None:
