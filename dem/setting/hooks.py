@@ -23,8 +23,8 @@ TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to roun
 class Hooks(Part):
     """Two horizontal crosses on the axis, each of two square bars at right angles; in place before the pour.
 
-    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container, and
-    move with it.
+    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container,
+    and move with it.
     """
 
     side_m: Length = Field(..., description="side of the bars' square section [m]; default: thickness_in_plane_m, t2")
