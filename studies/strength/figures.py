@@ -123,7 +123,8 @@ def _draw_means(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list
             draw_means(axes, x, scale * part[quantity], errors, look=look, label=_LABELS[procedure])
         axes.set_xticks(range(len(heights)), labels=[f"{1e3 * height:g}" for height in heights])
         axes.set_xlim(-0.5, len(heights) - 0.5)
-        axes.set_ylim(bottom=min(0.0, float(axes.dataLim.y0)))
+        # The lowest is at 0 at most; room above, lest a marker be cut.
+        axes.set_ylim(min(0.0, 1.05 * float(axes.dataLim.y0)), 1.05 * float(axes.dataLim.y1))
         axes.set_ylabel(label)
     for axes in grid[1]:
         axes.set_xlabel("hook above the floor [mm]")

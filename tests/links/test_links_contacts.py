@@ -159,7 +159,7 @@ def test_each_bar_of_a_grid_carries_what_hangs_on_it() -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_smarticle_that_bridges_both_grips_is_two_springs_in_a_row(count: int) -> None:
-    """Its barbs lie across the lower grid's and the upper hook's bars, one above the other, so that it does not turn."""
+    """Its barbs lie across bars of the grid and of the hook, one above the other, so that it does not turn."""
     inside, gap, raised = builds.W - 2 * RADIUS, 2e-5, 1e-4
     lower = replace(GRID, count=count)
     upper = Cross(height=lower.height + inside - gap - SIDE, side=SIDE, length=builds.W)
