@@ -14,10 +14,12 @@ from postprocess.measures.pull import moving_mean, read_pull, weight_of_one
 from postprocess.report import figures
 from postprocess.statistics.points import marked
 from studies.base.figures import (
+    BAND,
     COLOURS,
     CROSSINGS_LABEL,
     SHAPES,
     History,
+    draw_bounds,
     draw_history,
     draw_means,
     finished,
@@ -103,8 +105,8 @@ def _draw_forces(
     panels[0].set_ylabel(_FORCE)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
-    told = f"Line: mean over seeds, as far as all of them go, over {_WIDTH:g} mm; band: lowest to highest seed."
-    return finished(figure, path, [told, *footer])
+    told = f"Line: mean over seeds, as far as all of them go, over {_WIDTH:g} mm; {BAND}."
+    return finished(figure, path, [told], footer)
 
 
 def _draw_means(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -123,14 +125,13 @@ def _draw_means(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list
             draw_means(axes, x, scale * part[quantity], errors, look=look, label=_LABELS[procedure])
         axes.set_xticks(range(len(heights)), labels=[f"{1e3 * height:g}" for height in heights])
         axes.set_xlim(-0.5, len(heights) - 0.5)
-        # The lowest is at 0 at most; room above, lest a marker be cut.
-        axes.set_ylim(min(0.0, 1.05 * float(axes.dataLim.y0)), 1.05 * float(axes.dataLim.y1))
+        axes.set_ylim(bottom=0)
         axes.set_ylabel(label)
     for axes in grid[1]:
         axes.set_xlabel("hook above the floor [mm]")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
-    return finished(figure, path, footer)
+    return finished(figure, path, [], footer)
 
 
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
@@ -143,16 +144,20 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
         colour = COLOURS[procedure]
         axes.plot(one[CROSSINGS], one[PEAK], SHAPES[procedure], color=colour, markersize=1.8, alpha=0.55)
         held = one[one[HELD_FAST] > 0]
-        up = 0.08 * float(runs[PEAK].max())
-        axes.errorbar(
-            held[CROSSINGS], held[PEAK], yerr=up, lolims=True, linestyle="none", capsize=1.6, color=colour, alpha=0.55
+        arrow = {"color": colour, "elinewidth": 0.6, "alpha": 0.55, "capsize": 1.6}
+        draw_bounds(axes, held[CROSSINGS], held[PEAK], 0.08 * float(runs[PEAK].max()), look=arrow)
+        draw_means(
+            axes,
+            mean[CROSSINGS],
+            mean[PEAK],
+            mean[marked(PEAK, "95 %")],
+            across=mean[marked(CROSSINGS, "95 %")],
+            look={"markersize": 4.2, **procedure_marker(procedure), "linestyle": "none"},
+            label=_LABELS[procedure],
         )
-        errors = {"xerr": mean[marked(CROSSINGS, "95 %")], "yerr": mean[marked(PEAK, "95 %")]}
-        look = {"markersize": 4.2, **procedure_marker(procedure), "linestyle": "none"}
-        axes.errorbar(mean[CROSSINGS], mean[PEAK], **errors, **look, label=_LABELS[procedure])
     axes.set_xlabel(CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK)
     axes.set_ylim(bottom=0)
     legend_above(axes)
-    told = "Small: single runs, with an arrow: held fast; large: means over seeds of each height."
-    return finished(figure, path, [told, *footer])
+    told = "Small: single runs, with an arrow: held fast, a lower bound; large: means over seeds of each height."
+    return finished(figure, path, [told], footer)

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 
+import pandas as pd
+
 from dem.record.manifest import RunManifest
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
@@ -133,11 +135,6 @@ class Strength(PaperStudy):
         times = ", ".join(f"{name} {time:.3g} s" for name, time in active.items()) or "none"
         places = ", ".join(f"{1e3 * height:g}" for height in sorted(runs[UPPER].unique()))
         numbers = told_range(runs.groupby(ASPECT)["smarticles [-]"].first())
-        held, limits = int(every[HELD_FAST].sum()), told_range(every[LIMIT].round(3))
-        fast = (
-            f"Held fast: {held} of {len(every)} runs, whose hook stopped at {limits} n W_s; their peaks and work are "
-            "lower bounds."
-        )
         return (
             f"{numbers} smarticles, hook {places} mm above the floor, {told_seeds(runs, counts, 'point')}; active for: "
             f"{times}.",
@@ -145,7 +142,7 @@ class Strength(PaperStudy):
             f"Peak: largest mean over {WINDOW:g} s of the force that raises the hook, over the weight n W_s of all "
             "smarticles. Carried off: rose by more than half of the hook's way. ⟨N⟩: links of others through a "
             f"smarticle's plane at rest before the wall went. {told_bars(counts, 'point')}.",
-            *([fast] if held else ["No pile held fast."]),
+            _told_held(every),
         )
 
     def table(self, analysis: Analysis[Finding]) -> ToldTable:
@@ -160,6 +157,12 @@ class Strength(PaperStudy):
             analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
         )
 
+    def about_points(self, analysis: Analysis[Finding]) -> str:
+        """Seeds, and how many piles held fast."""
+        runs = judging(analysis.tables["runs"])
+        counts = judging(analysis.tables["points"])[SEEDS]
+        return f"{told_seeds(runs, counts, 'point')}. {_told_held(runs)}"
+
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Force against displacement, means by procedure, and peaks against ⟨N⟩."""
         return figures.draw(
@@ -169,3 +172,15 @@ class Strength(PaperStudy):
             manifests=analysis.found.manifests,
             footer=footer,
         )
+
+
+def _told_held(runs: pd.DataFrame) -> str:
+    """How many piles held fast, and what their numbers are then."""
+    held = int(runs[HELD_FAST].sum())
+    if not held:
+        return "No pile held fast."
+    limits = told_range(runs[LIMIT].round(3))
+    return (
+        f"Held fast: {held} of {len(runs)} runs, whose hook stopped at {limits} n W_s; their peaks and work are lower "
+        "bounds."
+    )
