@@ -23,7 +23,7 @@ TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to roun
 class Hooks(Part):
     """Two horizontal crosses on the axis, each of two square bars at right angles; in place before the pour.
 
-    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container, and
+    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container and
     move with it.
     """
 
