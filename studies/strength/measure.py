@@ -28,6 +28,7 @@ REMOVAL = "remove-container"
 UPPER = "hook above the floor [m]"
 PEAK, PEAK_RAISED, WORK = "peak force over n W_s [-]", "hook raised at the peak [m]", "work over n W_s w [-]"
 THROUGH = "force through to the grid at the peak over n W_s [-]"
+BEFORE = "load before the pull over n W_s [-]"
 HELD_FAST, LIMIT = "held fast [-]", "force limit over n W_s [-]"
 CARRIED, BREAK = "carried off [-]", "lowest points of what is carried off, before [m]"
 ABOVE, TOP, KEPT = "smarticles above the hook [-]", "height of 95 % [m]", "com height without over with the wall [-]"
@@ -38,6 +39,8 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         WORK: "∫ F dz over the whole pull, over n W_s w: work to fracture, and to carry off what comes along",
         THROUGH: "upwards on the grid at the peak less that before the pull, over n W_s: what goes through the pile, "
         "where the rest is weight that was lifted",
+        BEFORE: "force on the hook before the pull, over n W_s: of what rests on it, and of a pile that is braced between "
+        "hook and grid",
         HELD_FAST: "1 where the hook was stopped by its force limit on the way, 0 where it arrived",
         CARRIED: "smarticles whose centre of mass rose by more than half of the hook's way, over n; empty where held",
         BREAK: "height above the floor of those smarticles' lowest points before the pull, mean over them: where the "
@@ -125,6 +128,7 @@ def _of_pull(run: RunManifest, pull: HookPull) -> dict[str, float]:
         PEAK: highest.force / total,
         PEAK_RAISED: highest.raised,
         WORK: pull.work / total / run.middle_length,
+        BEFORE: pull.before / total,
         THROUGH: (held_at(pull, highest.time) - pull.held[0]) / total,
     }
 

@@ -37,6 +37,7 @@ from studies.strength import figures
 from studies.strength.findings import findings
 from studies.strength.measure import (
     ABOVE,
+    BEFORE,
     BREAK,
     CARRIED,
     HELD_FAST,
@@ -83,6 +84,7 @@ class Strength(PaperStudy):
         {
             PEAK: ("peak", ".3f"),
             PEAK_RAISED: ("raised at it [mm]", ".1f"),
+            BEFORE: ("before", ".3f"),
             THROUGH: ("through to the grid", ".3f"),
             WORK: ("work / n W_s w", ".3f"),
             CARRIED: ("carried off", ".3f"),

@@ -60,7 +60,8 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     assert row[PEAK] == pytest.approx(0.5 * blunt, rel=1e-3)
     assert row[PEAK_RAISED] == pytest.approx(APEX * W, abs=0.005 * W)
     assert row[WORK] == pytest.approx(0.5 * BASE, rel=1e-3)
-    # Before the pull nothing goes through.
+    # Before the pull one smarticle rests on the hook, and nothing goes through.
+    assert row[measure.BEFORE] == pytest.approx(1 / run.count, rel=1e-5)
     assert row[THROUGH] == pytest.approx(HELD * 0.5 * blunt, rel=1e-3)
     assert row[CARRIED] == RISEN / run.count
     made = SyntheticRun(seed=1)
