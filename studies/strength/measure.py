@@ -39,8 +39,8 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         WORK: "∫ F dz over the whole pull, over n W_s w: work to fracture, and to carry off what comes along",
         THROUGH: "upwards on the grid at the peak less that before the pull, over n W_s: what goes through the pile, "
         "where the rest is weight that was lifted",
-        BEFORE: "force on the hook before the pull, over n W_s: of what rests on it, and of a pile that is braced between "
-        "hook and grid",
+        BEFORE: "force on the hook before the pull, over n W_s: of what rests on it, and of a pile that is braced "
+        "between hook and grid",
         HELD_FAST: "1 where the hook was stopped by its force limit on the way, 0 where it arrived",
         CARRIED: "smarticles whose centre of mass rose by more than half of the hook's way, over n; empty where held",
         BREAK: "height above the floor of those smarticles' lowest points before the pull, mean over them: where the "

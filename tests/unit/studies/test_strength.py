@@ -34,13 +34,8 @@ def write(directory: Path, procedure: str, *, seed: int = 1, top: float = 0.5, *
     """A run whose force is a triangle of a height over n W_s, and whose last frame has three smarticles risen by 2w."""
     active = () if procedure == STATIC else (ACTIVITY[procedure], "relax")
     phases = ("deposit", "relax", *active, "remove-container", "pull-hook")
-    run = SyntheticRun(
-        seed=seed,
-        phases=phases,
-        packing=(DEPTH,) * len(phases),
-        frames_per_phase=2,
-        shake_time=2.0,  # type: ignore[arg-type]
-    )
+    keys: dict[str, Any] = {"phases": phases, "packing": (DEPTH,) * len(phases), "frames_per_phase": 2}
+    run = SyntheticRun(**keys, seed=seed, shake_time=2.0)
     total = run.count * weight(run)
     write_hooked_run(
         directory, run, lambda time: top * total * np.clip(1 - np.abs(time - APEX) / BASE, 0, None), **stops
@@ -101,7 +96,8 @@ def test_the_study_writes_its_tables_and_figures(tmp_path: Path) -> None:
 
 def test_runs_with_a_wall_are_none_of_this_study(tmp_path: Path, undrawn: None) -> None:
     phases = ("deposit", "relax", "pull-hook")
-    run = SyntheticRun(phases=phases, packing=(DEPTH,) * 3)  # type: ignore[arg-type]
+    keys: dict[str, Any] = {"phases": phases, "packing": (DEPTH,) * 3}
+    run = SyntheticRun(**keys)
     other = write_hooked_run(tmp_path / "walled", run, np.zeros_like)
     report = Strength().analyse([write(tmp_path / "one", STATIC), other], tmp_path / "out", **ORIGIN)
     assert "its phases are deposit, relax, pull-hook, not" in report.missing[0].cause
@@ -187,4 +183,5 @@ def test_no_smarticle_holds_both_grips_and_the_grid_is_over_the_whole_floor() ->
                 assert [phase.type for phase in scene.phases][-2:] == ["remove-container", "pull-hook"]
                 limit = scene.phases[-1].force_limit_N  # type: ignore[union-attr]
                 # A fifth more than the limit on one contact, and the watchdog does not stop the run.
+                assert limit is not None
                 assert 1.2 * limit / scene.fidelity.stiffness_N_per_m < 0.5 * scene.sphere_diameter
