@@ -107,7 +107,7 @@ class Strength(PaperStudy):
     def refuse(self, found: Collected) -> None:
         """A point and seed twice, other numbers of smarticles, other durations of an activity."""
         found.refuse_repeats(
-            "point", lambda run: f"{run.row[PROCEDURE]} l/w {run.row[ASPECT]:g}, hook at {1e3 * run.row[UPPER]:g} mm"
+            "point", lambda run: f"{run.row[PROCEDURE]} l/w {run.row[ASPECT]:g}, hook at {run.row[UPPER]:g} m"
         )
         found.refuse_mixed_counts()
         found.refuse_mixture(

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import SyntheticRun, W, write_frame
+from synthetic import SyntheticRun, write_frame
 from synthetic.hooked import HELD, UPPER, weight, write_hooked_run
+from synthetic.shapes import W
 
 from dem.record.manifest import read_run
 from postprocess.measures.pull import WINDOW
