@@ -7,7 +7,19 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dem.errors import InputError, nearest
-from studies import casting, chain, collapse, engines, fracture, friction, gravish, melting, procedures, sensitivity
+from studies import (
+    casting,
+    chain,
+    collapse,
+    engines,
+    fracture,
+    friction,
+    gravish,
+    melting,
+    procedures,
+    sensitivity,
+    strength,
+)
 from studies.base.shipped import Shipped
 
 STUDIES: Mapping[str, Shipped] = MappingProxyType(
@@ -23,6 +35,8 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             procedures.FACTORS,
             fracture.SHIPPED,
             fracture.CODE,
+            strength.SHIPPED,
+            strength.CODE,
             melting.SHIPPED,
             melting.CODE,
             casting.SHIPPED,

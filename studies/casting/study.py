@@ -118,7 +118,8 @@ class Casting(PaperStudy):
 
     def about_points(self, analysis: Analysis[Finding]) -> str:
         """Seeds."""
-        return f"{told_seeds(analysis.tables['runs'], analysis.tables['points'][SEEDS], 'procedure')}."
+        runs, points = (judging(analysis.tables[name]) for name in ("runs", "points"))
+        return f"{told_seeds(runs, points[SEEDS], 'procedure')}."
 
     def table(self, analysis: Analysis[Finding]) -> ToldTable:
         """Means over seeds with their standard errors, engine by engine where there are several."""

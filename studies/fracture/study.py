@@ -146,8 +146,8 @@ class Fracture(PaperStudy):
 
     def about_points(self, analysis: Analysis[Finding]) -> str:
         """Seeds, and how many piles held fast."""
-        runs = analysis.tables["runs"]
-        return " ".join([f"{told_seeds(runs, analysis.tables['points'][SEEDS], 'point')}.", *_told_held(runs)])
+        runs, points_ = (judging(analysis.tables[name]) for name in ("runs", "points"))
+        return " ".join([f"{told_seeds(runs, points_[SEEDS], 'point')}.", *_told_held(runs)])
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Forces against time, and peaks against θ, l/w and ⟨N⟩."""

@@ -153,7 +153,8 @@ class Melting(PaperStudy):
 
     def about_points(self, analysis: Analysis[Finding]) -> str:
         """Seeds."""
-        return f"{told_seeds(analysis.tables['runs'], analysis.tables['points'][SEEDS], 'point')}."
+        runs, points = (judging(analysis.tables[name]) for name in ("runs", "points"))
+        return f"{told_seeds(runs, points[SEEDS], 'point')}."
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Every measure against time, and pictures."""

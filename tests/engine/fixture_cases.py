@@ -95,6 +95,24 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     }
 
 
+def hang_low(data: dict[str, Any], *, settle: float) -> dict[str, Any]:
+    """A U hung over the outermost bar along y of the lower hook's grid, clear of the others and of the floor."""
+    scene = scene_of(data)
+    engine = build(scene)
+    grid, particle = scene.hooks.crosses[0], scene.particle
+    middle = HANGING.apply(particle.centres[particle.links == 1])
+    top = grid.height + grid.side / 2 + particle.radius
+    far = grid.bars[-1].middle[0]
+    add(engine, (far, far / 2, top - middle[:, 2].max() + 1e-5), HANGING)
+    damped(engine, 0.3)
+    engine.advance(round(settle / engine.time_step))
+    return {
+        "rest": mean_hook_forces(engine, 200),
+        "far": far,
+        "weight": particle.boxes.mass * scene.gravity_m_per_s2,
+    }
+
+
 def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     """A U round both hooks, one barb below the lower and one above the upper, which is raised until a contact is deep.
 

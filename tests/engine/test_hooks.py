@@ -34,6 +34,16 @@ def test_a_hook_reads_the_weight_that_hangs_on_it(simulate: Simulate, scene_data
     assert hung["carried"] == pytest.approx(hung["expected"], rel=5e-3)
 
 
+def test_each_bar_of_a_grid_carries_what_hangs_on_it(simulate: Simulate, scene_data: SceneData) -> None:
+    hooks = {"lower_height_m": 0.02, "lower_length_m": 0.02, "lower_bars": 3, "upper_height_m": 0.04}
+    hung = simulate(fixture_cases.hang_low, scene_data({"hooks": hooks}), settle=0.3)
+    assert hung["far"] == pytest.approx(0.005)
+    lower, upper = hung["rest"]
+    assert lower == pytest.approx([0, 0, -hung["weight"]], abs=5e-3 * hung["weight"])
+    # An empty grip feels nothing.
+    assert np.abs(upper).max() == 0
+
+
 @pytest.mark.parametrize("fidelity", ["draft", "standard"])
 def test_a_hook_reads_the_friction_of_what_it_drags(simulate: Simulate, scene_data: SceneData, fidelity: str) -> None:
     hooks = {"length_m": 0.006, "lower_height_m": 6e-4}

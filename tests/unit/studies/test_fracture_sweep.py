@@ -91,7 +91,7 @@ def test_the_quick_variant_covers_procedures_and_amplitudes(full: list[Point]) -
     assert names == {f"{kind}_lw0.70_links" for kind in kinds}
     assert {point.scene.seed for point in quick} == {1, 2, 3}
     lines = differences(quick, full)
-    assert lines[:2] == ["15 runs instead of 120", "share: 0.5 instead of 1.0"]
+    assert lines[:3] == ["15 runs instead of 120", "fidelity: draft instead of standard", "share: 0.5 instead of 1.0"]
     assert {point.scene.count for point in quick} == {135}
     # Which of the paper's numbers is halved follows from l/w.
     assert not any(line.startswith(("n:", "per_layer:")) for line in lines)
