@@ -6,6 +6,7 @@ import csv
 import subprocess
 import sys
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +196,7 @@ def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 AMPLITUDES = (5, 10, 15, 20, 30)
-RATIOS, RATIOS_OF_AMPLITUDES = (0.4, 0.55, 0.7, 0.85, 1.0), (0.4, 0.5, 0.7, 1.0)
+RATIOS, RATIOS_OF_AMPLITUDES = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1), (0.4, 0.5, 0.7, 1.0)
 
 
 def procedures(*, quick: bool) -> list[Point]:
@@ -204,12 +205,13 @@ def procedures(*, quick: bool) -> list[Point]:
 
 def test_the_procedures_are_those_of_the_paper() -> None:
     every = procedures(quick=False)
-    assert len(every) == 151
-    assert len({point.scene_sha256 for point in every}) == 151
-    found = every[:145]
+    assert len(every) == 302
+    assert len({point.scene_sha256 for point in every}) == 302
+    found = every[:296]
     # Seed by seed, so that an interrupted study has all points.
-    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3, 4, 5) for _ in range(29)]
-    counts = {0.4: (494, 13), 0.5: (390, 13), 0.55: (349, 12), 0.7: (270, 10), 0.85: (242, 9), 1.0: (192, 8)}
+    assert [point.scene.seed for point in found] == [seed for seed in range(1, 9) for _ in range(37)]
+    counts = {0.4: (494, 13), 0.5: (390, 13), 0.6: (308, 11), 0.7: (270, 10), 0.8: (260, 10), 0.9: (225, 9)}
+    counts |= {1.0: (192, 8), 1.1: (168, 7)}
     for point in found:
         deposit, rest, activity, again = point.scene.phases
         assert isinstance(deposit, Deposit)
@@ -217,10 +219,13 @@ def test_the_procedures_are_those_of_the_paper() -> None:
         assert isinstance(again, Relax)
         assert rest.duration_s == again.duration_s == 0.5
         assert (point.scene.count, deposit.per_layer) == counts[point.scene.smarticle.aspect_ratio]
-        assert point.scene.fidelity.base == "draft"
+        assert point.scene.fidelity.base == "standard"
+        assert point.scene.protocol == "text"
         assert point.scene.recording.energy
+        # Torque and angle together every 0.1 s, as the paper's code kept them, are every second frame.
+        assert point.scene.recording.frame_interval_s == 0.05
         if isinstance(activity, Shake):
-            assert (activity.duration_s, activity.frequency_hz, activity.peak_acceleration_g) == (5.0, 30, 2)
+            assert (activity.duration_s, activity.frequency_hz, activity.peak_acceleration_g) == (20.0, 30, 2)
         elif isinstance(activity, ShapeChange):
             assert (activity.straight_deg, activity.opening_s, activity.closing_s) == (0, 1.5, 1.5)
         else:
@@ -232,7 +237,7 @@ def test_the_procedures_are_those_of_the_paper() -> None:
 
 @pytest.mark.parametrize("activity", [Shake, ShapeChange])
 def test_every_procedure_is_run_at_every_aspect_ratio(activity: type) -> None:
-    found = procedures(quick=False)[:29]
+    found = procedures(quick=False)[:37]
     ratios = [point.scene.smarticle.aspect_ratio for point in found if isinstance(point.scene.phases[2], activity)]
     assert tuple(ratios) == RATIOS
 
@@ -241,7 +246,7 @@ def test_amplitudes_are_left_out_by_the_rule_of_the_hinge() -> None:
     """90° + θ/2 · 0.7/(l/w) is at most 105°; every other combination is there, and none twice."""
     found = [
         (point.scene.smarticle.aspect_ratio, activity.theta_deg)
-        for point in procedures(quick=False)[:29]
+        for point in procedures(quick=False)[:37]
         if isinstance(activity := point.scene.phases[2], InternalOscillation)
     ]
     wanted = {(ratio, 10.0) for ratio in RATIOS}
@@ -252,23 +257,35 @@ def test_amplitudes_are_left_out_by_the_rule_of_the_hinge() -> None:
         if theta * 0.7 / ratio <= 30 * (1 + 1e-9)
     }
     assert sorted(found) == sorted(wanted)
-    assert len(wanted) < len(RATIOS_OF_AMPLITUDES) * len(AMPLITUDES) + 2
+    assert len(wanted) == len(RATIOS) + 13
 
 
 def test_the_quick_procedures_say_how_they_differ() -> None:
     found = procedures(quick=True)
     assert len(found) == 36
     lines = differences(found, procedures(quick=False))
-    assert lines[0] == "36 runs instead of 151"
-    assert {"share: 0.25 instead of 1.0", "shake_s: 2.0 instead of 5.0"} <= set(lines)
+    assert lines[0] == "36 runs instead of 302"
+    assert {"share: 0.25 instead of 1.0", "shake_s: 2.0 instead of 20.0"} <= set(lines)
     assert "oscillate_s: 2.0 instead of 5.0" in lines
-    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.55, 0.7, 0.85, 1.0" in lines
+    assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
     assert "theta_deg: only 0, 10, 30 of 0, 5, 10, 15, 20, 30" in lines
-    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5" in lines
+    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5, 6, 7, 8" in lines
+
+
+def test_the_code_and_the_factors_go_by_the_same_points() -> None:
+    by_text, by_code = procedures(quick=False), expand(load_sweep(study_file("procedures-code")))
+    assert [point.name for point in by_code] == [point.name for point in by_text]
+    assert {point.scene.protocol for point in by_code} == {"code"}
+    assert {point.scene.motor.law for point in by_code} == {"ease"}
+    factors = expand(load_sweep(study_file("factors")))
+    rules = {(p.scene.motor.law, p.scene.contact.friction_wall, p.scene.container.radius_m) for p in factors}
+    assert rules == set(product(("halt", "ease"), (0.4, 0.2), (0.0234, 0.0224)))
+    assert len(factors) == len(rules) * 2 * 8
 
 
 def test_every_sweep_file_is_that_of_a_study_in_the_registry() -> None:
-    files = {path.name.removesuffix(".yaml") for path in FOLDER.glob("*/*.yaml")}
+    # The list of claims is no sweep.
+    files = {path.name.removesuffix(".yaml") for path in FOLDER.glob("*/*.yaml") if path.parent.name != "claims"}
     assert {name for name in files if "." not in name} == set(STUDIES)
 
 
