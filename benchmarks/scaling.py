@@ -108,7 +108,7 @@ def draw(table: Any, folder: Path, said: str) -> None:
         left.legend()
         figure.tight_layout()
         add_footer(figure, [said])
-        save(figure, folder / "scaling.png", formats=("png",))
+        save(figure, folder / "scaling", formats=("png",))
 
 
 def main() -> None:

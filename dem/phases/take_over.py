@@ -50,7 +50,7 @@ class TakeOver(Part, Phase):
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
     run: str = Field(..., min_length=1, description="directory of the run, as seen from the scene file")
-    frame: Annotated[int, Field(ge=0)] | Literal["last"] = Field(
+    frame: Annotated[int, Field(ge=0, le=10**9)] | Literal["last"] = Field(
         "last",
         description="number of the frame, as in the name of its file; last: of a run that is done, resolved when the "
         "scene is read",

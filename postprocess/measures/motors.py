@@ -79,7 +79,7 @@ def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
 def _sampled_work_of(run: RunManifest, series: Series, phase: int) -> tuple[float]:
     frames = read_frames(run.directory).in_phase(phase)
     chosen = [frames[k] for k in sampled(frames)]
-    if not chosen:
+    if not chosen or any("motor_torque_N_m" not in frame.cell_data for frame in chosen):
         return (math.nan,)
     angles, torques = (
         np.array([frame.cell_data[name][:, [0, 2]] for frame in chosen]) for name in ("angle_rad", "motor_torque_N_m")

@@ -21,7 +21,7 @@ echo "${{COMPREPLY[*]}}"
     ("words", "meant"),
     [
         ("smarticles compa", "compare"),
-        ("smarticles study fract", "fracture"),
+        ("smarticles study colla", "collapse"),
         ("smarticles run scene.yaml --eng", "--engine"),
         ("smarticles run scene.yaml --engine l", "links"),
         ("smarticles init cas", "casting"),
