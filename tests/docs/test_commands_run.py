@@ -83,7 +83,8 @@ def _compare(picture: Path, made: Path) -> None:
 def _drawn(image: Image.Image) -> tuple[float, NDArray[np.float64]]:
     """Share of a picture that is drawn on, and the middle of that as shares of width and height."""
     coarse = np.asarray(image.resize((64, 64), Image.Resampling.BOX), dtype=np.float64)
-    drawn = np.abs(coarse - np.median(coarse, axis=(0, 1))).max(axis=2) > 12
+    paper = np.median(np.concatenate([coarse[0], coarse[-1], coarse[:, 0], coarse[:, -1]]), axis=0)
+    drawn = np.abs(coarse - paper).max(axis=2) > 12
     return float(drawn.mean()), np.argwhere(drawn).mean(axis=0)[::-1] / 64 if drawn.any() else np.full(2, np.nan)
 
 
