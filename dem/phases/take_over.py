@@ -65,6 +65,9 @@ class TakeOver(Part, Phase):
     @field_validator("run")
     @classmethod
     def _seen_from_the_scene(cls, value: str, info: ValidationInfo) -> str:
+        if not value.isprintable():
+            msg = f"{shown(value)} has characters that cannot be printed; give the path of a run directory"
+            raise ValueError(msg)
         folder = (info.context or {}).get("folder") or Path()
         return str((Path(folder) / value).resolve())
 

@@ -294,7 +294,7 @@ def test_the_study_of_procedures_is_analysed(
     said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 36 runs instead of 151; ")
+    assert lines[0].startswith("not the full study: 36 runs instead of 302; ")
     assert lines[1].split()[:10] == ["engine", "procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again"]
     assert [line.split()[1] for line in lines[2:14]] == (
         ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3
@@ -303,7 +303,7 @@ def test_the_study_of_procedures_is_analysed(
     assert "NO DATA: Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5" in lines
     findings = (out / "results" / "findings.csv").read_text(encoding="utf-8")
     assert "Study procedures, fidelity draft, engine links and yade: 35 of 36 runs, 1 missing" in findings
-    assert "internal10_lw0.70_yade_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
+    assert "external_lw0.70_yade_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
