@@ -10,6 +10,7 @@ import pandas as pd
 from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.statistics.findings import CRITERION, Finding, findings_table
 from postprocess.statistics.points import ToldTable, told_means
+from studies.base.engines import engine_lines, told_by_engine
 from studies.base.references import SAVOIE, Reference
 from studies.base.study import Analysis, Study, Tables
 
@@ -62,8 +63,9 @@ class PaperStudy(Study[Finding]):
         """Statements for footers, see `Study.statements`, but for how verdicts come about."""
 
     def table(self, analysis: Analysis[Finding]) -> ToldTable:
-        """Means over seeds with their standard errors."""
-        return told_means(analysis.tables["points"], self.named, self.shown)
+        """Means over seeds with their standard errors, engine by engine where there are several."""
+        points = analysis.tables["points"]
+        return told_means(points, told_by_engine(points, self.named), self.shown)
 
     def told(self, analysis: Analysis[Finding]) -> Sequence[str]:
         """What the numbers are, and every finding with its verdict."""
@@ -102,5 +104,7 @@ class PaperStudy(Study[Finding]):
         return self.table(analysis)
 
     def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """Further lines of the text, below the table."""
-        return ()
+        """Further lines of the text, below the table: the engines compared, if there are several."""
+        return engine_lines(
+            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
+        )

@@ -13,14 +13,11 @@ from dem.record.manifest import RunManifest
 from postprocess.geometry.outline import BALL
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from postprocess.statistics.points import ToldTable, told_means
 from studies.base.engines import (
     by_engine,
     compared_engines,
-    engine_lines,
     engines_of,
     judging,
-    told_by_engine,
     told_engines,
 )
 from studies.base.paper import PaperStudy
@@ -120,17 +117,6 @@ class Casting(PaperStudy):
         """Seeds."""
         runs, points = (judging(analysis.tables[name]) for name in ("runs", "points"))
         return f"{told_seeds(runs, points[SEEDS], 'procedure')}."
-
-    def table(self, analysis: Analysis[Finding]) -> ToldTable:
-        """Means over seeds with their standard errors, engine by engine where there are several."""
-        points = analysis.tables["points"]
-        return told_means(points, told_by_engine(points, self.named), self.shown)
-
-    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """The engines compared, if there are several."""
-        return engine_lines(
-            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
-        )
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """Shares by tier, overlaps, and pictures."""

@@ -21,7 +21,6 @@ from postprocess.statistics.points import ToldTable, marked, told_means
 from studies.base.engines import (
     by_engine,
     compared_engines,
-    engine_lines,
     engines_of,
     judging,
     told_by_engine,
@@ -132,12 +131,6 @@ class Fracture(PaperStudy):
         """Means over seeds, the displacement in millimetres."""
         means, raised = analysis.tables["points"], [PEAK_RAISED, marked(PEAK_RAISED, "SE")]
         return told_means(means.assign(**(1e3 * means[raised])), told_by_engine(means, self.named), self.shown)
-
-    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """The engines compared, if there are several."""
-        return engine_lines(
-            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
-        )
 
     def text(self, analysis: Analysis[Finding]) -> Sequence[str]:
         """Ends with what a column of the runs is."""

@@ -15,14 +15,11 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.spread import OUTSIDE, TOUCHING
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from postprocess.statistics.points import ToldTable, told_means
 from studies.base.engines import (
     by_engine,
     compared_engines,
-    engine_lines,
     engines_of,
     judging,
-    told_by_engine,
     told_engines,
 )
 from studies.base.paper import PaperStudy
@@ -133,17 +130,6 @@ class Melting(PaperStudy):
             "the centre of mass from the floor below where it was before. Toppled: centre of mass beyond the radius "
             "that held 95 % before.",
             f"{told_bars(counts, 'point')}.",
-        )
-
-    def table(self, analysis: Analysis[Finding]) -> ToldTable:
-        """Means over seeds with their standard errors, engine by engine where there are several."""
-        points = analysis.tables["points"]
-        return told_means(points, told_by_engine(points, self.named), self.shown)
-
-    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """The engines compared, if there are several."""
-        return engine_lines(
-            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
         )
 
     @property

@@ -19,7 +19,7 @@ from dem.record.manifest import RunManifest
 from postprocess.scene_file import read_scene
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding, judge, negative, told
-from postprocess.statistics.points import mean_columns, seeds_of
+from postprocess.statistics.points import averaged, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
 from studies.base.paper import PaperStudy
@@ -97,10 +97,8 @@ class Factors(PaperStudy):
         runs = runs_table(found).sort_values([*FACTORS, ASPECT, SEED], ignore_index=True, kind="stable")
         rows = []
         for key, group in runs.groupby([*FACTORS, ASPECT], sort=True):
-            row: dict[str, object] = {**dict(zip((*FACTORS, ASPECT), key, strict=True)), **seeds_of(group)}
-            for quantity in QUANTITIES:
-                row |= mean_columns(quantity, mean_over_seeds(group[quantity]))
-            rows.append(row)
+            combination = dict(zip((*FACTORS, ASPECT), key, strict=True))
+            rows.append({**combination, **seeds_of(group), **averaged(group, QUANTITIES)})
         return {"runs": runs, "points": pd.DataFrame(rows)}
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:

@@ -15,12 +15,11 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from postprocess.statistics.points import ToldTable, told_means
 from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, QUANTITIES, procedure_row, samples, static_spread
-from studies.base.engines import by_engine, compared_engines, engine_lines, engines_of, judging, told_engines
+from studies.base.engines import by_engine, compared_engines, engines_of, judging, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, AMPLITUDE, CROSSINGS, NAMED, PHI, PROCEDURE, THETA, points, refuse_unlike
-from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
+from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.procedures import figures
 from studies.procedures.findings import findings
@@ -89,18 +88,6 @@ class Procedures(PaperStudy):
             f"and seed agree there within {static_spread(runs):.2g} in φ). h0 is the mean height of the centre of mass "
             "there. Energy: work of the motors, or of the shaken container without its own weight. Procedures are "
             f"compared at θ = {AMPLITUDE:g}°. {told_bars(counts, 'point')}.",
-        )
-
-    def table(self, analysis: Analysis[Finding]) -> ToldTable:
-        """Means over seeds with their standard errors, engine by engine where there are several."""
-        points_ = analysis.tables["points"]
-        engine = {"engine": lambda point: str(point[ENGINE])} if engines_of(points_) else {}
-        return told_means(points_, {**engine, **self.named}, self.shown)
-
-    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """The engines compared, if there are several."""
-        return engine_lines(
-            analysis.tables.get("engines"), {name: told for name, told in NAMED.items() if name != "seeds"}
         )
 
     @property

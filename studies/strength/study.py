@@ -22,7 +22,6 @@ from postprocess.statistics.points import ToldTable, marked, told_means
 from studies.base.engines import (
     by_engine,
     compared_engines,
-    engine_lines,
     engines_of,
     judging,
     told_by_engine,
@@ -152,12 +151,6 @@ class Strength(PaperStudy):
         points = analysis.tables["points"]
         columns = [name for length in _LENGTHS for name in (length, marked(length, "SE"))]
         return told_means(points.assign(**(1e3 * points[columns])), told_by_engine(points, self.named), self.shown)
-
-    def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
-        """The engines compared, if there are several."""
-        return engine_lines(
-            analysis.tables.get("engines"), {name: told for name, told in self.named.items() if name != "seeds"}
-        )
 
     def about_points(self, analysis: Analysis[Finding]) -> str:
         """Seeds, and how many piles held fast."""
