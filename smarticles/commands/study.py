@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from studies import registry
 
 if TYPE_CHECKING:
     from studies.base.report import Report
+    from studies.base.runs import MeasuredRun
     from studies.base.study import Study
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
@@ -45,6 +47,7 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
   smarticles study sensitivity --out sensitivity
   smarticles study procedures --quick --out procedures-quick
   smarticles study procedures --out procedures --analyse     what the finished runs say so far
+  smarticles study procedures --out more --earlier results/procedures    only the runs that are not in these tables
 """,
     )
     study.add_argument("name", choices=tuple(registry.STUDIES), metavar="NAME", help=", ".join(registry.STUDIES))
@@ -54,6 +57,12 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
     )
     add_engine(study, "all runs on this engine, instead of those that the study ships with")
     study.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
+    study.add_argument(
+        "--earlier",
+        type=Path,
+        metavar="RESULTS",
+        help="results of an earlier analysis: runs of the same scenes in its tables are not computed again",
+    )
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
     add_slots(study)
 
@@ -69,7 +78,10 @@ def run_study(arguments: argparse.Namespace) -> int:
     note = _note(arguments.name, file, changed, arguments.engine)
     print(note, flush=True)
     load = partial(shipped.load, quick=arguments.quick)
-    return compute_and_analyse(folder, arguments, load, note=note, pictured=shipped.pictured)
+    earlier = _earlier(arguments.earlier, folder, load)
+    if earlier:
+        note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"
+    return compute_and_analyse(folder, arguments, load, note=note, pictured=shipped.pictured, earlier=earlier)
 
 
 def compute_and_analyse(
@@ -79,6 +91,7 @@ def compute_and_analyse(
     *,
     note: str,
     pictured: Mapping[str, object],
+    earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> int:
     """Run what a sweep is missing unless --analyse says not to, then say what the finished runs say.
 
@@ -88,26 +101,50 @@ def compute_and_analyse(
         load: gives the study that analyses the runs, once there are any: its libraries are large.
         note: how the runs differ from the full study.
         pictured: values of the run that a picture is drawn of.
+        earlier: runs that were measured before; they are not computed again.
 
     Raises:
         InputError: no run is finished and none is to be started.
         RunError: a run failed.
     """
-    outcomes = [] if arguments.analyse else compute(folder, jobs=arguments.jobs, command=arguments.command_line)
+    earlier = earlier or {}
+    needed = replace(folder, entries=tuple(entry for entry in folder.entries if entry.name not in earlier))
+    outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
-    if arguments.analyse and not finished:
+    if arguments.analyse and not finished and not earlier:
         msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
         raise InputError(msg)
-    if finished:
+    if finished or earlier:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
         runs = [folder.run(entry) for entry in folder.entries]
-        print(told_report(load().analyse(runs, results, note=note, command=arguments.command_line)))
+        report = load().analyse(runs, results, note=note, command=arguments.command_line, earlier=earlier)
+        print(told_report(report))
         sys.stdout.flush()
         _draw(folder, finished, pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
     refuse_failures(folder, outcomes)
     return 0
+
+
+def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study[Any]]) -> Mapping[str, MeasuredRun]:
+    """The runs of a sweep that an earlier analysis measured.
+
+    Raises:
+        InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
+    """
+    if results is None:
+        return {}
+    study = load()
+    if not study.told_by_tables:
+        msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
+        raise InputError(msg)
+    from studies.base.earlier import Wanted, earlier_runs  # noqa: PLC0415
+
+    wanted = {
+        entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
+    }
+    return earlier_runs(results, wanted)
 
 
 def told_report(report: Report[Any]) -> str:

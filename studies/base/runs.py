@@ -184,7 +184,11 @@ class Collected:
 
 
 def collect_runs(
-    study: str, run_dirs: Sequence[Path | str], measure: Callable[[RunManifest], MeasuredRun]
+    study: str,
+    run_dirs: Sequence[Path | str],
+    measure: Callable[[RunManifest], MeasuredRun],
+    *,
+    earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
     """Measures the finished runs, and lists the others.
 
@@ -192,6 +196,7 @@ def collect_runs(
         study: Its name, for messages.
         run_dirs: Run directories.
         measure: What is measured of one run; an InputError makes the run unusable.
+        earlier: Runs measured before by the names of their directories, for those whose directories are not there.
 
     Raises:
         InputError: No run is done.
@@ -200,6 +205,10 @@ def collect_runs(
     missing: list[MissingRun] = []
     for directory in run_dirs:
         status = "unusable"
+        before = (earlier or {}).get(Path(directory).name)
+        if before is not None and not Path(directory).exists():
+            runs.append(before)
+            continue
         try:
             run = read_run(directory)
             if run.status != "done":

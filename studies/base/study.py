@@ -48,15 +48,24 @@ class Study(ABC, Generic[Judgement]):
         text_name: Name of the Markdown file that tells everything.
         one_fidelity: Whether all runs must have the same.
         one_engine: Whether all runs must be of the same engine; where not, the table of runs tells which.
+        told_by_tables: Whether what it says of a run is all in its table of runs, so that those of an earlier
+            analysis will do.
     """
 
     name: str
     text_name: str
     one_fidelity: bool = True
     one_engine: bool = True
+    told_by_tables: bool = False
 
     def analyse(
-        self, run_dirs: Sequence[Path | str], output: Path | str, *, note: str, command: str
+        self,
+        run_dirs: Sequence[Path | str],
+        output: Path | str,
+        *,
+        note: str,
+        command: str,
+        earlier: Mapping[str, MeasuredRun] | None = None,
     ) -> Report[Judgement]:
         """Measures the runs of the study and writes its tables, text, provenance and figures.
 
@@ -68,6 +77,8 @@ class Study(ABC, Generic[Judgement]):
             output: Folder for the results; made if needed.
             note: How these runs differ from the full study, if all of them were there; stands in every footer.
             command: Command line to state as the origin.
+            earlier: Runs measured by an earlier analysis, see `base.earlier`, that stand for directories which are
+                not there.
 
         Returns:
             The report.
@@ -78,7 +89,7 @@ class Study(ABC, Generic[Judgement]):
             RunError: This machine lacks the libraries to draw without a display.
         """
         output = make_folder(output)
-        found = collect_runs(self.name, run_dirs, self.measure)
+        found = collect_runs(self.name, run_dirs, self.measure, earlier=earlier)
         if self.one_fidelity:
             found.refuse_mixture("fidelity", lambda run: run.manifest.fidelity)
         if self.one_engine:

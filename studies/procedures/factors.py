@@ -57,6 +57,7 @@ class Factors(PaperStudy):
     """Runs of a shape change, by every combination of the factors."""
 
     name = "factors"
+    told_by_tables = True
     title = "What the paper's text and its own code differ in, one by one: shape change"
     quantities = QUANTITIES
     named: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(

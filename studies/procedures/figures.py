@@ -61,6 +61,9 @@ _LABELS = {
 }
 # To keep error bars apart.
 _SHIFTS = {SHAPE: -0.006, EXTERNAL: 0.006, INTERNAL: 0.0, STATIC: 0.0}
+_NAMED = 2
+"""Runs without a time series that a figure names; the others are counted."""
+
 _APART = "Set apart sideways by 0.006 in l/w."
 
 
@@ -222,5 +225,6 @@ def _draw_heights(
     legend_above(axes)
     told = [f"l/w = {aspect:g}. {told_histories(width, 'Each activity')}"]
     if without:
-        told.append(f"No time series of the height: {', '.join(without)}.")
+        named = ", ".join(without[:_NAMED]) + (f" and {len(without) - _NAMED} more" if len(without) > _NAMED else "")
+        told.append(f"No time series of the height: {named}.")
     return finished(figure, path, told, footer)

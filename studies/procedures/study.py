@@ -33,6 +33,7 @@ class Procedures(PaperStudy):
     """
 
     one_engine = False
+    told_by_tables = True
     title = "Procedures of smarticles against the findings of Savoie et al."
     quantities = QUANTITIES
     named = NAMED
