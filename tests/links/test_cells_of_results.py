@@ -1,0 +1,117 @@
+"""A cell of each table of the reproduction, run anew: is what stands in results/ what this version finds?
+
+Of the scene of one run, the very one by its hash, everything that is measured must lie where a further seed of its cell
+would: within the scatter of the cell's other seeds. On a processor of the kind that the table was made on, it is the
+number itself; on another one the last bits differ, and a pile with them.
+"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from scipy import stats
+
+from dem.record.manifest import read_run
+from dem.scene.reading import dump_scene
+from studies.registry import shipped, study_file
+from templates.sweep.expand import Point, expand
+from templates.sweep.sweep_file import SEED, load_sweep
+
+RESULTS = Path(__file__).resolve().parents[2] / "results"
+CHANCE = 0.01
+"""That a sound run is found out of its cell, all its columns together."""
+
+DIGITS = 1e-5  # tables have six
+MACHINE = ("processor", "wall time")
+"""What columns of the machine's time begin with: they say nothing of the pile."""
+
+CELLS = [
+    ("procedures", "shape-change_lw1.10_links_seed1"),
+    ("procedures-code", "shape-change_lw1.10_links_seed1"),
+    ("factors", "text_halt_mu0.4_lw1.00_seed1"),
+    ("engines", "hook_links_seed2"),
+]
+OTHERS = [
+    ("procedures", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
+    ("procedures-code", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
+    ("factors", "text_halt_mu0.4_lw1.00_seed1", "text_halt_mu0.2_lw1.00_seed1"),
+    ("engines", "internal_links_seed7", "shape-change_links_seed5"),
+]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a table says of the seeds of one point.
+
+    Attributes:
+        table: The study's folder under results/.
+        run: Name of one run.
+        rows: Numbers of all seeds of its point, by run.
+    """
+
+    table: str
+    run: str
+    rows: pd.DataFrame
+
+    def outside(self, row: Mapping[str, object]) -> dict[str, str]:
+        """The columns in which a row does not belong here, and how."""
+        columns = [name for name in self.rows if not str(name).startswith(MACHINE)]
+        found = {}
+        for name in columns:
+            others, value = self.rows[name].dropna(), float(str(row.get(name, math.nan)))
+            if len(others) < 3 or math.isnan(value):
+                continue
+            width = stats.t.ppf(1 - CHANCE / len(columns) / 2, len(others) - 1) * others.std()
+            width = width * math.sqrt(1 + 1 / len(others)) + DIGITS * abs(others.mean())
+            if abs(value - others.mean()) > width:
+                found[str(name)] = f"{value:g}, where the others are {others.mean():g} ± {width:g}"
+        return found
+
+
+@cache
+def points(study: str) -> dict[str, Point]:
+    return {point.name: point for point in expand(load_sweep(study_file(study)))}
+
+
+def cell(table: str, run: str) -> Cell:
+    rows = pd.read_csv(RESULTS / table / "runs.csv", comment="#").set_index("run")
+    alike = {name: value for name, value in points(table)[run].values.items() if name != SEED}
+    seeds = [
+        name
+        for name, point in points(table).items()
+        if name in rows.index and {key: point.values[key] for key in alike} == alike
+    ]
+    numbers = rows.loc[seeds].select_dtypes("number").drop(columns=[SEED])
+    return Cell(table=table, run=run, rows=numbers)
+
+
+@pytest.mark.parametrize(("table", "run"), CELLS)
+def test_a_cell_comes_out_again(table: str, run: str, tmp_path: Path) -> None:
+    point = points(table)[run]
+    told = pd.read_csv(RESULTS / table / "runs.csv", comment="#").set_index("run").loc[run]
+    assert told["scene_sha256"] == point.scene_sha256, "the table is of another scene than the study has now"
+    scene, out = tmp_path / f"{run}.yaml", tmp_path / "runs" / run
+    scene.write_text(dump_scene(point.scene), encoding="utf-8")
+    command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    measured = shipped(table).load(quick=False).measure(read_run(out)).row
+    known = cell(table, run)
+    assert len(known.rows) >= 8
+    assert set(known.rows) - {"engine"} <= set(measured)
+    assert known.outside(measured) == {}
+
+
+@pytest.mark.parametrize(("table", "run", "other"), OTHERS)
+def test_a_run_of_another_cell_is_found_out(table: str, run: str, other: str) -> None:
+    stranger = cell(table, other).rows.loc[other]
+    assert cell(table, run).outside(stranger.to_dict())
+    assert cell(table, run).outside(cell(table, run).rows.loc[run].to_dict()) == {}
