@@ -32,6 +32,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             sensitivity.SECTION,
             procedures.SHIPPED,
             procedures.CODE,
+            procedures.CODE_ON_YADE,
             procedures.FACTORS,
             fracture.SHIPPED,
             fracture.CODE,

@@ -21,8 +21,8 @@ plan`). Made by `make claims` from the tables of the studies in this folder, whi
 command of every run; a test holds this page against them. Errors are standard errors; verdicts go by 95 %.
 
 *Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: the
-opposite was found. *Not resolved*: neither. *No data*: the runs are still to be made. *On YADE*: the same finding by
-the text on the other engine, where it has runs of its own: no say in the verdict, but it shows where engines differ.
+opposite was found. *Not resolved*: neither. *No data*: the runs are still to be made. *On YADE*: the same finding on
+the other engine, where it has runs of its own: no say in the verdict, but it shows where engines differ.
 """
 
 
@@ -42,10 +42,10 @@ def text(found: Sequence[Claim]) -> str:
                 "",
                 f"## {part}",
                 "",
-                "| | claim | verdict | by the text | by the code | on YADE | rests on | why |",
-                "| --- | --- | --- | --- | --- | --- | --- | --- |",
+                "| | claim | verdict | by the text | by the code | text on YADE | code on YADE | rests on | why |",
+                "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
             ]
-        ours = (_told(tested) for tested in (claim.text, claim.code, claim.yade))
+        ours = (_told(tested) for tested in _all(claim))
         cells = (str(claim.number), claim.says, f"**{claim.verdict}**", *ours, _rests(claim), claim.why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
@@ -55,8 +55,13 @@ def _told(tested: Tested | None) -> str:
     return "–" if tested is None else f"{tested.verdict}: {tested.ours}"
 
 
+def _all(claim: Claim) -> tuple[Tested | None, ...]:
+    """By protocol and engine, in the order of the columns."""
+    return claim.text, claim.code, claim.yade, claim.code_on_yade
+
+
 def _rests(claim: Claim) -> str:
-    tested = [one for one in (claim.text, claim.code, claim.yade) if one is not None]
+    tested = [one for one in _all(claim) if one is not None]
     told = [f"[{one.study}]({one.study}/): {one.basis}" for one in tested]
     return "; ".join(told) or "–"
 
@@ -72,7 +77,7 @@ def table(found: Sequence[Claim]) -> pd.DataFrame:
             "verdict": claim.verdict,
             "why": claim.why,
         }
-        for name, tested in (("text", claim.text), ("code", claim.code), ("text on YADE", claim.yade)):
+        for name, tested in zip(("text", "code", "text on YADE", "code on YADE"), _all(claim), strict=True):
             for key in ("study", "verdict", "ours", "criterion", "basis"):
                 row[f"by the {name}: {key}"] = "" if tested is None else getattr(tested, key)
         rows.append(row)

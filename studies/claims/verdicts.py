@@ -71,6 +71,7 @@ class Claim:
         text: By the rules of the paper's text; None where that was not tested.
         code: By those of its own code.
         yade: By those of the text on YADE, from results of their own; None where these have no such finding.
+        code_on_yade: The same by the code.
         why: What decides the verdict, or why there is none.
     """
 
@@ -80,6 +81,7 @@ class Claim:
     text: Tested | None
     code: Tested | None
     yade: Tested | None
+    code_on_yade: Tested | None
     why: str
 
     @property
@@ -117,6 +119,7 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
                 text=tables.tested(entry.get("text")),
                 code=tables.tested(entry.get("code")),
                 yade=tables.on_yade(entry.get("text")),
+                code_on_yade=tables.on_yade(entry.get("code")),
                 why=entry.get("untested") or entry.get("why", ""),
             )
         )

@@ -1,4 +1,4 @@
-"""The studies `procedures`, `procedures-code` and `factors`: by the paper's text, by its code, and one by one."""
+"""The studies `procedures`, `procedures-code` on either engine, and `factors`: by text, by code, and one by one."""
 
 from __future__ import annotations
 
@@ -22,6 +22,12 @@ def _load_code(*, quick: bool) -> Procedures:
     from studies.procedures.study import Procedures  # noqa: PLC0415  (pandas, matplotlib)
 
     return Procedures("procedures-code")
+
+
+def _load_code_on_yade(*, quick: bool) -> Procedures:
+    from studies.procedures.study import Procedures  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Procedures("procedures-code-yade")
 
 
 def _load_factors(*, quick: bool) -> Factors:
@@ -50,6 +56,16 @@ CODE = Shipped(
     about="""\
 the same by the rules of the paper's own code: a motor at its torque limit goes on at half the speed and stops after
 20 findings in a row, friction 0.2, a wall of 22.4 mm, the floor shaken alone.""",
+)
+
+CODE_ON_YADE = Shipped(
+    name="procedures-code-yade",
+    folder=Path(__file__).parent,
+    load=_load_code_on_yade,
+    pictured={"procedure": "shape-change", "l_over_w": 0.7},
+    about="""\
+what the main finding by the code's rules rests on, once more on YADE: shape change and internal oscillation of 100
+smarticles at three aspect ratios; 18 runs.""",
 )
 
 FACTORS = Shipped(
