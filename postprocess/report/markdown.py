@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from postprocess.statistics.findings import Finding
+from postprocess.statistics.findings import Finding, told_more
 
 
 def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
@@ -15,7 +15,10 @@ def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[st
 
 def findings_lines(found: Iterable[Finding]) -> list[str]:
     """A table of findings."""
-    rows = ((one.paper, one.ours, f"**{one.verdict}**", one.criterion) for one in found)
+    rows = (
+        (one.paper, one.ours, "; ".join(filter(None, [f"**{one.verdict}**", told_more(one.verdict)])), one.criterion)
+        for one in found
+    )
     return table_lines(["finding in the paper", "ours (± standard error)", "verdict", "found if"], rows)
 
 

@@ -8,11 +8,35 @@ from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
+from scipy.special import stdtrit
 
-from postprocess.statistics.seeds import SeedMean, Slope
+from postprocess.statistics.seeds import CONFIDENCE, SeedMean, Slope
 
-Verdict = Literal["found", "not found", "not resolved", "no data"]
 Effect = SeedMean | Slope
+
+_MOST_RUNS = 1 << 20  # counted up to
+_TELLING = 100  # times as many runs that are told as a number
+
+
+class Unresolved(str):
+    """The verdict `not resolved`, and what it would take.
+
+    Attributes:
+        more: So many times as many runs of the same scatter would resolve an effect as large as the one seen [-].
+    """
+
+    __slots__ = ("more",)
+
+    def __new__(cls, more: float) -> Unresolved:
+        """A verdict; `more` is infinite where no effect is seen at all, NaN where one run has no scatter."""
+        verdict = super().__new__(cls, "not resolved")
+        verdict.more = more
+        return verdict
+
+    more: float
+
+
+Verdict = Literal["found", "not found", "not resolved", "no data"] | Unresolved
 
 CRITERION = (
     "A finding is found where it holds beyond the 95 % half-width (Student's t) of the scatter over pairs or runs, "
@@ -45,15 +69,48 @@ def judge(effect: Effect, *, threshold: float = 0.0) -> Verdict:
         return "no data"
     if effect.value - effect.half_width > threshold:
         return "found"
-    return "not found" if effect.value + effect.half_width < threshold else "not resolved"
+    if effect.value + effect.half_width < threshold:
+        return "not found"
+    return Unresolved(more=_runs_needed(effect, abs(effect.value - threshold)) / max(effect.count, 1))
+
+
+def _runs_needed(effect: Effect, size: float) -> float:
+    """How many runs of the same scatter have a 95 % half-width below some size; inf beyond a million."""
+    scatter = effect.standard_error * math.sqrt(effect.count)
+    if not math.isfinite(scatter):
+        return math.nan
+    few, many = 1, 2
+    while scatter * stdtrit(many - 1, (1 + CONFIDENCE) / 2) / math.sqrt(many) > size:
+        few, many = many, 2 * many
+        if many > _MOST_RUNS:
+            return math.inf
+    while many - few > 1:
+        middle = (few + many) // 2
+        enough = middle > 1 and scatter * stdtrit(middle - 1, (1 + CONFIDENCE) / 2) / math.sqrt(middle) <= size
+        few, many = (few, middle) if enough else (middle, many)
+    return float(many)
+
+
+def told_more(verdict: Verdict) -> str:
+    """`an effect of this size would take 3.1 times as many runs` of a verdict that is not resolved; else nothing."""
+    more = verdict.more if isinstance(verdict, Unresolved) else math.nan
+    if math.isnan(more):
+        return ""
+    if more > _TELLING:
+        return f"an effect of this size would take more than {_TELLING} times as many runs"
+    return f"an effect of this size would take {more:.2g} times as many runs"
 
 
 def all_of(verdicts: Sequence[Verdict]) -> Verdict:
     """Of a finding that says several things: one that is clearly wrong is enough to refuse it."""
-    for verdict in ("not found", "no data", "not resolved"):
+    for verdict in ("not found", "no data"):
         if verdict in verdicts:
             return verdict
-    return "found"
+    unresolved = [verdict for verdict in verdicts if verdict == "not resolved"]
+    if not unresolved:
+        return "found"
+    known = [verdict.more for verdict in unresolved if isinstance(verdict, Unresolved)]
+    return Unresolved(more=max(known)) if len(known) == len(unresolved) else "not resolved"
 
 
 def negative(effect: Effect) -> SeedMean:
@@ -77,4 +134,5 @@ def told(effect: Effect, digits: int = 4, unit: str = "") -> str:
 def findings_table(found: Sequence[Finding]) -> pd.DataFrame:
     """One row per finding."""
     columns = {"paper": "finding in the paper", "ours": "ours", "verdict": "verdict", "criterion": "criterion"}
-    return pd.DataFrame([[getattr(one, name) for name in columns] for one in found], columns=list(columns.values()))
+    table = pd.DataFrame([[getattr(one, name) for name in columns] for one in found], columns=list(columns.values()))
+    return table.assign(needed=[told_more(one.verdict) for one in found])

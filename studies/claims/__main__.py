@@ -20,9 +20,10 @@ the paper's own **code** where it says otherwise (`protocol: text` and `protocol
 plan`). Made by `make claims` from the tables of the studies in this folder, which name scene, seed, versions and
 command of every run; a test holds this page against them. Errors are standard errors; verdicts go by 95 %.
 
-*Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: the
-opposite was found. *Not resolved*: neither. *No data*: the runs are still to be made. *On YADE*: the same finding on
-the other engine, where it has runs of its own: no say in the verdict, but it shows where engines differ.
+*Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: by none,
+and the opposite was found by one at least. *Not resolved*: neither; what it would take is told by the scatter there is.
+*No data*: the runs are still to be made. *On YADE*: the same finding on the other engine, where it has runs of its own:
+no say in the verdict, but it shows where engines differ.
 """
 
 
@@ -52,7 +53,9 @@ def text(found: Sequence[Claim]) -> str:
 
 
 def _told(tested: Tested | None) -> str:
-    return "–" if tested is None else f"{tested.verdict}: {tested.ours}"
+    if tested is None:
+        return "–"
+    return "; ".join(filter(None, [f"{tested.verdict}: {tested.ours}", tested.needed]))
 
 
 def _all(claim: Claim) -> tuple[Tested | None, ...]:

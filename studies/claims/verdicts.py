@@ -51,6 +51,7 @@ class Tested:
         ours: Its numbers.
         criterion: What its verdict asks for.
         basis: Smarticles, seeds and engine that it rests on.
+        needed: What it would take, where the verdict is not resolved and that is told; else empty.
     """
 
     study: str
@@ -58,6 +59,7 @@ class Tested:
     ours: str
     criterion: str
     basis: str
+    needed: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +88,7 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """Of both together: partly where one finds it and the other does not."""
+        """Of both together: partly where one finds it and the other does not; not where one finds the opposite."""
         tested = [one.verdict for one in (self.text, self.code) if one is not None]
         told = {verdict for verdict in tested if verdict != "no data"}
         if not tested:
@@ -95,7 +97,7 @@ class Claim:
             return "no data"
         if len(told) == 1:
             return told.pop()
-        return "partly" if "reproduced" in told else "not resolved"
+        return "partly" if "reproduced" in told else "not"
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
@@ -147,11 +149,18 @@ class _Tables:
         study, finding = named
         self._open(study)
         try:
-            ours, verdict, criterion = self._found[study][finding]
+            ours, verdict, criterion, *needed = self._found[study][finding]
         except KeyError:
             msg = f"{self._results / study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
             raise InputError(msg) from None
-        return Tested(study=study, verdict=_FOUND[verdict], ours=ours, criterion=criterion, basis=self._bases[study])
+        return Tested(
+            study=study,
+            verdict=_FOUND[verdict],
+            ours=ours,
+            criterion=criterion,
+            basis=self._bases[study],
+            needed=needed[0] if needed else "",
+        )
 
     def on_yade(self, named: Sequence[str] | None) -> Tested | None:
         """What the same finding is in the results of the study on YADE, where there are such."""
@@ -171,12 +180,13 @@ class _Tables:
 
 def _read(folder: Path) -> dict[str, Sequence[str]]:
     """Numbers, verdict and criterion by finding; a study of questions has no criterion but the question."""
-    for name, order in (("findings.csv", (1, 2, 3)), ("verdicts.csv", (2, 1, 0))):
+    for name, order in (("findings.csv", (1, 2, 3, 4)), ("verdicts.csv", (2, 1, 0))):
         path = folder / name
         if path.is_file():
             with path.open(encoding="utf-8", newline="") as file:
                 rows = [row for row in csv.reader(file) if not row[0].startswith("# ")][1:]
-            return {row[0]: [row[column] for column in order] for row in rows}
+            # Results of before it was told lack what a verdict would need.
+            return {row[0]: [row[column] for column in order if column < len(row)] for row in rows}
     msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
     raise InputError(msg)
 

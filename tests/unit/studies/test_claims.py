@@ -65,7 +65,8 @@ HIGHEST = "⟨N⟩ is highest for shape change"
         ("not found", "found", "partly"),
         ("not resolved", "found", "partly"),
         ("not found", "not found", "not"),
-        ("not found", "not resolved", "not resolved"),
+        ("not found", "not resolved", "not"),
+        ("not resolved", "not resolved", "not resolved"),
         ("no data", "found", "reproduced"),
         ("no data", "no data", "no data"),
     ],
@@ -75,6 +76,18 @@ def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: s
     claim = one_of(claims(results), "shape change entangles most")
     assert claim.verdict == verdict
     assert f"**{verdict}**" in text((claim,))
+
+
+def test_what_a_verdict_would_take_is_told(tmp_path: Path) -> None:
+    results = written(tmp_path, {("procedures", HIGHEST): "not resolved"})
+    findings = results / "procedures" / "findings.csv"
+    lines = findings.read_text().splitlines()
+    told = [
+        f"{line},{'needed' if row == 0 else 'three runs' if HIGHEST in line else ''}" for row, line in enumerate(lines)
+    ]
+    findings.write_text("\n".join(told) + "\n")
+    claim = one_of(claims(results), "shape change entangles most")
+    assert "| not resolved: ours; three runs |" in text((claim,))
 
 
 def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
