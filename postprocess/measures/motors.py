@@ -3,7 +3,8 @@
 The paper integrates τ dα over every step. Its own code keeps torque and angle together every 0.1 s only
 (CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`), and a sum over samples so far apart is another quantity: of a
 barb that goes to and fro several times in between it is nearly nothing. Both stand beside each other in the tables:
-the integral is `motor_work_J` of the series.
+the integral is `motor_work_J` of the series. When the first sample is taken is nobody's choice: the least and the
+greatest sum over all beginnings that the frames allow stand there too.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
+from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import RunManifest
 from dem.record.series import Series
@@ -27,7 +29,9 @@ APART = 0.1
 ACTUATED = ("actuate", "internal-oscillation", "shape-change")
 """Types of phase in which motors move barbs."""
 
-_WORK = Quantity(f"motor work sampled every {APART:g} s", "J")
+_SAMPLED = f"motor work sampled every {APART:g} s"
+_WORK = Quantity(_SAMPLED, "J")
+_EXTREMES = Quantity(f"{_SAMPLED} least", "J"), Quantity(f"{_SAMPLED} greatest", "J")
 
 SAMPLED_WORK = _WORK.header
 """Its column in tables of phases."""
@@ -76,23 +80,37 @@ def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
     return [int(k) for k in chosen] if np.array_equal(np.round(multiples[chosen]), wanted) else []
 
 
-def _sampled_work_of(run: RunManifest, series: Series, phase: int) -> tuple[float]:
+def _sampled_work_of(run: RunManifest, series: Series, phase: int) -> tuple[float, ...]:
+    """From the first frame on, and the least and greatest of beginning at any frame of the first 0.1 s."""
     frames = read_frames(run.directory).in_phase(phase)
-    chosen = [frames[k] for k in sampled(frames)]
-    if not chosen or any("motor_torque_N_m" not in frame.cell_data for frame in chosen):
-        return (math.nan,)
+    begun = [sampled(frames[first:]) for first in range(int(np.searchsorted(frames.times, _first_end(frames))))]
+    found = [_work_of([frames[first + k] for k in chosen]) for first, chosen in enumerate(begun)]
+    known = [work for work in found if not math.isnan(work)]
+    if not known:
+        return (math.nan,) * 3
+    return found[0], min(known), max(known)
+
+
+def _first_end(frames: FrameSequence) -> float:
+    """When the samples that began with the first frame come to their second [s]; -inf without frames."""
+    return float(frames.times[0]) + APART * (1 - _NEAR) if len(frames) else -math.inf
+
+
+def _work_of(samples: list[Frame]) -> float:
+    if not samples or any("motor_torque_N_m" not in frame.cell_data for frame in samples):
+        return math.nan
     angles, torques = (
-        np.array([frame.cell_data[name][:, [0, 2]] for frame in chosen]) for name in ("angle_rad", "motor_torque_N_m")
+        np.array([frame.cell_data[name][:, [0, 2]] for frame in samples]) for name in ("angle_rad", "motor_torque_N_m")
     )
     known = ~np.isnan(torques).any(axis=(1, 2))  # the first frame may be of before motors were there
-    return (sampled_work(angles[known], torques[known]),)
+    return sampled_work(angles[known], torques[known])
 
 
 MEASURES = (
     PhaseMeasure(
         name="sampled motor work",
         phases=ACTUATED,
-        quantities=(_WORK,),
+        quantities=(_WORK, *_EXTREMES),
         take=_sampled_work_of,
         told_of=lambda series, _: "motor_work_J" in series.data,
     ),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dem.errors import InputError
 from dem.record.frames import FrameSequence
-from postprocess.measures.motors import sampled, sampled_work
+from postprocess.measures import motors
+from postprocess.measures.motors import MEASURES, sampled, sampled_work
 
 
 def frames(times: list[float]) -> FrameSequence:
@@ -52,3 +54,29 @@ def test_samples_are_the_frames_at_multiples_from_the_first() -> None:
 def test_frames_that_fall_elsewhere_are_no_samples() -> None:
     assert sampled(frames([0.0, 0.04, 0.08, 0.12, 0.16, 0.2])) == []
     assert sampled(frames([])) == []
+
+
+class Swinging(FrameSequence):
+    """Frames every 25 ms of one barb that turns by 2 rad/s against a torque that grows from 1 N m by 1 N m/s."""
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]
+        if isinstance(index, slice):
+            return Swinging(self.times[index], self.paths[index])
+        time = self.times[index]
+        angles, torques = np.zeros((1, 3)), np.zeros((1, 3))
+        angles[0, 0], torques[0, 0] = 2 * time, 1 + time
+        return SimpleNamespace(cell_data={"angle_rad": angles, "motor_torque_N_m": torques})
+
+    def in_phase(self, phase: int) -> FrameSequence:
+        return self
+
+
+def test_every_beginning_within_the_first_tenth_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = np.arange(13) * 0.025
+    swinging = Swinging(times, tuple(Path(f"{k}.vtu") for k in range(13)))
+    monkeypatch.setattr(motors, "read_frames", lambda _: swinging)
+    first, least, most = MEASURES[0].take(SimpleNamespace(directory=Path()), None, 2)  # type: ignore[arg-type]
+    # Samples at 0, 0.1, 0.2, 0.3: 0.2 rad each against 1.1, 1.2, 1.3 N m; from 0.025 on there are two ways only.
+    assert first == pytest.approx(0.2 * (1.1 + 1.2 + 1.3))
+    assert most == pytest.approx(first)
+    assert least == pytest.approx(0.2 * (1.125 + 1.225))
