@@ -371,6 +371,7 @@ class KindDouble:
     """See `dem.engine.kinds.EngineKind`; `built` are the engines that it has built."""
 
     name = "double"
+    workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
     threads_pay_from = 0
