@@ -91,6 +91,7 @@ class LammpsEngine:
 
     def _told(self, commands: Iterator[str]) -> None:
         """Tell LAMMPS something that the next run must be set up for; before there is a box it is told all at once."""
+        self._contacts = None
         if self._box:
             self.child.tell(*commands)
             self._fresh = True
