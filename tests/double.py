@@ -220,6 +220,7 @@ class EngineDouble:
     """Depth of the deepest contact of each smarticle that stands [m]."""
     time: float = 0.0
     steps: int = 0
+    cpu_elsewhere: float = 0.0
     told: Told = field(default_factory=list)
     account: AccountDouble = field(default_factory=AccountDouble)
 

@@ -38,13 +38,6 @@ QUICK: dict[str, Any] = {
 QUICK["phases"][0]["settle"]["unbalanced_force"] = 10
 
 
-def ranks_of(engine: LammpsEngine) -> list[int]:
-    """Process ids of LAMMPS, below mpirun."""
-    children = Path(f"/proc/{engine.child._process.pid}/task/{engine.child._process.pid}/children").read_text()
-    found = [int(pid) for pid in children.split()]
-    return [pid for pid in found if Path(f"/proc/{pid}/comm").read_text().strip() == "lmp"]
-
-
 def poured(engine: LammpsEngine, seed: int, bottom: float) -> None:
     rng = np.random.default_rng(seed)
     poses = place_layer(
@@ -108,7 +101,7 @@ def test_a_run_whose_rank_is_killed_says_so_loses_nothing_and_goes_on(
 
             def until(steps: int) -> None:
                 if engine.time > 0.05:
-                    os.kill(ranks_of(engine)[1], signal.SIGKILL)
+                    os.kill(engine.child.local_ranks()[1], signal.SIGKILL)
                 advance(steps)
 
             monkeypatch.setattr(engine, "advance", until)
@@ -148,6 +141,8 @@ def test_the_command_runs_on_two_ranks_and_what_it_leaves_is_measured(tmp_path: 
     manifest = json.loads((out / "run.json").read_text())
     assert (manifest["engine"], manifest["threads"]) == ("lammps", 2)
     assert set(manifest["versions"]) >= {"lammps"}
+    done = json.loads((out / "done.json").read_text())
+    assert done["cpu_s"] > 0.02 * 2  # the ranks' besides, which alone start in half of that
     measured = call("measure", out, "--json")
     assert measured.returncode == 0
     assert "shake" in measured.stdout

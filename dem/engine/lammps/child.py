@@ -106,6 +106,21 @@ class Child:
         self.close = weakref.finalize(self, _end, self._process, self._heard, self.scratch)
         """End it and remove its files; done at the end of the process at the latest."""
 
+    def cpu(self) -> float:
+        """Processor time [s] of its ranks on this machine; 0 once it has ended."""
+        ticks = 0
+        for rank in self.local_ranks():
+            # After the name, which may hold anything: utime and stime are the 14th and 15th word of all.
+            words = _text(Path(f"/proc/{rank}/stat")).rpartition(")")[2].split()
+            ticks += sum(map(int, words[11:13]))
+        return ticks / os.sysconf("SC_CLK_TCK")
+
+    def local_ranks(self) -> list[int]:
+        """Process ids of its ranks on this machine, the first one first."""
+        number = self._process.pid
+        children = map(int, _text(Path(f"/proc/{number}/task/{number}/children")).split())
+        return [child for child in children if _text(Path(f"/proc/{child}/comm")).strip() == LMP]
+
     def tell(self, *commands: str) -> None:
         """Let it obey some commands, and wait until it has.
 

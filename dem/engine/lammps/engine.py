@@ -73,6 +73,7 @@ class LammpsEngine:
         self._law = law
         self.child = Child(ranks)
         """LAMMPS."""
+        self._cpu_before = 0.0  # of LAMMPS before it was started anew [s]
         self._moving = Moving.none()
         # Body frame in LAMMPS's own principal frame of each smarticle, known from the first dump on.
         self._frames: Array | None = None
@@ -130,6 +131,11 @@ class LammpsEngine:
             yield "balance 1.02 shift xy 20 1.01"
 
     # -- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def cpu_elsewhere(self) -> float:
+        """See the interface: of all ranks on this machine."""
+        return self._cpu_before + self.child.cpu()
 
     def set_time_step(self, time_step: float) -> None:
         """See the interface."""
@@ -338,6 +344,7 @@ class LammpsEngine:
             )
 
     def _begin_anew(self, files: Mapping[str, bytes]) -> None:
+        self._cpu_before += self.child.cpu()
         self.child.close()
         self.child = Child(self.child.ranks)
         for name, data in files.items():
