@@ -1,6 +1,6 @@
 """LAMMPS beside the other engines, and its ranks beside each other: `python -m benchmarks.lammps agree | ranks`.
 
-`agree` pours piles on YADE, and has each engine take them over, rest and shake: φ at rest, φ and ⟨N⟩ while shaken.
+`agree` pours piles on links, and has each engine take them over, rest and shake: φ at rest, φ and ⟨N⟩ while shaken.
 `ranks` puts smarticles into a wide container, lets them come down, saves them, and times the same steps from there on
 one rank and on two, again and again: of every stretch of steps the least time counts, as near to an idle machine as a
 shared one allows. Two ranks need both cores to be free at once.
@@ -72,7 +72,7 @@ def agree(folder: Path, seeds: list[int], count: int, fidelity: str, shake: floa
         pour = f"pour-{seed}"
         if not (folder / pour).exists():
             poured = scene_data(
-                "yade", seed, count, fidelity, {"type": "deposit"}, {"type": "relax", "duration_s": 0.2}
+                "links", seed, count, fidelity, {"type": "deposit"}, {"type": "relax", "duration_s": 0.2}
             )
             run_child(folder, pour, poured)
         on = scene_data(

@@ -23,6 +23,8 @@ LOOK_S = 0.2  # between looks at whether a child that does not answer is alive
 
 # As root, as in containers, mpirun refuses without these; others do not notice them.
 _ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+# It ends when the run is killed, whatever it is at: it would wait for ever to be heard.
+_TIED = ("/usr/bin/setpriv", "--pdeathsig", "TERM")
 # Two words of one program: two runs at once would all be bound to the same first cores.
 _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mpi_yield_when_idle 1".split(),)
 
@@ -86,7 +88,8 @@ class Child:
         # Opened for writing too, so that there is never an end of it.
         self._heard = os.open(fifo, os.O_RDWR | os.O_NONBLOCK)
         self._answer = f'print "done" append {fifo} screen no\n'
-        command = [MPIRUN, *_OPTIONS, "-np", str(ranks), LMP, "-nocite", "-screen", "none", "-log", LOG]
+        tied = _TIED if Path(_TIED[0]).exists() else ()
+        command = [*tied, MPIRUN, *_OPTIONS, "-np", str(ranks), LMP, "-nocite", "-screen", "none", "-log", LOG]
         try:
             with (self.scratch / SAID).open("wb") as said:
                 # A session of its own: Ctrl-C is for the run, which then ends it.
