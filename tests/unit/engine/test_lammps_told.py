@@ -171,7 +171,8 @@ def test_the_floor_may_move_alone(fixtures: LammpsFixtures, told: list[str], clo
 
 
 def test_contacts_are_those_of_all_pairs_of_spheres(fixtures: LammpsFixtures) -> None:
-    scene, rng = small(), np.random.default_rng(3)
+    # Spheres of one smarticle overlap.
+    scene, rng = small({"fidelity": {"base": "draft", "pitch": 0.7}}), np.random.default_rng(3)
     count, radius = 12, scene.particle.radius
     places = np.column_stack([rng.uniform(-0.009, 0.009, (count, 2)), rng.uniform(0.005, 0.012, count)])
     turns, still = Rotation.random(count, random_state=rng).as_matrix(), np.zeros((count, 3))
