@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from lammps_builds import Build
 
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
@@ -15,8 +16,6 @@ from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-
-Build = Callable[..., LammpsEngine]
 
 
 @pytest.fixture(scope="session", autouse=True)

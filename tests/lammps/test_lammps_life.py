@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Build
+from lammps_builds import Build
 from scenes import small
 
 from dem.body.placement import place_layer

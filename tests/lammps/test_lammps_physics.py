@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import Build
+from lammps_builds import Build
 from scenes import small
 from scipy.spatial.transform import Rotation
 
