@@ -172,7 +172,7 @@ def main() -> None:
     parser.add_argument("--shake", type=float, default=1.0, help="length of the shaking [s] (agree)")
     parser.add_argument("--counts", type=int, nargs="+", default=[500, 1000, 5000], help="smarticles (ranks)")
     parser.add_argument("--repeats", type=int, default=5, help="times that the same steps are timed (ranks)")
-    parser.add_argument("--fall", type=float, default=0.1, help="time to come down [s] (ranks)")
+    parser.add_argument("--fall", type=float, default=0.25, help="time to come down [s] (ranks)")
     parser.add_argument("--fidelity", default="standard", help="draft, standard, reference")
     parser.add_argument("--out", type=Path, default=None, help="folder for runs and tables (default: a new one)")
     arguments = parser.parse_args()

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -111,10 +113,21 @@ def test_lammps_ends_with_a_run_that_is_killed_whatever_it_is_at(tmp_path: Path)
         assert run.stdout is not None
         started = [int(pid) for pid in run.stdout.readline().split()]
         assert len(started) == 3
+        (log,) = tmp_path.glob("smarticles-lammps-*/log.lammps")
+        _await(lambda: "run 10000000 pre" in log.read_text(), "LAMMPS was told to run")
         run.kill()
-    waited = time.monotonic()
-    while any(Path(f"/proc/{pid}/cmdline").exists() for pid in started):
-        assert time.monotonic() - waited < 30, "LAMMPS goes on without its run"
+    try:
+        _await(lambda: not any(Path(f"/proc/{pid}/cmdline").exists() for pid in started), "LAMMPS ended with its run")
+    finally:
+        for pid in started:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
+
+def _await(done: Callable[[], bool], what: str) -> None:
+    began = time.monotonic()
+    while not done():
+        assert time.monotonic() - began < 30, f"30 s, and not yet: {what}"
         time.sleep(0.1)
 
 
