@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validate paper claims verify bench stability test lint types unit engine docs format lock clean
+.PHONY: help setup setup-mpi demo validate paper claims verify bench stability test lint types unit engine docs format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -11,10 +11,13 @@ STAMP := $(shell date +%Y%m%d-%H%M%S)
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: ## install everything into the system and .venv (first time on a bare system: 5 min; then at once)
 	@setup/install.sh
+
+setup-mpi: setup ## install LAMMPS and Open MPI besides, for engine: lammps (a minute)
+	@setup/install.sh --mpi
 
 demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 min)
 	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Install everything the project needs: Debian's packages, then the environment .venv.
 #
-#     setup/install.sh [--no-dev]        --no-dev: without the tools for tests and checks
+#     setup/install.sh [--no-dev] [--mpi]        --no-dev: without the tools for tests and checks
+#                                                --mpi: with LAMMPS and Open MPI, for engine: lammps
 #
 # A second call finds everything in place and does nothing. Traps and reasons: environment.md.
 set -euo pipefail
@@ -16,7 +17,8 @@ fail() {
 install_debian_packages() {
     command -v dpkg-query >/dev/null || fail "this is not Debian; see environment.md, 'Other systems'"
     local package missing=() lists=(setup/debian-packages.txt)
-    [ "${1-}" = --no-dev ] || lists+=(setup/debian-packages-dev.txt)
+    [ -n "$no_dev" ] || lists+=(setup/debian-packages-dev.txt)
+    [ -z "$mpi" ] || lists+=(setup/debian-packages-mpi.txt)
     for package in $(sed 's/#.*//' "${lists[@]}"); do
         case $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) in
         installed*) ;;
@@ -49,7 +51,7 @@ install_debian_packages() {
 
 install_environment() {
     local requirements=(-r requirements.txt) key
-    [ "${1-}" = --no-dev ] || requirements+=(-r requirements-dev.txt)
+    [ -n "$no_dev" ] || requirements+=(-r requirements-dev.txt)
     key=$(pwd && /usr/bin/python3 --version && echo "${requirements[*]}" &&
         sha256sum setup/install.sh requirements*.txt requirements.in pyproject.toml)
     [ "$key" != "$(cat .venv/installed 2>/dev/null)" ] || return 0
@@ -70,5 +72,13 @@ install_environment() {
     echo "setup: done; '.venv/bin/smarticles doctor' tells what works"
 }
 
-install_debian_packages "$@"
-install_environment "$@"
+no_dev='' mpi=''
+for option in "$@"; do
+    case $option in
+    --no-dev) no_dev=yes ;;
+    --mpi) mpi=yes ;;
+    *) fail "unknown option $option; there are --no-dev and --mpi" ;;
+    esac
+done
+install_debian_packages
+install_environment

@@ -21,6 +21,7 @@ from typing import Any
 
 _TIMEOUT_S = 120
 _GIB = 2**30
+LAMMPS_TRIED = "29 Sep 2021 - Update 2"  # Debian 12's
 _LEAST_MEMORY_GIB = 1.0
 _LEAST_DISK_GIB = 1.0
 
@@ -69,6 +70,19 @@ import json
 import numba
 from dem.engine.links.compiler import folder
 answer = {"version": numba.__version__, "sum": numba.njit(lambda a, b: a + b)(1, 2), "folder": str(folder() or "")}
+print()
+print(json.dumps(answer))
+"""
+
+# LAMMPS under mpirun, on one rank: it starts, and obeys.
+_LAMMPS = """
+import json
+from dem.engine.lammps.child import Child, lammps_version
+answer = {"version": lammps_version()}
+child = Child(1)
+child.tell("print obeyed file obeyed")
+answer["obeyed"] = (child.scratch / "obeyed").exists()
+child.close()
 print()
 print(json.dumps(answer))
 """
@@ -161,6 +175,7 @@ def examine() -> Iterator[Probe]:
     # One engine is enough; only scenes that name the other one need that.
     yield check_yade(needed=not links.ok)
     yield links
+    yield check_lammps()
     for module, (distribution, needed) in _PACKAGES.items():
         yield check_package(module, distribution, needed=needed)
     yield check_pyvista()
@@ -201,6 +216,17 @@ def check_links() -> Probe:
         return Probe(name="links", ok=False, needed=False, found=found, way_out=way_out)
     kept = f"compiled code in {answer['folder']}" if answer["folder"] else "compiled code cannot be kept"
     return Probe(name="links", ok=True, needed=False, found=f"Numba {answer['version']}; {kept}")
+
+
+def check_lammps() -> Probe:
+    """Whether LAMMPS starts under mpirun, and does what it is told."""
+    answer = _ask(_LAMMPS)
+    if isinstance(answer, str) or not answer["obeyed"]:
+        found = answer if isinstance(answer, str) else f"{answer['version']} does not do what it is told"
+        way_out = "only scenes with `engine: lammps` need it; `make setup-mpi` installs it"
+        return Probe(name="lammps", ok=False, needed=False, found=found, way_out=way_out)
+    tried = "" if answer["version"] == LAMMPS_TRIED else f"; the engine was tried with {LAMMPS_TRIED}"
+    return Probe(name="lammps", ok=True, needed=False, found=f"{answer['version']}, under mpirun{tried}")
 
 
 def check_pyvista() -> Probe:

@@ -106,7 +106,11 @@ def add_scene(parser: Parser) -> None:
 
 def add_engine(parser: Parser, what: str) -> None:
     """Add --engine; `what` is what it sets, for the help."""
-    parser.add_argument("--engine", choices=ENGINES, help=f"{what}: yade, sphere chains on YADE, or links, swept links")
+    parser.add_argument(
+        "--engine",
+        choices=ENGINES,
+        help=f"{what}: yade, sphere chains on YADE, links, swept links, or lammps, sphere chains on several processes",
+    )
 
 
 def engine_settings(arguments: argparse.Namespace) -> list[str]:
@@ -124,6 +128,16 @@ def engine_settings(arguments: argparse.Namespace) -> list[str]:
             msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
             raise InputError(msg)
     return [*settings, f"engine={arguments.engine}"]
+
+
+def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
+    """Add --ranks; `default` for the help."""
+    parser.add_argument(
+        "--ranks",
+        type=positive_int,
+        metavar="N",
+        help=f"processes of engine: lammps, under mpirun, one core each; default: {default}",
+    )
 
 
 def add_slots(parser: Parser) -> None:

@@ -127,7 +127,9 @@ class SweepDirectory(Sequence[RunDirectory]):
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
 
-def run(scene: Scene | Path | str, out: Path | str, *, threads: int = 1, resume: bool = False) -> RunDirectory:
+def run(
+    scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
+) -> RunDirectory:
     """Run a scene into a run directory, as `smarticles run` does, in a process of its own.
 
     Of its own, because YADE and what draws never meet in one.
@@ -136,6 +138,7 @@ def run(scene: Scene | Path | str, out: Path | str, *, threads: int = 1, resume:
         scene: a scene, or the file of one.
         out: the run directory; must not exist or be empty, or with `resume` hold an unfinished run of this scene.
         threads: of the engine; only one gives the same bits again.
+        ranks: processes of the engine lammps; default: one.
         resume: go on from the last checkpoint.
 
     Raises:
@@ -147,6 +150,7 @@ def run(scene: Scene | Path | str, out: Path | str, *, threads: int = 1, resume:
         if isinstance(scene, Scene):
             file.write_text(dump_scene(scene), encoding="utf-8")
         words = [*smarticles_command(file, Path(out), resume), "--threads", str(threads)]
+        words += [] if ranks is None else ["--ranks", str(ranks)]
         done = subprocess.run(
             words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
         )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.parsing import Parser, positive_int
+from smarticles.parsing import Parser, add_ranks, positive_int
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -22,7 +22,7 @@ queues itself again. --submit none with --cluster writes the same scripts, for s
 cluster is known by name or described in a TOML file of yours; what it cannot give is refused before
 anything is written."""
 
-_OPTIONS = ("cluster", "partition", "account", "time", "runs_per_task", "memory")
+_OPTIONS = ("cluster", "partition", "account", "time", "runs_per_task", "memory", "ranks")
 
 
 def add_options(parser: Parser) -> None:
@@ -41,10 +41,15 @@ def add_options(parser: Parser) -> None:
         help="runs side by side in one task, one core each; default: a full node",
     )
     group.add_argument("--memory", type=positive_int, metavar="MIB", help="memory per run [MiB]; default: 1024")
+    add_ranks(group, "1, or what a run to be resumed began with")
 
 
-def wants_queue(arguments: argparse.Namespace) -> bool:
+def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool:
     """Whether the runs are for a cluster.
+
+    Args:
+        arguments: of the command.
+        one_run: whether they name one run, which may have ranks here too.
 
     Raises:
         InputError: an option for a cluster is given although they are not.
@@ -52,7 +57,7 @@ def wants_queue(arguments: argparse.Namespace) -> bool:
     if arguments.submit == "slurm" or (arguments.submit == "none" and arguments.cluster is not None):
         return True
     for name in _OPTIONS:
-        if getattr(arguments, name) is not None:
+        if getattr(arguments, name) is not None and not (one_run and name == "ranks"):
             option = f"--{name.replace('_', '-')}"
             msg = f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME"
             raise InputError(msg)
@@ -90,6 +95,7 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
         time=arguments.time,
         runs_per_task=arguments.runs_per_task,
         memory_mib=arguments.memory,
+        ranks=arguments.ranks,
     )
     request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
     return draft(

@@ -39,6 +39,7 @@ def run_here(
     settings: Sequence[str] = (),
     resume: bool,
     threads: int | None = None,
+    ranks: int | None = None,
 ) -> int:
     """Run a scene in this process.
 
@@ -49,6 +50,7 @@ def run_here(
         settings: keys that differ from the file, `KEY=VALUE`.
         resume: go on in a run directory that holds an unfinished run.
         threads: of the engine; by default one, or as many as the run that is resumed began with.
+        ranks: likewise, on the engine lammps.
 
     Returns:
         Exit status: 0, or 75 where SIGUSR1 stopped the run at a checkpoint.
@@ -58,17 +60,8 @@ def run_here(
         RunError: the run failed.
         KeyboardInterrupt: it was stopped; the message says how to go on.
     """
-    from dem.engine.cores import threads_warning  # noqa: PLC0415
-    from dem.record.manifest import read_run  # noqa: PLC0415
-    from dem.record.names import MANIFEST  # noqa: PLC0415
-
     scene = read_scene(scene_file, settings)
-    if threads is None:
-        threads = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
-    if (warning := threads_warning(threads)) is not None:
-        print(f"smarticles: warning: {warning}", file=sys.stderr)
-    # Engines read it when they are loaded, and a batch system may have set it to all cores of the node.
-    os.environ["OMP_NUM_THREADS"] = str(threads)
+    _set_workers(scene, out, resume=resume, threads=threads, ranks=ranks)
     # These lead to YADE: not before the scene is known to be good.
     from dem.run import run  # noqa: PLC0415
     from dem.run.simulation import StopRequestedError  # noqa: PLC0415
@@ -88,3 +81,33 @@ def run_here(
         print(f"{out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s")
     print(f"next: smarticles measure {place}, smarticles render {place}")
     return 0
+
+
+def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, ranks: int | None) -> None:
+    """Tell the engine on how many threads, or ranks, it is to run: by variables that it reads when it is loaded.
+
+    Raises:
+        InputError: the engine has none of them, or there are not so many cores.
+    """
+    from dem.engine.cores import threads_warning  # noqa: PLC0415
+    from dem.engine.lammps.ranks import RANKS, check_ranks  # noqa: PLC0415
+    from dem.record.manifest import read_run  # noqa: PLC0415
+    from dem.record.names import MANIFEST  # noqa: PLC0415
+
+    many = scene.engine == "lammps"
+    if many and threads is not None and threads > 1:
+        msg = f"--threads {threads}: engine: lammps has processes of one thread; use --ranks {threads}"
+        raise InputError(msg)
+    if not many and ranks is not None:
+        msg = f"--ranks {ranks}: engine: {scene.engine} is one process; use --threads, or engine: lammps"
+        raise InputError(msg)
+    wanted = ranks if many else threads
+    if wanted is None:
+        wanted = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
+    if many:
+        check_ranks(wanted)
+        os.environ[RANKS], wanted = str(wanted), 1
+    elif (warning := threads_warning(wanted)) is not None:
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
+    # A batch system may have set it to all cores of the node.
+    os.environ["OMP_NUM_THREADS"] = str(wanted)

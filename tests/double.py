@@ -220,6 +220,7 @@ class EngineDouble:
     """Depth of the deepest contact of each smarticle that stands [m]."""
     time: float = 0.0
     steps: int = 0
+    cpu_elsewhere: float = 0.0
     told: Told = field(default_factory=list)
     account: AccountDouble = field(default_factory=AccountDouble)
 
@@ -371,6 +372,7 @@ class KindDouble:
     """See `dem.engine.kinds.EngineKind`; `built` are the engines that it has built."""
 
     name = "double"
+    workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
     threads_pay_from = 0

@@ -10,7 +10,11 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from dem.deck.passive import PassivePhase, PassiveScene, passive
+from dem.engine.lammps import text
+from dem.engine.lammps.text import Moving
 from dem.errors import InputError
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
@@ -20,7 +24,6 @@ from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
 DECK, DATA, BODIES, DUMP = "in.lammps", "spheres.data", "bodies.txt", "bodies.dump"
-SKIN = 0.2  # sphere diameters that neighbours are looked for beyond contact
 
 
 def write_deck(scene: Scene, folder: Path) -> None:
@@ -44,49 +47,26 @@ def write_deck(scene: Scene, folder: Path) -> None:
 
 
 def _data(told: PassiveScene) -> Iterator[str]:
-    """All spheres: number, type, place, diameter, density, smarticle."""
+    """All spheres."""
     scene, spheres = told.scene, told.spheres
-    count, each = spheres.shape[:2]
-    d, cylinder = scene.sphere_diameter, scene.cylinder
-    yield f"Spheres of {count} smarticles, {each} each: {_one_line(scene.name)}"
-    yield f"\n{count * each} atoms\n1 atom types\n"
-    side, top = cylinder.corner_radius + d, cylinder.height + d
-    for low, high, axis in ((-side, side, "x"), (-side, side, "y"), (cylinder.bottom - d, top, "z")):
-        yield f"{low:.9g} {high:.9g} {axis}lo {axis}hi"
-    yield "\nAtoms # hybrid sphere bond\n"
-    densities = told.sphere_masses / (math.pi / 6 * d**3)
-    for k in range(count):
-        for s, (x, y, z) in enumerate(spheres[k]):
-            yield f"{k * each + s + 1} 1 {x:.17g} {y:.17g} {z:.17g} {d:.17g} {densities[s]:.17g} {k + 1}"
+    title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
+    return text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title)
 
 
 def _bodies(told: PassiveScene) -> Iterator[str]:
-    """All smarticles: number, mass, centre, inertia (xx yy zz xy xz yz), velocity, angular momentum, image."""
-    mass, tensors = told.scene.particle.boxes.mass, told.inertias
-    yield str(told.state.count)
-    for k, ((x, y, z), i) in enumerate(zip(told.state.positions, tensors, strict=True)):
-        moments = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
-        inertia = " ".join(f"{value:.17g}" for value in moments)
-        yield f"{k + 1} {mass:.17g} {x:.17g} {y:.17g} {z:.17g} {inertia} 0 0 0 0 0 0 0 0 0"
+    """All smarticles, at rest."""
+    still = np.zeros((told.state.count, 3))
+    return text.body_lines(told.scene.particle, Moving(told.state.positions, told.turns, still, still, still, still))
 
 
 def _deck(told: PassiveScene) -> Iterator[str]:
     scene, law, boxes = told.scene, told.law, told.scene.particle.boxes
     d, dt, cylinder = scene.sphere_diameter, told.time_step, scene.cylinder
-    each, reach = len(scene.particle.centres), scene.particle.reach
+    each = len(scene.particle.centres)
+    before_box, neighbours = "\n".join(text.before_box(scene.particle)), "\n".join(text.neighbours(scene.particle))
+    between, at_wall = text.contact_terms(law, boxes.mass)
+    container = "\n".join(text.container(cylinder, at_wall))
     frame = _steps(scene.recording.frame_interval_s, dt)
-    # LAMMPS multiplies a damping with the effective mass of the two bodies that touch, M/2, or M at a wall.
-    between, wall = law.normal_damping / (boxes.mass / 2), law.wall_damping / boxes.mass
-    tangential = law.tangential_damping
-    contact = (
-        f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g} {between:.9g} {between * tangential:.9g} "
-        f"{law.friction:.9g} 1"
-    )
-    at_wall = (
-        f"hooke/history {law.normal_stiffness:.9g} {law.tangential_stiffness:.9g} {wall:.9g} {wall * tangential:.9g} "
-        f"{law.wall_friction:.9g} 1"
-    )
-    extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
     columns = " ".join(f"c_where[{k}]" for k in range(1, 12))
     first = told.phases[0]
     assert isinstance(first, TakeOver)
@@ -99,25 +79,15 @@ def _deck(told: PassiveScene) -> Iterator[str]:
 #        (w, x, y, z) of each smarticle.
 # Not as in a run of the scene: the wall is round ({cylinder.facets} flats there), phases end by time, nothing watches.
 
-units            si
-# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders.
-newton           off
-boundary         m m m
-# Style bond brings the number of the smarticle that a sphere belongs to; rigid/small looks spheres up by number.
-atom_style       hybrid sphere bond
-atom_modify      map array
-# A body is moved by the processor of one of its spheres, which must see all others: as far as it is long.
-comm_modify      vel yes cutoff {2 * reach + d:.9g}
+{before_box}
 read_data        {DATA}
 
-# Spheres of one smarticle do not touch each other.
-neighbor         {SKIN * d:.9g} bin
-neigh_modify     delay 0 every 1 check yes exclude molecule/intra all
+{neighbours}
 
 # Contact: kn and ks [N/m]; damping across and along the surface, to be multiplied with the effective mass of the two
 # bodies, M/2 [1/s]; friction; 1: damping along the surface is on.
 # cn = {law.normal_damping:.6g} N s/m: restitution {scene.contact.restitution:g} at a typical lever.
-pair_style       gran/hooke/history {contact}
+pair_style       gran/hooke/history {between}
 pair_coeff       * *
 
 # Mass, {boxes.mass:.6g} kg, and inertia are those of the boxes, read from {BODIES}; "reinit no": once, not at each run.
@@ -133,14 +103,8 @@ variable         floor_base equal 0
 variable         floor_amplitude equal 0
 variable         wall_base equal 0
 variable         wall_amplitude equal 0
-variable         wave equal sin(v_omega*(step-v_begun)*dt)
-variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave
-variable         wall_z equal v_wall_base+v_wall_amplitude*v_wave
-region           floor plane 0 0 0 0 0 1 side in move NULL NULL v_floor_z
-region           wall cylinder z 0 0 {extent} side in open 1 open 2 move NULL NULL v_wall_z
 # The same springs; damping times the mass of one body, M.
-fix              floor all wall/gran/region {at_wall} region floor
-fix              wall all wall/gran/region {at_wall} region wall
+{container}
 
 timestep         {dt:.17g}
 thermo           {frame}

@@ -17,6 +17,7 @@ from dem.phases.shake import Shake
 from dem.phases.take_over import TakeOver, poses_of
 from dem.physics.contact import ContactLaw, contact_law
 from dem.plan.steps import time_steps
+from dem.scene.carried import foreign
 from dem.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -53,31 +54,9 @@ class PassiveScene:
         return turns
 
     @property
-    def inertias(self) -> Array:
-        """(N, 3, 3) about the centres of mass, laboratory axes [kg m²]."""
-        turns = self.turns
-        tensors: Array = turns @ np.diag(self.scene.particle.boxes.inertia) @ np.swapaxes(turns, 1, 2)
-        return tensors
-
-    @property
     def spheres(self) -> Array:
         """(N, S, 3) centres of the spheres [m]."""
         return self.state.spheres(self.scene.particle)
-
-    @property
-    def sphere_masses(self) -> Array:
-        """(S,) [kg] that add up to a smarticle's mass, balanced about its centre, so that weight does not turn it.
-
-        As near to equal as that goes: those of least squares.
-        """
-        particle = self.scene.particle
-        count = len(particle.centres)
-        # Of each sphere: its share of the mass, and of the first moments, which are to vanish.
-        rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
-        wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
-        equal = np.full(count, particle.boxes.mass / count)
-        masses: Array = equal + np.linalg.pinv(rows) @ (wanted - rows @ equal)
-        return masses
 
 
 def passive(scene: Scene, target: str) -> PassiveScene:
@@ -113,20 +92,11 @@ def _foreign(scene: Scene) -> Iterator[str]:
     """What other simulators cannot be told, by key and name."""
     if scene.smooth:
         yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
-    if scene.plane is not None:
-        yield "plane: motion in a plane"
-    if scene.hooks is not None:
-        yield "hooks"
-    if scene.cylinder.upper:
-        yield "container.tiers"
+    yield from foreign(scene)
     for index, phase in enumerate(scene.phases):
-        if isinstance(phase, RemoveContainer) and phase.speed_m_per_s is not None:
-            yield f"phases.{index}.speed_m_per_s: a wall that is lifted (use null, gone at once)"
-        elif phase.actuates:
-            yield f"phases.{index} ({phase.kind}): motors"
-        elif phase.pours:
+        if phase.pours:
             yield f"phases.{index} ({phase.kind}): a pour (run it here, and begin with take-over of that run)"
-        elif not isinstance(phase, PassivePhase):
+        elif not phase.actuates and not isinstance(phase, PassivePhase):
             yield f"phases.{index} ({phase.kind})"
 
 

@@ -1,4 +1,4 @@
 """The running simulation behind one interface."""
 
-ENGINES = ("yade", "links")
+ENGINES = ("yade", "links", "lammps")
 """Names of the engines, the default first; `dem.engine.kinds` makes them."""

@@ -270,6 +270,10 @@ class Engine(Protocol):
     # -- time --------------------------------------------------------------------------------------------------
 
     @property
+    def cpu_elsewhere(self) -> float:
+        """Processor time [s] that other processes of this machine have spent for it since it was built."""
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
 

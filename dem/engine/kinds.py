@@ -29,7 +29,7 @@ class EngineKind(Protocol):
 
     @property
     def threads_pay_from(self) -> int:
-        """Smarticles from which on a second thread makes a run clearly faster, about."""
+        """Smarticles from which on a second thread, or rank, makes a run clearly faster, about."""
 
     def version(self) -> str:
         """Version of what results depend on.
@@ -38,8 +38,12 @@ class EngineKind(Protocol):
             RunError: it is not installed.
         """
 
+    @property
+    def workers(self) -> str:
+        """What a run on several cores has several of: threads, or ranks, which are processes."""
+
     def threads(self) -> int:
-        """Threads that it runs with here."""
+        """Threads, or ranks, that it runs with here."""
 
     def adds(self, effect: EffectName) -> Adds:
         """What an effect adds to what it does."""
@@ -83,5 +87,9 @@ def engine_kind(name: str) -> EngineKind:
         from dem.engine.links.kind import LinksKind  # noqa: PLC0415
 
         return LinksKind()
-    msg = f"engine: {name!r} is not built into this version; use yade or links"
+    if name == "lammps":
+        from dem.engine.lammps.kind import LammpsKind  # noqa: PLC0415
+
+        return LammpsKind()
+    msg = f"engine: {name!r} is not built into this version; use yade, links or lammps"
     raise InputError(msg)

@@ -21,13 +21,14 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def thread_warnings(scene: Scene, threads: int) -> tuple[str, ...]:
-    """Threads that a scene has no use for, in one line."""
-    pays = engine_kind(scene.engine).threads_pay_from
+    """Threads, or ranks, that a scene has no use for, in one line."""
+    kind = engine_kind(scene.engine)
+    pays, worker = kind.threads_pay_from, kind.workers.removesuffix("s")
     if threads == 1 or scene.count >= pays:
         return ()
     return (
-        f"--threads {threads}: {scene.count} smarticles gain little by more than one thread, from about {pays} on "
-        "they do; for many small runs use a sweep with one thread each",
+        f"--{kind.workers} {threads}: {scene.count} smarticles gain little by more than one {worker}, from about "
+        f"{pays} on they do; for many small runs use a sweep with one {worker} each",
     )
 
 

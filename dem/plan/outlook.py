@@ -106,7 +106,8 @@ class Plan:
         """What is different on an engine that is not the usual one."""
         idle = engine_kind(self.engine).idle_knobs
         if not self.strands:
-            return []
+            told = f"engine {self.engine}: {', '.join(idle)} have no meaning here"
+            return [told] if idle else []
         return [
             f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here",
             f"fidelity {self._fidelity_to_text()}",

@@ -52,7 +52,7 @@ class RunManifest:
         command: Command line of the run.
         started: Wall-clock start, ISO 8601.
         versions: Version of each program that took part.
-        threads: Threads the engine ran with.
+        threads: Threads the engine ran with; ranks on lammps.
         fidelity: Name of the fidelity setting.
         count: Number of smarticles of the scene.
         aspect_ratio: Barb length over middle length, l/w [-].
@@ -72,7 +72,7 @@ class RunManifest:
         time_step: The shortest of its phases [s].
         phases: The phases in order.
         status: "done", "failed", "interrupted" or "unfinished".
-        engine: What computed it: "yade" or "links".
+        engine: What computed it: "yade", "links" or "lammps".
         cause: Why the run failed or was interrupted; None otherwise.
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.

@@ -209,8 +209,9 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
     simulation.restore(checkpoint)
     begun = read_run(out).threads
     if begun != threads:
+        workers = engine_kind(scene.engine).workers
         simulation.warn(
-            f"--threads {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
+            f"--{workers} {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
             "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)

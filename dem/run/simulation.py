@@ -215,8 +215,8 @@ class Simulation:
 
     @property
     def cpu(self) -> float:
-        """Processor time spent [s], in the processes before this one too."""
-        return self._cpu_spent + time.process_time() - self._cpu_began
+        """Processor time spent [s], in the processes before this one too, and by those that the engine has here."""
+        return self._cpu_spent + time.process_time() - self._cpu_began + self.engine.cpu_elsewhere
 
     def _request_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True

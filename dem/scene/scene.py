@@ -22,6 +22,7 @@ from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
+from dem.scene.carried import check_carried
 from dem.scene.rules import check
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
@@ -44,8 +45,10 @@ class Scene(Part):
     """One run: everything that decides its result."""
 
     schema_version: Literal[1] = Field(1, description="version of this format [1]")
-    engine: Literal["yade", "links"] = Field(
-        "yade", description="what computes it: yade, chains of spheres on YADE, or links, swept segments"
+    engine: Literal["yade", "links", "lammps"] = Field(
+        "yade",
+        description="what computes it: yade, chains of spheres on YADE; links, swept segments; or lammps, those chains "
+        "on LAMMPS, on several processes and nodes, for passive scenes",
     )
     protocol: Protocol | None = Field(
         None,
@@ -112,6 +115,8 @@ class Scene(Part):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         check(self)
+        if self.engine == "lammps":
+            check_carried(self)
         return self
 
     @cached_property

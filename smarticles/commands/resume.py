@@ -53,12 +53,20 @@ def resume_sweep(arguments: argparse.Namespace) -> int:
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     directory: Path = arguments.directory
-    queue = queueing.wants_queue(arguments)
-    if (directory / "run.json").is_file():
+    one_run = (directory / "run.json").is_file()
+    queue = queueing.wants_queue(arguments, one_run=one_run)
+    if one_run:
         if queue:
             msg = f"{directory}: is one run; give the directory of its sweep to submit it, or leave --submit out"
             raise InputError(msg)
-        return run_here(directory / "scene.yaml", directory, arguments, resume=True, threads=arguments.threads)
+        return run_here(
+            directory / "scene.yaml",
+            directory,
+            arguments,
+            resume=True,
+            threads=arguments.threads,
+            ranks=arguments.ranks,
+        )
     folder = open_folder(directory)
     if arguments.threads is not None:
         given = f"--threads {arguments.threads}"

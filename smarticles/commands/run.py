@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from smarticles.parsing import Commands, add_engine, add_scene, engine_settings, positive_int
+from smarticles.parsing import Commands, add_engine, add_ranks, add_scene, engine_settings, positive_int
 from smarticles.scenes import run_here
 
 
@@ -26,6 +26,7 @@ directory that holds something else is never touched.""",
   smarticles run scene.yaml --out runs/b --set seed=2 --set phases.2.duration_s=5
   smarticles run scene.yaml --out runs/c --set fidelity=draft
   smarticles run scene.yaml --out runs/d --engine links
+  smarticles run scene.yaml --out runs/e --engine lammps --ranks 2
   smarticles run scene.yaml --out runs/a --resume
 """,
     )
@@ -45,6 +46,7 @@ directory that holds something else is never touched.""",
         "with. Results depend on their number in the last bits: the same number gives the same bits on links, not on "
         "YADE. They pay from about 1000 smarticles on; threads that find no free core make a run slower",
     )
+    add_ranks(run, "1, or what the run to be resumed began with")
 
 
 def run_scene(arguments: argparse.Namespace) -> int:
@@ -56,4 +58,5 @@ def run_scene(arguments: argparse.Namespace) -> int:
         settings=engine_settings(arguments),
         resume=arguments.resume,
         threads=arguments.threads,
+        ranks=arguments.ranks,
     )

@@ -117,6 +117,12 @@ def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) ->
     from templates.sweep.folder import MANIFEST, Entry, open_folder  # noqa: PLC0415
 
     out = _place(arguments)
+    if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
+        msg = (
+            f"--ranks {arguments.ranks}: engine: {', '.join(sorted(others))} is one process; leave it out, or give "
+            "--engine lammps"
+        )
+        raise InputError(msg)
     entries = [
         Entry(
             name=point.name,

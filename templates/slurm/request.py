@@ -29,6 +29,7 @@ class Wishes:
         time: wall time, as Slurm writes it.
         runs_per_task: runs side by side in one task of the array.
         memory_mib: memory per run [MiB].
+        ranks: processes of a run, one core each.
     """
 
     partition: str | None = None
@@ -36,22 +37,25 @@ class Wishes:
     time: str | None = None
     runs_per_task: int | None = None
     memory_mib: int | None = None
+    ranks: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """An array of tasks, each of which computes several runs at once, one core each.
+    """An array of tasks, each of which computes several runs at once, one core each; or one run on several ranks.
 
     Args:
         partition: the partition; None is Slurm's default.
         account: the account, or None.
         tasks: tasks of the array.
-        runs_per_task: runs, and cores, of a task.
+        runs_per_task: runs, and cores, of a task; one where it has several ranks.
         time_s: wall time of a task [s], whole minutes.
-        memory_mib: memory of a task [MiB].
+        memory_mib: memory of a task on each node [MiB].
         lead_s: between the signal and the time limit [s].
         grace_s: between the signal and the end of runs that have not reached a checkpoint [s].
         requeues: how often a task may be put back into the queue.
+        ranks: processes of a run, one core each.
+        nodes: that these are on.
     """
 
     partition: str | None
@@ -63,10 +67,18 @@ class Request:
     lead_s: int
     grace_s: int
     requeues: int
+    ranks: int = 1
+    nodes: int = 1
 
     def to_text(self) -> str:
         """One line for the terminal."""
         each = f"{self.runs_per_task} runs" if self.runs_per_task > 1 else "1 run"
+        if self.ranks > 1:
+            where = f"{self.nodes} nodes" if self.nodes > 1 else "1 node"
+            return (
+                f"{self.tasks} tasks of {each} on {self.ranks} ranks: {where}, {self.memory_mib} MiB on each, "
+                f"{format_time(self.time_s)} each"
+            )
         return (
             f"{self.tasks} tasks of {each}: {self.runs_per_task} cores, {self.memory_mib} MiB, "
             f"{format_time(self.time_s)} each"
@@ -86,8 +98,19 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
     """
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
-    memory = wishes.memory_mib or MEMORY_PER_RUN_MIB
-    runs = _runs_per_task(len(expected_s), cluster, partition, wishes.runs_per_task, memory)
+    memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
+    if ranks > 1 and wishes.runs_per_task not in (None, 1):
+        msg = f"--runs-per-task {wishes.runs_per_task}: a run on {ranks} ranks is alone in its task; leave it out"
+        raise InputError(msg)
+    nodes = math.ceil(ranks / partition.cores)
+    if nodes > 1 and cluster.container is not None:
+        msg = (
+            f"--ranks {ranks}: {where} has {partition.cores} cores per node, and from an image mpirun reaches no other "
+            f"node; give at most {partition.cores}, or a cluster without a container"
+        )
+        raise InputError(msg)
+    wanted = 1 if ranks > 1 else wishes.runs_per_task
+    runs = _runs_per_task(len(expected_s), cluster, partition, wanted, memory)
     if runs > partition.cores:
         msg = f"--runs-per-task {runs}: {where} has {partition.cores} cores per node; give at most that many"
         raise InputError(msg)
@@ -104,6 +127,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
             f"{cluster.max_array_size}: give a larger --runs-per-task (up to {partition.cores}), or a smaller sweep"
         )
         raise InputError(msg)
+    # Expected are the costs of one core; ranks make it shorter by a share that nobody knows, and are not counted on.
     longest = TIME_MARGIN * max(expected_s)
     time_s = _time(longest, cluster, partition, wishes.time, where)
     return Request(
@@ -116,6 +140,8 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
         lead_s=cluster.signal_lead_s,
         grace_s=max(cluster.signal_lead_s - CLOSING_S, cluster.signal_lead_s // 2),
         requeues=max(LEAST_REQUEUES, 2 * math.ceil(longest / (time_s - cluster.signal_lead_s))),
+        ranks=ranks,
+        nodes=nodes,
     )
 
 

@@ -78,6 +78,8 @@ class LinksEngine:
         """See the interface."""
         self.gravity = gravity
         """See the interface."""
+        self.cpu_elsewhere = 0.0
+        """See the interface."""
         self._world = World(
             particle=particle,
             contact=law,

@@ -23,6 +23,7 @@ class LinksKind:
     """See `dem.engine.kinds.EngineKind`."""
 
     name = "links"
+    workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
     # Two threads against one, piles at equal height, least of eight, 2026-11-22: 1.06 times as fast at 270, 1.56 at

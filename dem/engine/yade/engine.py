@@ -81,6 +81,7 @@ class YadeEngine:
         self._law = law
         self.particle = particle
         self.cylinder = cylinder
+        self.cpu_elsewhere = 0.0
         self.gravity = gravity
         hinge_law, motor_law = hinges or (None, None)
         self._assembly = Assembly(self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths)

@@ -28,6 +28,7 @@ class YadeKind:
     """See `dem.engine.kinds.EngineKind`."""
 
     name = "yade"
+    workers = "threads"
     damps_once_per_look = True
     idle_knobs: tuple[str, ...] = ()
     threads_pay_from = 0  # not measured

@@ -235,6 +235,17 @@ def test_a_defect_of_ours_is_told_in_the_run_directory(
     assert "unexpected ZeroDivisionError" in json.loads((tmp_path / "failed.json").read_text())["cause"]
 
 
+def test_what_other_processes_spend_for_the_engine_is_spent_by_the_run(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(EngineDouble, "cpu_elsewhere", property(lambda self: 50 * self.time, lambda *_: None))
+    run(scene_of("rested"), tmp_path / "run")
+    done = json.loads((tmp_path / "run" / "done.json").read_text())
+    assert done["cpu_s"] == pytest.approx(50 * done["time_s"], abs=40 * done["time_s"])
+    relax = done["phases"][1]
+    assert relax["cpu_s"] == pytest.approx(50 * 0.1, abs=4)
+
+
 def test_the_same_scene_is_the_same_run(kind: KindDouble, tmp_path: Path) -> None:
     for out in ("one", "other"):
         run(scene_of("actuated"), tmp_path / out)

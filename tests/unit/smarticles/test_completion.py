@@ -23,7 +23,7 @@ echo "${{COMPREPLY[*]}}"
         ("smarticles compa", "compare"),
         ("smarticles study colla", "collapse"),
         ("smarticles run scene.yaml --eng", "--engine"),
-        ("smarticles run scene.yaml --engine l", "links"),
+        ("smarticles run scene.yaml --engine la", "lammps"),
         ("smarticles init cas", "casting"),
         ("smarticles run sce", "scene.yaml"),
     ],

@@ -11,13 +11,19 @@ from smarticles import installation
 
 YADE = {"version": "2023.02a", "path": "/somewhere/yade", "speed": 0.0981}
 LINKS = {"version": "0.68.1", "sum": 3, "folder": "/somewhere/links"}
+LAMMPS = {"version": installation.LAMMPS_TRIED, "obeyed": True}
 PYVISTA = {"version": "0.49", "vtk": "9.7.2", "window": "vtkEGLRenderWindow", "contrast": 50.0}
 
 
 @pytest.fixture
 def answers(monkeypatch):
     """What child processes answer; without an entry: a version. To be changed by a test."""
-    answers = {installation._YADE: YADE, installation._LINKS: LINKS, installation._PYVISTA: PYVISTA}
+    answers = {
+        installation._YADE: YADE,
+        installation._LAMMPS: LAMMPS,
+        installation._LINKS: LINKS,
+        installation._PYVISTA: PYVISTA,
+    }
     monkeypatch.setattr(installation, "_ask", lambda script: answers.get(script, {"version": "1.2"}))
     monkeypatch.setattr(shutil, "which", lambda command: None)
     return answers
@@ -142,3 +148,22 @@ def test_version_of_an_installed_package():
     check = installation.check_package("packaging", "packaging", needed=True)
     assert check.ok
     assert check.found[0].isdigit()
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        (LAMMPS, "lammps          ok    29 Sep 2021 - Update 2, under mpirun\n"),
+        ({**LAMMPS, "version": "2 Aug 2023"}, "ok    2 Aug 2023, under mpirun; the engine was tried with 29 Sep 2021"),
+        ({**LAMMPS, "obeyed": False}, "no    29 Sep 2021 - Update 2 does not do what it is told\n"),
+        ("RunError: engine: lammps needs the program lmp", "no    RunError: engine: lammps needs the program lmp\n"),
+    ],
+)
+def test_lammps_is_told_of_and_not_needed(answers, capsys, answer, told):
+    answers[installation._LAMMPS] = answer
+    assert installation.doctor(json_output=False) == 0
+    output = capsys.readouterr().out
+    assert told in output
+    assert ("way out: only scenes with `engine: lammps` need it; `make setup-mpi` installs it" in output) == (
+        "lammps          no" in output
+    )

@@ -136,12 +136,26 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
         ({"runs_per_task": 17}, "--runs-per-task 17: partition long of mine has 16 cores"),
         ({"runs_per_task": 16, "memory_mib": 2001}, "16 × 2001 MiB are more than the 32000 MiB"),
         ({"memory_mib": 40000}, "--runs-per-task 1: 1 × 40000 MiB are more than"),
+        ({"ranks": 4, "runs_per_task": 2}, "--runs-per-task 2: a run on 4 ranks is alone in its task"),
         ({"partition": "lng"}, "--partition lng: cluster mine has no such partition; did you mean 'long'?"),
     ],
 )
 def test_requests_beyond_the_limits_are_refused(cluster: Cluster, wishes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         planned(cluster, **wishes)  # type: ignore[arg-type]
+
+
+def test_a_run_on_many_ranks_has_as_many_nodes_as_that_takes(cluster: Cluster) -> None:
+    assert (planned(cluster, ranks=1).tasks, planned(cluster, ranks=1).nodes) == (3, 1)
+    full, more = planned(cluster, 3, ranks=16), planned(cluster, 3, ranks=17)
+    assert (full.tasks, full.runs_per_task, full.ranks, full.nodes) == (3, 1, 16, 1)
+    assert (more.tasks, more.runs_per_task, more.ranks, more.nodes) == (3, 1, 17, 2)
+    assert "3 tasks of 1 run on 17 ranks: 2 nodes, 1024 MiB on each" in more.to_text()
+    image = load_cluster("example-apptainer")
+    cores = image.partition(None)[1].cores
+    assert planned(image, 1, ranks=cores).nodes == 1
+    with pytest.raises(InputError, match=rf"^--ranks {cores + 1}: .* from an image mpirun reaches no other node"):
+        planned(image, 1, ranks=cores + 1)
 
 
 def test_an_array_of_exactly_the_limit_is_given_and_one_more_is_not(cluster: Cluster) -> None:

@@ -34,6 +34,7 @@ CASES = {
         Wishes(partition="debug", account="abc123", time="00:20:00", runs_per_task=2, memory_mib=2000),
     ),
     ("example-large", "hostile_path"): (HOSTILE, [HOUR] * 2, Wishes()),
+    ("example-large", "ranks"): (PLAIN, [10 * HOUR] * 3, Wishes(ranks=96, memory_mib=20_000)),
     ("example-apptainer", "packed"): (PLAIN, [HOUR] * 72, Wishes()),
     ("example-apptainer", "hostile_path"): (HOSTILE.replace(":", "").replace(",", ""), [HOUR], Wishes()),
 }

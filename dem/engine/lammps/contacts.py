@@ -1,0 +1,82 @@
+"""Who touches whom, and how deep, from the places of the spheres: LAMMPS is not asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from dem.engine.lammps.fixtures import LammpsFixtures
+from dem.physics.contact import ContactLaw
+from dem.physics.overlaps import Overlaps
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """All contacts at one instant.
+
+    Args:
+        count: N.
+        pairs: (C, 2) smarticles that touch by two spheres, as often as they do.
+        depths: (C,) overlap of each [m].
+        fixed: (F,) smarticles that touch floor or wall by a sphere, as often as they do.
+        fixed_depths: (F,) overlap of each [m].
+    """
+
+    count: int
+    pairs: NDArray[np.int64]
+    depths: Array
+    fixed: NDArray[np.int64]
+    fixed_depths: Array
+
+    @classmethod
+    def of(cls, spheres: Array, radius: float, fixtures: LammpsFixtures) -> Contacts:
+        """Contacts of spheres (N, S, 3) [m] of a radius [m] with each other and with floor and wall."""
+        count, each = spheres.shape[:2]
+        centres = spheres.reshape(-1, 3)
+        owners = np.repeat(np.arange(count), each)
+        none = np.zeros((0, 2), dtype=np.int64)
+        found = cKDTree(centres).query_pairs(2 * radius, output_type="ndarray") if len(centres) else none
+        found = found[owners[found[:, 0]] != owners[found[:, 1]]]
+        apart = np.linalg.norm(centres[found[:, 0]] - centres[found[:, 1]], axis=1)
+        beside = [radius - (centres[:, 2] - fixtures.floor)]
+        if fixtures.walled:
+            high = (centres[:, 2] > fixtures.wall_bottom) & (centres[:, 2] < fixtures.wall_top)
+            off_axis = np.hypot(centres[:, 0], centres[:, 1])
+            beside.append(np.where(high, radius - (fixtures.cylinder.radius - off_axis), -np.inf))
+        touching = [np.flatnonzero(depths > 0) for depths in beside]
+        return cls(
+            count=count,
+            pairs=owners[found],
+            depths=2 * radius - apart,
+            fixed=owners[np.concatenate(touching)],
+            fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
+        )
+
+    def neighbours(self) -> NDArray[np.int64]:
+        """(N,) how many other smarticles each one touches."""
+        ordered = np.sort(self.pairs, axis=1)
+        both = np.unique(ordered[:, 0] * self.count + ordered[:, 1])
+        return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
+
+    def touches(self) -> NDArray[np.int64]:
+        """(N,) contacts of each smarticle, spheres counted singly."""
+        return np.bincount(np.concatenate([self.pairs.ravel(), self.fixed]), minlength=self.count)
+
+    def overlaps(self, limit: float, law: ContactLaw) -> Overlaps:
+        """See `dem.engine.interface.Engine.overlaps`."""
+        deep = np.zeros(self.count, dtype=np.bool_)
+        deep[self.pairs[self.depths > limit]] = True
+        deep[self.fixed[self.fixed_depths > limit]] = True
+        depths = np.concatenate([self.depths, self.fixed_depths])
+        return Overlaps(float(depths.max(initial=0.0)), deep, self.elastic_energy(law))
+
+    def elastic_energy(self, law: ContactLaw) -> float:
+        """No less than what the springs of all contacts hold [J]: friction bounds tangential ones by normal ones."""
+        squares = float((self.depths**2).sum() + (self.fixed_depths**2).sum())
+        friction = max(law.friction, law.wall_friction)
+        return law.normal_stiffness / 2 * squares * (1 + friction**2 * law.normal_stiffness / law.tangential_stiffness)

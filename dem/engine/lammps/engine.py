@@ -1,0 +1,360 @@
+"""A running simulation on LAMMPS, in a child process on one or several ranks; see `dem.engine.lammps.child`."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dem.body.particle import Particle
+from dem.body.placement import Poses
+from dem.body.state import State
+from dem.engine.interface import Saved
+from dem.engine.lammps import text
+from dem.engine.lammps.absent import NoMotors, NoStrings
+from dem.engine.lammps.account import LammpsAccount
+from dem.engine.lammps.child import Child
+from dem.engine.lammps.contacts import Contacts
+from dem.engine.lammps.fixtures import LammpsFixtures
+from dem.engine.lammps.text import Moving
+from dem.errors import InputError, RunError
+from dem.physics.contact import ContactLaw
+from dem.physics.overlaps import Overlaps
+from dem.setting.container import Cylinder
+
+Array = NDArray[np.float64]
+
+FORMAT = "lammps-1"
+SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
+HEAD = 9  # lines of a dump before its rows
+
+
+class LammpsEngine:
+    """See `dem.engine.interface.Engine`.
+
+    LAMMPS moves smarticles; what is asked of them at one instant is told from their poses, which it writes down after
+    each advance.
+
+    Args:
+        particle: one smarticle.
+        cylinder: the container; its floor is at z = 0 at the start.
+        law: contact law.
+        gravity: g, downwards [m/s²].
+        time_step: dt [s], until another is set.
+        ranks: processes.
+    """
+
+    def __init__(
+        self,
+        *,
+        particle: Particle,
+        cylinder: Cylinder,
+        law: ContactLaw,
+        gravity: float,
+        time_step: float,
+        ranks: int = 1,
+    ) -> None:
+        self.particle = particle
+        """See the interface."""
+        self.cylinder = cylinder
+        """See the interface."""
+        self.gravity = gravity
+        """See the interface."""
+        self.time, self.steps, self.time_step = 0.0, 0, time_step
+        self._law = law
+        self.child = Child(ranks)
+        """LAMMPS."""
+        self._cpu_before = 0.0  # of LAMMPS before it was started anew [s]
+        self._moving = Moving.none()
+        # Body frame in LAMMPS's own principal frame of each smarticle, known from the first dump on.
+        self._frames: Array | None = None
+        self._fresh = True  # the next run must be set up
+        self._box = False
+        self._seconds = 0.0
+        self._thrown = 0.0
+        self._contacts: Contacts | None = None
+        self.fixtures = LammpsFixtures(cylinder, self._told, lambda: (self.steps, self.time_step))
+        """See the interface."""
+        self.motors, self.strings = NoMotors(), NoStrings()
+        self.account = LammpsAccount(lambda: self.fixtures.moving, lambda: self.contacts.elastic_energy(law))
+        """See the interface."""
+
+    # -- what LAMMPS is told -----------------------------------------------------------------------------------
+
+    def _told(self, commands: Iterator[str]) -> None:
+        """Tell LAMMPS something that the next run must be set up for; before there is a box it is told all at once."""
+        self._contacts = None
+        if self._box:
+            self.child.tell(*commands)
+            self._fresh = True
+
+    def _scene(self, box: str) -> Iterator[str]:
+        """Everything but the bodies, for a LAMMPS that knows nothing; `box` is the command that brings the spheres."""
+        between, at_wall = text.contact_terms(self._law, self.particle.boxes.mass)
+        yield from text.before_box(self.particle)
+        # The pile is cut like a cake: a cut across would leave the upper part without work.
+        yield "processors * * 1"
+        yield box
+        yield from text.neighbours(self.particle)
+        yield f"pair_style gran/hooke/history {between}"
+        yield "pair_coeff * *"
+        yield f"fix weight all gravity {self.gravity:.17g} vector 0 0 -1"
+        yield from self.fixtures.variables()
+        yield from text.container(self.cylinder, at_wall, walled=self.fixtures.walled)
+        yield f"timestep {self.time_step:.17g}"
+        yield "thermo 0"
+        yield "thermo_style custom step"
+        yield "thermo_modify lost error flush yes"
+
+    def _bodies(self, file: str) -> Iterator[str]:
+        # Last of all, since what it does at the set-up of a run needs the forces of the others.
+        yield f"fix bodies all rigid/small molecule infile {file} reinit no"
+        yield from text.looking("bodies.*.dump", when="v_when")
+
+    def _forget_bodies(self) -> Iterator[str]:
+        yield "undump bodies"
+        yield "uncompute where"
+        yield "unfix bodies"
+
+    def _balanced(self) -> Iterator[str]:
+        """Equal shares of the spheres; two halves of a round pile are."""
+        if self.child.ranks > 2:
+            yield "balance 1.02 shift xy 20 1.01"
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def cpu_elsewhere(self) -> float:
+        """See the interface: of all ranks on this machine."""
+        return self._cpu_before + self.child.cpu()
+
+    def set_time_step(self, time_step: float) -> None:
+        """See the interface."""
+        if time_step == self.time_step:
+            return
+        if self.fixtures.moving:
+            msg = "engine: lammps cannot change the time step while the container moves"
+            raise RunError(msg)
+        self.time_step = time_step
+        self._told(iter((f"timestep {time_step:.17g}",)))
+
+    def advance(self, steps: int) -> None:
+        """See the interface."""
+        if steps <= 0:
+            return
+        if self.count:
+            self._run(steps)
+        elif self._box:
+            msg = "engine: lammps lost its smarticles"
+            raise RunError(msg)
+        self.steps += steps
+        self.time += steps * self.time_step
+        self._seconds += steps * self.time_step * self.count
+        self._contacts = None
+
+    def _run(self, steps: int) -> None:
+        target = self.steps + steps
+        try:
+            self.child.tell(
+                f"variable when equal {target}+1000000000*(step>={target})",
+                f"run {steps} pre {'yes' if self._fresh else 'no'} post no",
+            )
+        except RunError as error:
+            msg = f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}"
+            raise RunError(msg) from None
+        if self._frames is None:
+            # Written when the run was set up, of poses that are known: where LAMMPS has its axes.
+            own = _turns(self._read(self.steps))
+            self._frames = np.swapaxes(own, 1, 2) @ self._moving.turns
+        self._fresh = False
+        rows = self._read(target)
+        self._moving = Moving(
+            positions=rows[:, 1:4],
+            turns=_turns(rows) @ self._frames,
+            velocities=rows[:, 4:7],
+            spins=rows[:, 11:14],
+            momenta=rows[:, 14:17],
+            forces=rows[:, 17:20],
+        )
+
+    def _read(self, step: int) -> Array:
+        """(N, 20) numbers of all bodies at a step, as `LOOKED_AT` names them; its file is gone then."""
+        file = self.child.scratch / f"bodies.{step}.dump"
+        lines = file.read_text(encoding="ascii").split("\n", HEAD)
+        rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.LOOKED_AT.split()))
+        file.unlink()
+        if len(rows) != self.count:
+            msg = f"LAMMPS told of {len(rows)} of {self.count} smarticles at step {step}"
+            raise RunError(msg)
+        ordered: Array = rows[np.argsort(rows[:, 0])]
+        return ordered
+
+    # -- smarticles --------------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """See the interface."""
+        return len(self._moving.positions)
+
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        """See the interface."""
+        new, boxes, before = len(poses.positions), self.particle.boxes, self._moving
+        turns = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
+        zero, thrown = np.zeros((new, 3)), np.tile([0.0, 0.0, -speed], (new, 1))
+        weight = np.tile([0.0, 0.0, -boxes.mass * self.gravity], (new, 1))
+        added = Moving(poses.positions, turns, thrown, zero, zero, weight)
+        spheres = State.rigid(boxes, poses.positions, turns, thrown, zero).spheres(self.particle)
+        lines = text.sphere_lines(self.particle, self.cylinder, spheres, title="smarticles", first=self.count)
+        self._moving = Moving(*(np.concatenate([getattr(one, name) for one in (before, added)]) for name in _FIELDS))
+        self._write(SPHERES, lines)
+        self._write(BODIES, text.body_lines(self.particle, self._moving))
+        if self._box:
+            self.child.tell(*self._forget_bodies(), f"read_data {SPHERES} add merge", *self._balanced())
+        else:
+            self.child.tell(*self._scene(f"read_data {SPHERES}"), *self._balanced())
+            if self.steps:
+                self.child.tell(f"reset_timestep {self.steps}")
+            self._box = True
+        self.child.tell(*self._bodies(BODIES))
+        self._frames, self._fresh, self._contacts = None, True, None
+        self.account.added += boxes.mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self._thrown += boxes.mass * new * speed
+
+    def _write(self, name: str, lines: Iterator[str]) -> None:
+        with (self.child.scratch / name).open("w", encoding="ascii") as file:
+            file.writelines(f"{line}\n" for line in lines)
+
+    def still(self) -> None:
+        """See the interface."""
+        self.account.dissipated += self.state().kinetic_energy
+        none = np.zeros_like(self._moving.velocities)
+        self._moving = replace(self._moving, velocities=none, spins=none, momenta=none)
+        self._told(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
+
+    def state(self) -> State:
+        """See the interface."""
+        now = self._moving
+        return State.rigid(self.particle.boxes, now.positions, now.turns, now.velocities, now.spins)
+
+    @property
+    def impulse(self) -> float:
+        """See the interface."""
+        return self._seconds * self.particle.boxes.mass * self.gravity + self._thrown
+
+    def unbalanced_force(self) -> float:
+        """See the interface."""
+        if not self.count or not self.gravity:
+            return math.inf
+        weight = self.particle.boxes.mass * self.gravity
+        return float(np.linalg.norm(self._moving.forces, axis=1).mean() / weight)
+
+    @property
+    def contacts(self) -> Contacts:
+        """Who touches whom at present."""
+        if self._contacts is None:
+            self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.fixtures)
+        return self._contacts
+
+    def neighbours(self) -> NDArray[np.int64]:
+        """See the interface."""
+        return self.contacts.neighbours()
+
+    def touches(self) -> NDArray[np.int64]:
+        """See the interface."""
+        return self.contacts.touches()
+
+    def overlaps(self, limit: float) -> Overlaps:
+        """See the interface."""
+        return self.contacts.overlaps(limit, self._law)
+
+    # -- checkpoints -------------------------------------------------------------------------------------------
+
+    def save(self, scratch: Path) -> Saved:
+        """See the interface: LAMMPS's restart file with the springs of friction, the bodies, and their poses here.
+
+        LAMMPS orders spheres anew when it reads them: the simulation loads what it has saved, on a LAMMPS that was
+        started anew, since one that had contacts before does not find those of the file.
+        """
+        files: dict[str, bytes] = {}
+        if self._box:
+            self.child.tell(f"write_restart {RESTART}")
+            for name in (RESTART, f"{RESTART}.rigid"):
+                files[name] = (self.child.scratch / name).read_bytes()
+        arrays = io.BytesIO()
+        np.savez(arrays, **{name: getattr(self._moving, name) for name in _FIELDS})
+        files[STATE] = arrays.getvalue()
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for name, data in files.items():
+                archive.writestr(name, data)
+        memory: dict[str, Any] = {
+            "format": FORMAT,
+            "time": self.time,
+            "steps": self.steps,
+            "time_step": self.time_step,
+            "seconds": self._seconds,
+            "thrown": self._thrown,
+            "fixtures": self.fixtures.memory,
+            "account": [self.account.added, self.account.dissipated],
+        }
+        saved = Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
+        self.load(saved, scratch)
+        return saved
+
+    def load(self, saved: Saved, scratch: Path) -> None:
+        """See the interface.
+
+        Raises:
+            InputError: it was not saved by this engine.
+        """
+        memory = saved.memory
+        if memory.get("format") != FORMAT:
+            msg = (
+                f"checkpoint: format {memory.get('format')!r}, here is {FORMAT!r}; it was made by another engine or "
+                "version: resume with that, or start anew"
+            )
+            raise InputError(msg)
+        try:
+            with zipfile.ZipFile(io.BytesIO(saved.content)) as archive:
+                files = {name: archive.read(name) for name in archive.namelist()}
+                self._box = RESTART in files
+                with np.load(io.BytesIO(files[STATE])) as arrays:
+                    self._moving = Moving(*(arrays[name] for name in _FIELDS))
+        except (zipfile.BadZipFile, KeyError, ValueError) as error:
+            msg = f"checkpoint: not readable by the lammps engine ({error}); start the run anew"
+            raise InputError(msg) from error
+        self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
+        self._seconds, self._thrown = memory["seconds"], memory["thrown"]
+        self.account.added, self.account.dissipated = memory["account"]
+        self.fixtures.restore(memory["fixtures"])
+        self._frames, self._fresh, self._contacts = None, True, None
+        if self._box:
+            self._begin_anew(files)
+            self.child.tell(
+                *self._scene(f"read_restart {RESTART}"), *self._balanced(), *self._bodies(f"{RESTART}.rigid")
+            )
+
+    def _begin_anew(self, files: Mapping[str, bytes]) -> None:
+        self._cpu_before += self.child.cpu()
+        self.child.close()
+        self.child = Child(self.child.ranks)
+        for name, data in files.items():
+            (self.child.scratch / name).write_bytes(data)
+
+
+_FIELDS = ("positions", "turns", "velocities", "spins", "momenta", "forces")
+
+
+def _turns(rows: Array) -> Array:
+    """(N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
+    turns: Array = Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix()
+    return turns

@@ -1,0 +1,172 @@
+"""What LAMMPS is told, as text: files of spheres and of bodies, contact, gravity, container.
+
+Keywords are those of the version of September 2021, which Debian 12 has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import Particle
+from dem.physics.contact import ContactLaw
+from dem.setting.container import Cylinder
+
+Array = NDArray[np.float64]
+
+SKIN = 0.2  # sphere diameters that neighbours are looked for beyond contact
+LOOKED_AT = (
+    "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"  # of a body
+)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Bodies at one instant, in the laboratory frame.
+
+    Args:
+        positions: (N, 3) centres of mass [m].
+        turns: (N, 3, 3) body frame to laboratory frame [1].
+        velocities: (N, 3) of the centres of mass [m/s].
+        spins: (N, 3) angular velocities [rad/s].
+        momenta: (N, 3) angular momenta about the centres of mass [kg m²/s].
+        forces: (N, 3) of contacts and weight [N].
+    """
+
+    positions: Array
+    turns: Array
+    velocities: Array
+    spins: Array
+    momenta: Array
+    forces: Array
+
+    @classmethod
+    def none(cls) -> Moving:
+        """No bodies."""
+        empty = np.zeros((0, 3))
+        return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)
+
+
+def sphere_masses(particle: Particle) -> Array:
+    """(S,) [kg] that add up to a smarticle's mass, balanced about its centre, so that weight does not turn it.
+
+    As near to equal as that goes: those of least squares.
+    """
+    count = len(particle.centres)
+    # Of each sphere: its share of the mass, and of the first moments, which are to vanish.
+    rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
+    wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
+    equal = np.full(count, particle.boxes.mass / count)
+    masses: Array = equal + np.linalg.pinv(rows) @ (wanted - rows @ equal)
+    return masses
+
+
+def sphere_lines(
+    particle: Particle, cylinder: Cylinder, spheres: Array, *, title: str, first: int = 0
+) -> Iterator[str]:
+    """All spheres, for `read_data`: number, type, place, diameter, density, smarticle.
+
+    Args:
+        particle: one smarticle.
+        cylinder: the container, for the box.
+        spheres: (N, S, 3) their centres [m].
+        title: the first line.
+        first: number of the first smarticle.
+    """
+    count, each = spheres.shape[:2]
+    d = particle.chain.diameter
+    yield title
+    yield f"\n{count * each} atoms\n1 atom types\n"
+    side, top = cylinder.corner_radius + d, cylinder.height + d
+    for low, high, axis in ((-side, side, "x"), (-side, side, "y"), (cylinder.bottom - d, top, "z")):
+        yield f"{low:.9g} {high:.9g} {axis}lo {axis}hi"
+    yield "\nAtoms # hybrid sphere bond\n"
+    densities = sphere_masses(particle) / (math.pi / 6 * d**3)
+    ends = [f"{d:.17g} {density:.17g}" for density in densities]
+    for k, chain in enumerate(spheres.tolist(), first):
+        for s, (x, y, z) in enumerate(chain):
+            yield f"{k * each + s + 1} 1 {x:.17g} {y:.17g} {z:.17g} {ends[s]} {k + 1}"
+
+
+def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
+    """All smarticles, for `fix rigid/small infile`: number, mass, centre, inertia (xx yy zz xy xz yz), motion."""
+    tensors = moving.turns @ np.diag(particle.boxes.inertia) @ np.swapaxes(moving.turns, 1, 2)
+    moments = tensors[:, (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
+    yield str(len(moving.positions))
+    columns = (moving.positions, moments, moving.velocities, moving.momenta)
+    for k, row in enumerate(np.concatenate(columns, axis=1).tolist()):
+        numbers = " ".join("0" if value == 0 else f"{value:.17g}" for value in row)
+        yield f"{k + 1} {particle.boxes.mass:.17g} {numbers} 0 0 0"
+
+
+def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
+    """Numbers of `pair_style gran/hooke/history` between smarticles of a mass [kg], and of `fix wall/gran/region`.
+
+    kn and ks [N/m]; damping across and along the surface [1/s], which LAMMPS multiplies with the effective mass of the
+    two bodies that touch, M/2, or M at a wall; friction; 1: damping along the surface is on.
+    """
+    between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
+    springs, tangential = f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g}", law.tangential_damping
+    return (
+        f"{springs} {between:.9g} {between * tangential:.9g} {law.friction:.9g} 1",
+        f"hooke/history {springs} {wall:.9g} {wall * tangential:.9g} {law.wall_friction:.9g} 1",
+    )
+
+
+def before_box(particle: Particle) -> Iterator[str]:
+    """Commands before there is a box."""
+    yield "units            si"
+    yield "# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders."
+    yield "newton           off"
+    yield "boundary         m m m"
+    yield (
+        "# Style bond brings the number of the smarticle that a sphere belongs to; rigid/small looks spheres up by "
+        "number."
+    )
+    yield "atom_style       hybrid sphere bond"
+    yield "atom_modify      map array"
+    yield "# A body is moved by the processor of one of its spheres, which must see all others: as far as it is long."
+    yield f"comm_modify      vel yes cutoff {2 * particle.reach + particle.chain.diameter:.9g}"
+
+
+def neighbours(particle: Particle) -> Iterator[str]:
+    """Commands about who is looked for."""
+    yield "# Spheres of one smarticle do not touch each other."
+    yield f"neighbor         {SKIN * particle.chain.diameter:.9g} bin"
+    yield "neigh_modify     delay 0 every 1 check yes exclude molecule/intra all"
+
+
+def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Iterator[str]:
+    """Commands that put floor and wall where the variables `floor_z` and `wall_z` say.
+
+    Args:
+        cylinder: the container.
+        at_wall: numbers of the contact, see `contact_terms`.
+        walled: whether there is a wall.
+    """
+    extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
+    yield "variable         wave equal sin(v_omega*(step-v_begun)*dt)"
+    yield "variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave"
+    yield "variable         wall_z equal v_wall_base+v_wall_amplitude*v_wave"
+    yield "region           floor plane 0 0 0 0 0 1 side in move NULL NULL v_floor_z"
+    yield f"fix              floor all wall/gran/region {at_wall} region floor"
+    if walled:
+        yield f"region           wall cylinder z 0 0 {extent} side in open 1 open 2 move NULL NULL v_wall_z"
+        yield f"fix              wall all wall/gran/region {at_wall} region wall"
+
+
+def looking(dump: str, *, when: str) -> Iterator[str]:
+    """Commands that write bodies down.
+
+    Args:
+        dump: the file.
+        when: how often, as `dump_modify every` has it.
+    """
+    count = len(LOOKED_AT.split())
+    yield f"compute          where all rigid/local bodies {LOOKED_AT}"
+    yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"
+    yield f"dump_modify      bodies every {when} first yes format float %.17g"

@@ -1,0 +1,108 @@
+#!/bin/bash
+#SBATCH --job-name=friction.0a1b2c3d
+#SBATCH --array=0-2
+#SBATCH --nodes=2
+#SBATCH --ntasks=96
+#SBATCH --cpus-per-task=1
+#SBATCH --mem=20000M
+#SBATCH --time=1-06:10:00
+#SBATCH --signal=B:USR1@600
+#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output=jobs/001/%a.txt
+#SBATCH --partition=shared
+#SBATCH --hint=nomultithread
+# 3 runs of the sweep in /home/user/sweeps/friction, made by `smarticles`.
+# By hand:  cd -- /home/user/sweeps/friction && sbatch jobs/001/array.sh
+# Task number i computes one run on 96 ranks, started by mpirun on the cores of the task: line i + 1 of
+# jobs/001/runs.txt. Runs that are done or failed are passed over, others go on from their last checkpoint.
+set -euo pipefail
+cd -- /home/user/sweeps/friction
+
+# One thread per run: threads that find no free core spin, and bits depend on their number.
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+set +u # module systems use variables that are not set
+module load python/3.11
+set -u
+smarticles=('/opt/it'"'"'s here/.venv/bin/smarticles')
+
+task=${SLURM_ARRAY_TASK_ID:?submit this script with sbatch}
+mapfile -t -s $((task * 1)) -n 1 runs <jobs/001/runs.txt
+began=jobs/001/$task.began
+: >"$began" # what is newer was made by this task
+pids=()
+told=
+
+state() {
+    if [ -e "runs/$1/done.json" ]; then
+        echo finished
+    elif grep -qs '"status": "failed"' "runs/$1/failed.json"; then
+        echo failed
+    else
+        echo open
+    fi
+}
+
+start() {
+    local resume=()
+    [ ! -e "runs/$1/run.json" ] || resume=(--resume)
+    "${smarticles[@]}" run "scenes/$1.yaml" --out "runs/$1" --ranks 96 "${resume[@]}" >>"logs/$1.txt" 2>&1 &
+    pids+=("$!")
+}
+
+tell() {
+    local pid
+    for pid in "${pids[@]}"; do
+        kill -s "$1" "$pid" 2>/dev/null || true # it has ended
+    done
+}
+
+computing() {
+    local pid
+    for pid in "${pids[@]}"; do
+        ! kill -0 "$pid" 2>/dev/null || return 0
+    done
+    return 1
+}
+
+# USR1: the time limit is near; runs end at their next checkpoint. TERM: runs end at once.
+trap 'told=USR1; tell USR1' USR1
+trap 'told=TERM; tell TERM' TERM
+
+mkdir -p runs logs
+for run in "${runs[@]}"; do
+    [ "$(state "$run")" != open ] || start "$run"
+done
+[ -z "$told" ] || tell "$told" # those that were not started yet
+until wait; do # a signal ends it early
+    patience=$((SECONDS + 570))
+    while computing && ((SECONDS < patience)); do
+        sleep 1
+    done
+    tell TERM
+done
+
+finished=0 failed=0 open=0 progress=no
+for run in "${runs[@]}"; do
+    case $(state "$run") in
+    finished) finished=$((finished + 1)) ;;
+    failed) failed=$((failed + 1)) ;;
+    *) open=$((open + 1)) ;;
+    esac
+    for file in checkpoint.zip done.json; do
+        [ ! "runs/$run/$file" -nt "$began" ] || progress=yes
+    done
+done
+echo "task $task: $finished finished, $failed failed, $open not finished${told:+, ended by $told}"
+if [ "$told" = USR1 ] && [ "$open" -gt 0 ]; then
+    if [ "$progress" = no ]; then
+        echo "task $task: not queued again: no run reached a checkpoint; ask for more --time" >&2
+    elif ((${SLURM_RESTART_COUNT:-0} >= 3)); then
+        echo "task $task: not queued again: it was 3 times; go on with smarticles resume" >&2
+    else
+        echo "task $task: queued again"
+        scontrol requeue "$SLURM_JOB_ID"
+        exit 0
+    fi
+fi
+[ $((failed + open)) -eq 0 ]

@@ -1,0 +1,50 @@
+"""LAMMPS under mpirun, where it is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from lammps_builds import Build
+
+from dem.engine.lammps.child import lammps_version
+from dem.engine.lammps.engine import LammpsEngine
+from dem.engine.lammps.kind import contact_law_of
+from dem.engine.lammps.ranks import most_ranks
+from dem.errors import RunError
+from dem.plan.steps import time_step
+from dem.scene.scene import Scene
+from dem.setting.container import Cylinder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _installed() -> None:
+    try:
+        lammps_version()
+    except RunError as error:
+        pytest.skip(f"tests of engine: lammps need it (`make setup-mpi`, as .ci/run does): {error}")
+    if most_ranks() < 2:
+        pytest.skip("mpirun -np 2 needs two cores")
+
+
+@pytest.fixture
+def build() -> Iterator[Build]:
+    """Builds engines of scenes, on two ranks unless told otherwise, that end with the test."""
+    built: list[LammpsEngine] = []
+
+    def make(scene: Scene, *, ranks: int = 2, **instead: Any) -> LammpsEngine:
+        made = {
+            "particle": scene.particle,
+            "cylinder": Cylinder(radius=scene.container.radius_m, height=scene.cylinder.height, facets=64),
+            "law": contact_law_of(scene),
+            "gravity": scene.gravity_m_per_s2,
+            "time_step": time_step(scene),
+            "ranks": ranks,
+        }
+        built.append(LammpsEngine(**(made | instead)))
+        return built[-1]
+
+    yield make
+    for engine in built:
+        engine.child.close()

@@ -1,0 +1,138 @@
+"""LAMMPS that is missing, another one, or dies: cause and way out, in one line, and nothing written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from scenes import small
+
+from dem.engine.lammps.child import NEEDED, Child, explain, lammps_version
+from dem.engine.lammps.ranks import RANKS, check_ranks, ranks
+from dem.errors import InputError, RunError
+from dem.run.run import run_scene
+
+HELP = "Large-scale Atomic/Molecular Massively Parallel Simulator - {version}\n\n" + " ".join(NEEDED)
+Programs = Callable[..., Path]
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Programs:
+    """Makes programs that are all that is found; each a shell script."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+
+    def make(**scripts: str) -> Path:
+        for name, text in scripts.items():
+            (folder / name).write_text(f"#!/bin/sh\n{text}\n")
+            (folder / name).chmod(0o755)
+        return folder
+
+    return make
+
+
+def said(version: str = "29 Sep 2021", *, without: str = "") -> str:
+    text = HELP.format(version=version).replace(without, "") if without else HELP.format(version=version)
+    return f"while read -r line; do echo \"$line\"; done <<'E'\n{text}\nE"
+
+
+@pytest.mark.parametrize(("there", "missing"), [({}, "lmp of LAMMPS"), ({"lmp": said()}, "mpirun of Open MPI")])
+def test_what_is_missing_is_named_and_no_directory_is_left(
+    programs: Programs, there: dict[str, str], missing: str, tmp_path: Path
+) -> None:
+    programs(**there)
+    way_out = r"`make setup-mpi` or `apt-get install lammps openmpi-bin`, or use engine: yade"
+    with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
+        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_version_is_that_of_the_program(programs: Programs) -> None:
+    programs(lmp=said("2 Aug 2023 - Update 1"), mpirun="")
+    assert lammps_version() == "2 Aug 2023 - Update 1"
+
+
+@pytest.mark.parametrize("style", NEEDED)
+def test_a_lammps_without_its_packages_is_refused(programs: Programs, style: str) -> None:
+    programs(lmp=said(without=style), mpirun="")
+    with pytest.raises(RunError, match=r"LAMMPS 29 Sep 2021 was built without .*packages GRANULAR and RIGID") as caught:
+        lammps_version()
+    assert style in str(caught.value)
+
+
+@pytest.mark.parametrize("script", ["echo liblammps.so.0: cannot open >&2; exit 127", "echo something else"])
+def test_a_program_that_is_no_lammps_is_told_with_what_it_says(programs: Programs, script: str) -> None:
+    programs(lmp=script, mpirun="")
+    with pytest.raises(RunError, match=r"lmp: is no LAMMPS that starts \((liblammps|something else)"):
+        lammps_version()
+
+
+KILLED = """\
+--------------------------------------------------------------------------
+mpirun noticed that process rank 1 with PID 0 on node box exited on
+signal 9 (Killed).
+--------------------------------------------------------------------------
+"""
+UNKNOWN = "ERROR: Unknown fix style nonsense (../modify.cpp:899)\nLast command: fix bogus all   nonsense\n"
+
+
+@pytest.mark.parametrize(
+    ("log", "printed", "cause", "way_out"),
+    [
+        ("", KILLED, "rank 1 was ended by signal 9 (Killed)", "if memory ran out.*fewer --ranks; go on .*resume"),
+        ("", KILLED.replace("9 (Killed)", "11 (Segmentation fault)"), "signal 11 (Segm", "^go on from the last check"),
+        (UNKNOWN, "", "Unknown fix style nonsense (command: fix bogus all nonsense)", "does not know .*setup-mpi"),
+        (
+            "ERROR: Lost atoms: original 180 current 179 (../thermo.cpp:438)",
+            "",
+            "Lost atoms: original",
+            "fly apart.*low",
+        ),
+        ("", "ERROR on proc 1: Failed to allocate 8 bytes for array x (../memory.cpp:66)", "Failed", "memory is short"),
+        ("", "There are not enough slots available in the system", "fewer cores than ranks", "fewer --ranks"),
+        ("units si", "", "exit status 3 (it says nothing)", "see its log"),
+    ],
+)
+def test_why_it_ended_is_read_from_its_own_log(log: str, printed: str, cause: str, way_out: str) -> None:
+    import re  # noqa: PLC0415
+
+    told = explain(log, printed, 3)
+    assert cause in told[0]
+    assert "cpp" not in told[0]
+    assert re.search(way_out, told[1])
+
+
+def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(programs: Programs, tmp_path: Path) -> None:
+    echo = "\n".join(f"echo '{line}'" for line in KILLED.splitlines())
+    programs(mpirun=f"read -r line\n{echo}\nexit 137")
+    child = Child(2)
+    with pytest.raises(
+        RunError, match=r"^LAMMPS ended: rank 1 was ended by signal 9 \(Killed\); .*; its log: /"
+    ) as told:
+        child.tell("run 1")
+    assert not child.scratch.exists()
+    kept = Path(str(told.value).rpartition("its log: ")[2])
+    assert "signal 9 (Killed)" in kept.read_text()
+    kept.unlink()
+    kept.parent.rmdir()
+
+
+def test_ranks_are_one_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(RANKS, raising=False)
+    assert ranks() == 1
+    monkeypatch.setenv(RANKS, "3")
+    assert ranks() == 3
+
+
+def test_more_ranks_than_cores_are_refused_but_for_those_of_a_batch_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
+    monkeypatch.delenv("SLURM_NTASKS", raising=False)
+    check_ranks(2)
+    with pytest.raises(InputError, match=r"^--ranks 3: there are 2 cores .*; use at most 2, or more machines"):
+        check_ranks(3)
+    monkeypatch.setenv("SLURM_NTASKS", "64")
+    check_ranks(64)
+    with pytest.raises(InputError, match=r"use at most 64"):
+        check_ranks(65)

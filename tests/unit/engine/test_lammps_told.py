@@ -1,0 +1,204 @@
+"""What the engine lammps refuses, what it says to LAMMPS, and what it works out itself; without LAMMPS."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import SMALL, changed, small
+from scipy.spatial.transform import Rotation
+
+from dem.body.state import State
+from dem.engine.kinds import engine_kind
+from dem.engine.lammps.contacts import Contacts
+from dem.engine.lammps.fixtures import LammpsFixtures
+from dem.engine.lammps.text import Moving, body_lines, contact_terms, sphere_lines, sphere_masses
+from dem.errors import InputError
+from dem.physics.contact import contact_law
+from dem.scene.reading import parse_scene
+from dem.setting.container import Cylinder
+
+LIFT = {"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.1}
+PHASES = [{"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"hooks": {"lower_height_m": 0.03, "upper_height_m": 0.04}}, ["hooks"]),
+        ({"container": {"tiers": [{"radius_m": 0.04, "height_m": 0.1}]}}, None),
+        (
+            {"container": {"tiers": [{"radius_m": 0.04, "height_m": 0.03}, {"radius_m": 0.02, "height_m": 0.1}]}},
+            ["container.tiers"],
+        ),
+        ({"phases": [*PHASES, LIFT]}, ["phases.2.speed_m_per_s: a wall that is lifted"]),
+        ({"phases": [*PHASES, {**LIFT, "speed_m_per_s": None}]}, None),
+        ({"phases": [*PHASES, {"type": "shape-change"}]}, ["phases.2 (shape-change): motors"]),
+        ({"recording.energy": True}, ["recording.energy"]),
+        ({"recording.dissipation_interval_s": 2e-4}, ["recording.dissipation_interval_s"]),
+        (
+            {"hooks": {"lower_height_m": 0.03, "upper_height_m": 0.04}, "recording.energy": True},
+            ["hooks", "recording.energy"],
+        ),
+    ],
+)
+def test_what_it_cannot_compute_is_refused_by_name_when_the_scene_is_read(
+    changes: dict[str, Any], named: list[str] | None
+) -> None:
+    data = changed(SMALL, {"engine": "lammps", **changes})
+    if named is None:
+        assert parse_scene(data, source="x").engine == "lammps"
+        return
+    with pytest.raises(
+        InputError, match=r"engine: lammps cannot compute .*; leave that out, or use engine: yade or"
+    ) as e:
+        parse_scene(data, source="x")
+    for each in named:
+        assert each in str(e.value)
+    assert len(str(e.value).splitlines()) == 1
+    assert parse_scene({**data, "engine": "yade"}, source="x").engine == "yade"
+
+
+def test_its_spheres_law_and_step_are_those_of_yade() -> None:
+    one, other = small({"engine": "lammps"}), small()
+    assert np.array_equal(one.particle.centres, other.particle.centres)
+    kinds = engine_kind("lammps"), engine_kind("yade")
+    assert kinds[0].stable_step(one, articulated=False) == kinds[1].stable_step(other, articulated=False)
+
+
+def test_damping_is_given_by_mass_as_lammps_multiplies_it() -> None:
+    scene = small()
+    law, mass = contact_law(scene.particle, scene.contact, 250.0), scene.particle.boxes.mass
+    between, wall = (
+        [float(value) for value in terms.split() if value[0].isdigit()] for terms in contact_terms(law, mass)
+    )
+    assert between[:2] == wall[:2] == [250.0, pytest.approx(205)]
+    assert between[2] * mass / 2 == pytest.approx(law.normal_damping, rel=1e-8)
+    assert wall[2] * mass == pytest.approx(law.wall_damping, rel=1e-8)
+    assert between[3] / between[2] == pytest.approx(law.tangential_damping, rel=1e-8)
+    assert between[4:] == [law.friction, 1]
+
+
+def moving(count: int) -> tuple[Any, Moving]:
+    scene, rng = small(), np.random.default_rng(4)
+    turns = Rotation.random(count, random_state=rng).as_matrix()
+    vectors = (rng.normal(size=(count, 3)) for _ in range(5))
+    places, *rest = vectors
+    return scene, Moving(places, turns, *rest)
+
+
+def test_bodies_keep_all_digits_of_their_motion() -> None:
+    scene, told = moving(3)
+    number, *lines = body_lines(scene.particle, told)
+    assert number == "3"
+    rows = np.array([line.split() for line in lines], float)
+    assert rows.shape == (3, 20)
+    assert np.array_equal(rows[:, 2:5], told.positions)
+    assert np.array_equal(rows[:, 11:14], told.velocities)
+    assert np.array_equal(rows[:, 14:17], told.momenta)
+    xx, yy, zz, xy, xz, yz = rows[:, 5:11].T
+    tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+    turned = np.swapaxes(told.turns, 1, 2) @ tensors @ told.turns
+    np.testing.assert_allclose(turned, np.tile(np.diag(scene.particle.boxes.inertia), (3, 1, 1)), atol=1e-20)
+
+
+def test_spheres_that_are_added_go_on_counting() -> None:
+    scene = small()
+    each = len(scene.particle.centres)
+    spheres = np.zeros((2, each, 3))
+    rows = list(sphere_lines(scene.particle, scene.cylinder, spheres, title="more", first=7))
+    atoms = np.array([row.split() for row in rows[-2 * each :]], float)
+    assert atoms[[0, -1], 0].tolist() == [7 * each + 1, 9 * each]
+    assert atoms[[0, -1], 7].tolist() == [8, 9]
+    masses = atoms[:each, 6] * math.pi / 6 * scene.sphere_diameter**3
+    np.testing.assert_allclose(masses, sphere_masses(scene.particle), rtol=1e-12)
+
+
+@pytest.fixture
+def told() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def clock() -> list[float]:
+    return [0, 1e-4]
+
+
+@pytest.fixture
+def fixtures(told: list[str], clock: list[float]) -> LammpsFixtures:
+    cylinder = Cylinder(radius=0.02, height=0.05, facets=64)
+    return LammpsFixtures(cylinder, told.extend, lambda: (int(clock[0]), clock[1]))
+
+
+def test_floor_and_wall_are_where_lammps_s_variables_put_them(
+    fixtures: LammpsFixtures, told: list[str], clock: list[float]
+) -> None:
+    clock[0] = 30
+    fixtures.shake(amplitude=1e-3, frequency=25.0)
+    values = dict(line.split()[1::2] for line in told)
+    assert values["begun"] == "30"
+    clock[0] = 90  # 6 ms later
+    omega, t = 2 * math.pi * 25, 6e-3
+    assert fixtures.floor == pytest.approx(1e-3 * math.sin(omega * t), rel=1e-12)
+    assert fixtures.velocity == pytest.approx(1e-3 * omega * math.cos(omega * t), rel=1e-12)
+    assert fixtures.wall_bottom == pytest.approx(-0.002 + fixtures.floor, rel=1e-12)
+    assert fixtures.moving
+    assert fixtures.enclosed
+    height = fixtures.floor
+    fixtures.stop()
+    clock[0] = 500
+    assert (fixtures.floor, fixtures.velocity, fixtures.moving) == (height, 0.0, False)
+    del told[:]
+    fixtures.remove_wall()
+    assert told == ["unfix wall", "region wall delete"]
+    assert (fixtures.walled, fixtures.enclosed, fixtures.raised) == (False, False, None)
+    fixtures.shake(amplitude=1e-3, frequency=25.0, walls=True)
+    assert "variable wall_amplitude equal 0" in told
+    again = LammpsFixtures(fixtures.cylinder, told.extend, lambda: (510, 1e-4))
+    again.restore(fixtures.memory)
+    clock[0] = 510
+    assert again.floor == fixtures.floor != height
+
+
+def test_the_floor_may_move_alone(fixtures: LammpsFixtures, told: list[str], clock: list[float]) -> None:
+    fixtures.shake(amplitude=1e-3, frequency=25.0, walls=False)
+    clock[0] = 70
+    assert fixtures.floor != 0
+    assert fixtures.wall_bottom == -0.002
+    assert "variable wall_amplitude equal 0" in told
+
+
+def test_contacts_are_those_of_all_pairs_of_spheres(fixtures: LammpsFixtures) -> None:
+    # Spheres of one smarticle overlap.
+    scene, rng = small({"fidelity": {"base": "draft", "pitch": 0.7}}), np.random.default_rng(3)
+    count, radius = 12, scene.particle.radius
+    places = np.column_stack([rng.uniform(-0.009, 0.009, (count, 2)), rng.uniform(0.005, 0.012, count)])
+    turns, still = Rotation.random(count, random_state=rng).as_matrix(), np.zeros((count, 3))
+    spheres = State.rigid(scene.particle.boxes, places, turns, still, still).spheres(scene.particle)
+    found = Contacts.of(spheres, radius, fixtures)
+    touches, neighbours, depths = np.zeros(count, int), np.zeros(count, int), []
+    for k in range(count):
+        beside = [radius - spheres[k, :, 2], radius - (0.02 - np.hypot(spheres[k, :, 0], spheres[k, :, 1]))]
+        for depth in beside:
+            touches[k] += (depth > 0).sum()
+            depths += list(depth[depth > 0])
+        for j in range(count):
+            apart = np.linalg.norm(spheres[k][:, None] - spheres[j][None], axis=-1)
+            deep = 2 * radius - apart
+            if j != k:
+                touches[k] += (deep > 0).sum()
+                neighbours[k] += (deep > 0).any()
+            if j > k:
+                depths += list(deep[deep > 0])
+    assert neighbours.max() > 1
+    assert np.array_equal(found.touches(), touches)
+    assert np.array_equal(found.neighbours(), neighbours)
+    law = contact_law(scene.particle, scene.contact, 250.0)
+    told = found.overlaps(radius, law)
+    assert told.deepest == pytest.approx(max(depths), rel=1e-12)
+    assert 0 < told.deep.sum() < count
+    normal = 250 / 2 * sum(depth**2 for depth in depths)
+    assert told.elastic_energy == pytest.approx(normal * (1 + 0.4**2 / 0.82), rel=1e-12)
+    assert Contacts.of(np.zeros((0, 18, 3)), radius, fixtures).touches().shape == (0,)
