@@ -26,11 +26,12 @@ class InBullet:
     """A world of compounds of three boxes each."""
 
     def __init__(self, given: Given, *, time_step: float, iterations: int, recovery: float) -> None:
-        self._given, self._bullet = given, importlib.import_module("pybullet")
+        # A client of its own: without one, calls go to the first world of the process.
+        library, clients = (importlib.import_module(name) for name in ("pybullet", "pybullet_utils.bullet_client"))
+        self._given, self._bullet = given, clients.BulletClient(connection_mode=library.DIRECT)
         bullet = self._bullet
         self.version = f"pybullet {importlib.import_module('importlib.metadata').version('pybullet')}"
         self.time_step = time_step
-        self._client = bullet.connect(bullet.DIRECT)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step,
             numSolverIterations=iterations,

@@ -23,7 +23,9 @@ PARALLEL = 1e-9  # squared sine of an angle below which two edges have no common
 class Solid(Protocol):
     """The parts that smarticles are made of at one instant."""
 
-    owners: Indices
+    @property
+    def owners(self) -> Indices:
+        """(B,) number of the smarticle that each part belongs to."""
 
     def candidates(self) -> Indices:
         """(P, 2) pairs of parts that may be in each other."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -40,7 +41,7 @@ class Setting:
     @property
     def key(self) -> str:
         """Name of files."""
-        return f"{self.engine}-{self.name}".replace(" ", "_").replace(",", "")
+        return re.sub(r"[^0-9a-z.-]+", "_", f"{self.engine}-{self.name}".lower())
 
 
 @dataclass(frozen=True, kw_only=True)
