@@ -24,6 +24,7 @@ from benchmarks.rivals import figure, running
 from benchmarks.rivals.ours import RESIDUAL
 from benchmarks.rivals.settings import ACTIVITIES, ENGINES, SETTINGS, Setting
 from benchmarks.rivals.table import markdown, medians, verdicts
+from dem.errors import InputError
 from dem.run.run import versions
 
 QUICK_COUNT, QUICK_SECONDS = 20, 0.05
@@ -66,9 +67,17 @@ def joined(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def run_all(folder: Path, arguments: argparse.Namespace, engines: Sequence[str]) -> pd.DataFrame:
-    """Run what the folder's table lacks."""
+    """Run what the folder's table lacks.
+
+    Raises:
+        InputError: the table is of another pile or time, or the pile's scene is refused.
+    """
     path = folder / "rivals.csv"
     rows = pd.read_csv(path) if path.exists() else pd.DataFrame()
+    for column, value in ((running.COUNT, arguments.count), (running.SECONDS, arguments.seconds)):
+        if len(rows) and (rows[column] != value).any():
+            msg = f"--out {folder}: has rows of {column} {rows[column].iloc[0]:g}, not {value:g}; choose another folder"
+            raise InputError(msg)
     for setting, activity, seed, account in planned(engines, arguments.seeds):
         if activity not in arguments.activities or not missing_from(rows, setting, activity, seed, account=account):
             continue
@@ -121,7 +130,11 @@ def main() -> int:
         if ENGINES[engine].missing:
             print(ENGINES[engine].missing)
     present = [engine for engine in arguments.engines if ENGINES[engine].missing is None]
-    rows = run_all(folder, arguments, present)
+    try:
+        rows = run_all(folder, arguments, present)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
     if rows.empty:
         print("nothing was run", file=sys.stderr)
         return 1

@@ -32,6 +32,7 @@ POUR: Mapping[str, Any] = {"engine": "links", "fidelity": {"base": "standard", "
 PAPER_COUNT, PAPER_RADIUS, PAPER_PER_LAYER = 270, 0.0234, 10
 REST = 0.3  # s before the activity
 
+COUNT, SECONDS = "N [1]", "activity [s]"
 COST, STEP, MEMORY = "cost [s/s]", "dt [s]", "peak memory [MiB]"
 DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of looks [m]", "of the true boxes [m]"
 PHI_REST, PHI_END = "phi at rest [1]", "phi at the end [1]"
@@ -110,8 +111,9 @@ def run(
         "engine": ENGINES[setting.engine].title,
         "setting": setting.name,
         "activity": activity,
-        "N [1]": count,
+        COUNT: count,
         "seed": seed,
+        SECONDS: seconds,
         COST: told["processor_s"] / seconds,
         STEP: told["time_step_s"],
         **found,

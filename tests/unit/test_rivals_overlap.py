@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from scenes import SMALL
+from scipy.spatial.transform import Rotation
 
 from benchmarks.rivals.overlap import Bars, Swept, deepest, distances
 from benchmarks.rivals.solids import SHAPES, solid_of
