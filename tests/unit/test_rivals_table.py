@@ -62,6 +62,15 @@ def test_what_was_asked_is_answered_with_its_numbers_also_where_it_does_not_hold
     assert f"{394 / 88 * 40:.0f} times as cheap as Chrono would be" in said
     assert "cheaper by 0.5 or more (least: Bullet, 1e-3 s), asked more than 1: does not hold" in said
     assert "no setting of links was run with a tenth of the overlap of Rapier, 2e-4 s, stiff" in said
+    swung = [{**each, "activity": OSCILLATE} for each in ROWS]
+    deep = [{**each, running.DEPTH: 2.1e-3} if each["engine"] == "MuJoCo" else each for each in swung]
+    told = "at a twentieth of the overlap of MuJoCo (2e-4 s, CG 50, soft)"
+    assert f"{told}, 2.100 mm, links are 40.0 times as cheap, asked 25: holds" in "\n".join(
+        verdicts(medians(pd.DataFrame(deep)))
+    )
+    assert f"{told}, 0.500 mm, links are 13.3 times as cheap, asked 25: does not hold" in "\n".join(
+        verdicts(medians(pd.DataFrame(swung)))
+    )
     slower = [{**each, running.COST: 10.0} if each["engine"] == "links" else each for each in ROWS]
     said = "\n".join(verdicts(medians(pd.DataFrame(slower))))
     assert "8.0 times as cheap as MuJoCo (2e-4 s, CG 50, soft), asked 25: does not hold" in said
