@@ -72,13 +72,28 @@ def test_segments_that_cross_meet() -> None:
     assert deepest(swept) == pytest.approx(0.15)
 
 
-def nested(apart: float, shape: str) -> float:
-    """How deep two smarticles are in each other, the second above the first by a distance along their normal [m]."""
+def pair(shape: str, turn: Rotation, place: list[float]) -> float:
+    """How deep two smarticles are in each other, the first in its body frame, the second turned and at a place [m]."""
     scene = parse_scene({**SMALL, "engine": "links", "fidelity": "standard"}, source="x")
-    places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, apart]])
-    turns, still = np.array([np.eye(3)] * 2), np.zeros((2, 3))
+    places, turns = np.array([[0.0, 0.0, 0.0], place]), np.array([np.eye(3), turn.as_matrix()])
+    still = np.zeros((2, 3))
     state = State.rigid(scene.particle.boxes, places, turns, still, still)
     return deepest(solid_of(shape, scene.particle, state.link_positions, state.link_rotations))
+
+
+def nested(apart: float, shape: str) -> float:
+    """The same, the second above the first by a distance along their normal [m]."""
+    return pair(shape, Rotation.identity(), [0.0, 0.0, apart])
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("depth", [-1e-5, 3e-5])
+def test_barbs_end_at_their_tips_whatever_they_are_made_of(shape: str, depth: float) -> None:
+    # Mouth to mouth, so that tips meet tips.
+    boxes = parse_scene(SMALL, source="x").particle.boxes
+    mouth = boxes.vertices[0, 1]
+    found = pair(shape, Rotation.from_euler("z", 180, degrees=True), [0.0, 2 * mouth - depth, 0.0])
+    assert found == pytest.approx(max(0.0, depth), abs=1e-12)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
