@@ -118,6 +118,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=0.4, help="of the activity [s] (default: %(default)s)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="piles; what is costly has the first")
     parser.add_argument("--quick", action="store_true", help="a small pile, and little time")
+    parser.add_argument("--analyse", action="store_true", help="run nothing: table and figure of the rows in --out")
     parser.add_argument("--out", type=Path, default=None, help="folder (default: a new one); goes on if it exists")
     arguments = parser.parse_args()
     if arguments.quick:
@@ -126,10 +127,11 @@ def main() -> int:
         parser.error(f"--count {arguments.count}, --seconds {arguments.seconds:g}: at least 1 and {LOOK:g} s")
     folder = arguments.out or Path("out") / f"rivals-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
     folder.mkdir(parents=True, exist_ok=True)
-    for engine in arguments.engines:
+    engines = [] if arguments.analyse else arguments.engines
+    for engine in engines:
         if ENGINES[engine].missing:
             print(ENGINES[engine].missing)
-    present = [engine for engine in arguments.engines if ENGINES[engine].missing is None]
+    present = [engine for engine in engines if ENGINES[engine].missing is None]
     try:
         rows = run_all(folder, arguments, present)
     except InputError as error:

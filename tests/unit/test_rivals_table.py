@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ NUMBERS = (running.MEAN_DEPTH, running.BOX_DEPTH, running.PHI_REST, running.PHI_
 
 def row(engine: str, setting: str, cost: float, depth: float, **more: Any) -> dict[str, Any]:
     known = {"engine": engine, "setting": setting, "activity": SHAKE, "seed": 1, "account": False}
-    known |= {running.COUNT: 270, running.SECONDS: 0.4, running.STEP: 1e-4, "version": "1"}
+    known |= {running.COUNT: 270, running.SECONDS: 0.4, running.STEP: 1e-4, "version": "v1"}
     return {**known, **dict.fromkeys(NUMBERS, 0.1), running.COST: cost, running.DEPTH: depth, **more}
 
 
@@ -144,3 +145,20 @@ def test_what_cannot_be_run_ends_in_status_2(
         bench.main()
     assert stop.value.code == 2
     assert value in capsys.readouterr().err
+
+
+def test_rows_that_are_there_are_analysed_without_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pd.DataFrame(ROWS).to_csv(tmp_path / "rivals.csv", index=False)
+    monkeypatch.setattr(running, "run", lambda *_, **__: pytest.fail("ran"))
+    monkeypatch.setattr("sys.argv", ["rivals", "--analyse", "--out", str(tmp_path)])
+    assert bench.main() == 0
+    assert (tmp_path / "rivals.md").read_text() in capsys.readouterr().out
+    origin = json.loads((tmp_path / "rivals.json").read_text())
+    assert origin["versions"]["MuJoCo"] == "v1"
+    assert (origin["count"], origin["seconds"]) == (270, 0.4)
+    assert (tmp_path / "rivals.png").stat().st_size > 1000
+    assert len(pd.read_csv(tmp_path / "rivals_medians.csv")) == len(
+        {(each["engine"], each["setting"]) for each in ROWS}
+    )
