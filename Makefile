@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-mpi demo validate paper claims verify bench stability test lint types unit engine docs format lock clean
+.PHONY: help setup setup-mpi demo validate paper claims verify bench rivals stability test lint types unit engine docs format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -40,12 +40,17 @@ claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, f
 verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
 	$(BIN)/smarticles verify --engine both --out out/verify-$(STAMP)
 
-bench: setup ## measure speed, and what each effect costs (hours)
+bench: setup ## measure speed, what each effect costs, and rivals that are installed (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.scaling
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.effects
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.rivals
+
+rivals: setup ## install the engines that make bench compares with, into .venv (a minute); nothing else needs them
+	$(BIN)/python -m pip -qq --disable-pip-version-check install -r requirements.txt -r requirements-bench.txt
+	@command -v lmp >/dev/null || echo "LAMMPS is a package of Debian: apt-get install lammps"
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
 	for engine in yade links; do for part in onset figure cases; do \

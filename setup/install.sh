@@ -53,7 +53,7 @@ install_environment() {
     local requirements=(-r requirements.txt) key
     [ -n "$no_dev" ] || requirements+=(-r requirements-dev.txt)
     key=$(pwd && /usr/bin/python3 --version && echo "${requirements[*]}" &&
-        sha256sum setup/install.sh requirements*.txt requirements.in pyproject.toml)
+        sha256sum setup/install.sh requirements.txt requirements-dev.txt requirements.in pyproject.toml)
     [ "$key" != "$(cat .venv/installed 2>/dev/null)" ] || return 0
 
     echo "setup: installing Python packages into .venv (a minute)"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Regenerate the pins in requirements.txt and requirements-dev.txt from the two .in files.
+# Regenerate the pins in requirements.txt, requirements-dev.txt and requirements-bench.txt from the .in files.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 scratch=$(mktemp -d)
@@ -13,6 +13,8 @@ pins() { "${pip[@]}" freeze --all --exclude pip | sort -f; }
 pins >"$scratch/run"
 "${pip[@]}" install -r "$scratch/run" -r requirements-dev.in
 pins >"$scratch/all"
+"${pip[@]}" install -r "$scratch/all" -r requirements-bench.in
+pins >"$scratch/bench"
 
 {
     echo "# Made by 'make lock' from requirements.in; setuptools builds the project itself."
@@ -22,3 +24,8 @@ pins >"$scratch/all"
     echo "# Made by 'make lock' from requirements-dev.in; used together with requirements.txt."
     comm -13 <(sort "$scratch/run") <(sort "$scratch/all") | sort -f
 } >requirements-dev.txt
+
+{
+    echo "# Made by 'make lock' from requirements-bench.in; used together with requirements.txt, by 'make rivals' alone."
+    comm -13 <(sort "$scratch/all") <(sort "$scratch/bench") | sort -f
+} >requirements-bench.txt

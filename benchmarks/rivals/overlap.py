@@ -1,0 +1,146 @@
+"""How deep smarticles are in each other, from poses alone: one measure for all engines, whatever their shapes.
+
+Boxes are taken as deep in each other as the shortest push that parts them is long, swept segments (and spheres, which
+are segments of no length) as far as their axes are nearer than a diameter. Links of one smarticle are left out.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PARALLEL = 1e-9  # squared sine of an angle below which two edges have no common normal of their own
+
+
+class Solid(Protocol):
+    """The parts that smarticles are made of at one instant."""
+
+    @property
+    def owners(self) -> Indices:
+        """(B,) number of the smarticle that each part belongs to."""
+
+    def candidates(self) -> Indices:
+        """(P, 2) pairs of parts that may be in each other."""
+
+    def depths(self, pairs: Indices) -> Array:
+        """(P,) how deep pairs of parts are in each other [m]; not positive where they are apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Boxes.
+
+    Args:
+        centres: (B, 3) [m].
+        frames: (B, 3, 3) axes of each as columns [1].
+        halves: (B, 3) half its lengths along them [m].
+        owners: (B,) number of the smarticle that it belongs to.
+    """
+
+    centres: Array
+    frames: Array
+    halves: Array
+    owners: Indices
+
+    def candidates(self) -> Indices:
+        """See `Solid.candidates`."""
+        return _near(self.centres, np.linalg.norm(self.halves, axis=1))
+
+    def depths(self, pairs: Indices) -> Array:
+        """See `Solid.depths`: least overlap over the fifteen axes on which convex boxes can be told apart."""
+        one, other = pairs.T
+        between = self.centres[other] - self.centres[one]
+        frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
+        sides = np.concatenate([self.halves[one], self.halves[other]], axis=1)
+        axes = [frames[:, :, k] for k in range(6)]
+        axes += [np.cross(frames[:, :, i], frames[:, :, j]) for i, j in itertools.product(range(3), range(3, 6))]
+        least = np.full(len(pairs), np.inf)
+        for axis in axes:
+            squared = np.einsum("pi,pi->p", axis, axis)
+            unit = axis / np.sqrt(np.maximum(squared, PARALLEL))[:, None]
+            reach = np.einsum("pk,pk->p", np.abs(np.einsum("pi,pik->pk", unit, frames)), sides)
+            apart = reach - np.abs(np.einsum("pi,pi->p", unit, between))
+            least = np.where(squared > PARALLEL, np.minimum(least, apart), least)
+        return least
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """Segments swept by a sphere.
+
+    Args:
+        starts: (S, 3) [m].
+        ends: (S, 3) [m].
+        radius: of the sphere [m].
+        owners: (S,) number of the smarticle that it belongs to.
+    """
+
+    starts: Array
+    ends: Array
+    radius: float
+    owners: Indices
+
+    def candidates(self) -> Indices:
+        """See `Solid.candidates`."""
+        reaches = np.linalg.norm(self.ends - self.starts, axis=1) / 2 + self.radius
+        return _near((self.starts + self.ends) / 2, reaches)
+
+    def depths(self, pairs: Indices) -> Array:
+        """See `Solid.depths`."""
+        one, other = pairs.T
+        return 2 * self.radius - distances(self.starts[one], self.ends[one], self.starts[other], self.ends[other])
+
+
+def distances(starts: Array, ends: Array, others: Array, other_ends: Array) -> Array:
+    """(P,) distances [m] of pairs of segments, (P, 3) [m] each; segments may be points.
+
+    The least is between the points that the infinite lines have nearest, where both are on their segments, or at one of
+    the four ends.
+    """
+    u, v, w = ends - starts, other_ends - others, starts - others
+    uu, uv, vv = (np.einsum("pi,pi->p", a, b) for a, b in ((u, u), (u, v), (v, v)))
+    uw, vw = np.einsum("pi,pi->p", u, w), np.einsum("pi,pi->p", v, w)
+    determinant = uu * vv - uv**2
+    crossing = determinant > PARALLEL * uu * vv
+    safe = np.where(crossing, determinant, 1.0)
+    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
+    inside = crossing & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    lines = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
+    ends_to = [_to_segment(point, others, other_ends) for point in (starts, ends)]
+    ends_to += [_to_segment(point, starts, ends) for point in (others, other_ends)]
+    at_ends = np.min(ends_to, axis=0)
+    nearest: Array = np.where(inside, np.minimum(lines, at_ends), at_ends)
+    return nearest
+
+
+def deepest(solid: Solid) -> float:
+    """How deep the deepest two parts of different smarticles are in each other [m]; 0 where none are."""
+    pairs = solid.candidates()
+    pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
+    return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
+
+
+def _to_segment(points: Array, starts: Array, ends: Array) -> Array:
+    along = ends - starts
+    squared = np.einsum("pi,pi->p", along, along)
+    share = np.einsum("pi,pi->p", points - starts, along) / np.where(squared > 0, squared, 1.0)
+    nearest = starts + np.clip(share, 0.0, 1.0)[:, None] * along
+    apart: Array = np.linalg.norm(points - nearest, axis=1)
+    return apart
+
+
+def _near(centres: Array, reaches: Array) -> Indices:
+    """(P, 2) pairs whose spheres about their centres meet."""
+    pairs = cKDTree(centres).query_pairs(2 * float(reaches.max()), output_type="ndarray").astype(np.int64)
+    one, other = pairs.T
+    meet = np.linalg.norm(centres[one] - centres[other], axis=1) < reaches[one] + reaches[other]
+    near: Indices = pairs[meet]
+    return near
