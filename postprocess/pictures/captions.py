@@ -22,13 +22,14 @@ class Caption:
     lines: tuple[str, ...]
 
 
-def caption_of(frame: Frame, run: RunManifest, *, pace: str = "") -> Caption:
+def caption_of(frame: Frame, run: RunManifest, *, pace: str = "", force: float | None = None) -> Caption:
     """The caption of a frame.
 
     Args:
         frame: One of the run's frames.
         run: The run.
         pace: How fast a film plays; empty for a picture.
+        force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
     count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
@@ -40,6 +41,8 @@ def caption_of(frame: Frame, run: RunManifest, *, pace: str = "") -> Caption:
         mean = entanglement(frame.vertices).mean
         crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {crossings}")
+    if force is not None:
+        lines[-1] += f"   widest line: {1e3 * force:.3g} mN"
     return Caption(run.name, tuple(lines))
 
 

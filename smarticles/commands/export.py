@@ -70,7 +70,7 @@ fields, of each box:
     )
     export.add_argument("--time", type=float, metavar="S", help="simulated time [s], nearest frame; default: end")
     export.add_argument("--all", action="store_true", help="all frames: a folder of numbered files")
-    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings")
+    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings, forces")
     export.add_argument(
         "--without", dest="unwanted", type=_names, default=(), metavar="WHAT,…", help="bodies or fields to leave out"
     )
