@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.forces import FIXTURES, NONE, ContactForces
-from dem.body.state import State
 from dem.record.files import cannot_read
 from dem.record.frame import Frame, read_mesh
 from dem.record.names import FORCE, collection, member
@@ -24,20 +23,20 @@ NO_FORCES = "a run does where its scene says recording.contact_forces: true"
 _REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: true"
 
 
-def force_mesh(found: ContactForces, state: State, *, time: float, phase: int) -> meshio.Mesh:
+def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
     """All contacts as lines from the first smarticle's centre of mass to the second's, or to the point at a fixture.
 
     Args:
         found: the contacts.
-        state: the smarticles at the same instant.
+        positions: (N, 3) centres of mass of the smarticles at the same instant [m].
         time: simulated time [s].
         phase: index of the phase.
     """
     number, between = len(found.forces), found.fixtures == NONE
     ends = np.empty((number, 2, 3))
-    ends[:, 0] = state.positions[found.smarticles[:, 0]]
+    ends[:, 0] = positions[found.smarticles[:, 0]]
     ends[:, 1] = found.points
-    ends[between, 1] = state.positions[found.smarticles[between, 1]]
+    ends[between, 1] = positions[found.smarticles[between, 1]]
     values = {
         "first_smarticle": found.smarticles[:, 0],
         "first_link": found.links[:, 0],

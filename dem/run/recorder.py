@@ -85,7 +85,7 @@ class Recorder:
             self.frames.write(mesh, engine.time)
             if self.forces is not None:
                 found = engine.contact_forces()
-                self.forces.write(force_mesh(found, state, time=engine.time, phase=phase), engine.time)
+                self.forces.write(force_mesh(found, state.positions, time=engine.time, phase=phase), engine.time)
             self.series.keep_up()
         if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)

@@ -93,8 +93,9 @@ def _pressed(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
     """(N,) [N]."""
     forces = read_forces(frame)
     found, between = forces.contacts, forces.between
-    total: NDArray[np.float64] = np.bincount(found.smarticles[:, 0], weights=found.normal, minlength=frame.count)
-    total += np.bincount(found.smarticles[between, 1], weights=found.normal[between], minlength=frame.count)
+    total = np.zeros(frame.count)
+    np.add.at(total, found.smarticles[:, 0], found.normal)
+    np.add.at(total, found.smarticles[between, 1], found.normal[between])
     return total
 
 
