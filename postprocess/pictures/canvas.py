@@ -206,6 +206,8 @@ class Canvas:
             rgb=True,
             name="smarticles",
             opacity=1.0 if self._largest_force is None else _PALE,
+            # Of a closed box nobody sees the faces behind; drawing them took a quarter of a film's time.
+            culling=self._largest_force is None and "back",
             ambient=0.22,
             diffuse=0.85,
             specular=0.12,

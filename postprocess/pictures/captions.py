@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction that pictures tell, as the first column of `smarticles measure`."""
@@ -22,13 +27,21 @@ class Caption:
     lines: tuple[str, ...]
 
 
-def caption_of(frame: Frame, run: RunManifest, *, pace: str = "", force: float | None = None) -> Caption:
+def caption_of(
+    frame: Frame,
+    run: RunManifest,
+    *,
+    pace: str = "",
+    force: float | None = None,
+    crossings: NDArray[np.int64] | None = None,
+) -> Caption:
     """The caption of a frame.
 
     Args:
         frame: One of the run's frames.
         run: The run.
         pace: How fast a film plays; empty for a picture.
+        crossings: Of all smarticles, where they are known already.
         force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
     count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
@@ -38,7 +51,7 @@ def caption_of(frame: Frame, run: RunManifest, *, pace: str = "", force: float |
     if pace:
         lines[0] += f"   {pace}"
     if not run.planar:  # neither packing nor crossings have a meaning there
-        mean = entanglement(frame.vertices).mean
+        mean = entanglement(frame.vertices, crossings).mean
         crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {crossings}")
     if force is not None:

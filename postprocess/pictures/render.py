@@ -16,7 +16,7 @@ from postprocess.pictures import film
 from postprocess.pictures.camera import Look
 from postprocess.pictures.canvas import Canvas
 from postprocess.pictures.captions import caption_of
-from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.colouring import COLOURINGS, ColourScale
 from postprocess.pictures.focus import focused
 from postprocess.pictures.moments import MOST, RATE, Moments
 from postprocess.pictures.page import Page, page_size
@@ -250,7 +250,8 @@ class _Set:
         for shot, canvas, values, index in zip(self._shots, self._canvases, self._values, indices, strict=True):
             frame = shot.frames[index]
             panels.append(canvas.panel(frame, self.scale.colours(values[index])))
-            captions.append(caption_of(frame, shot.run, pace=pace, force=self._largest))
+            known = values[index] if self._look.colouring is COLOURINGS["crossings"] else None
+            captions.append(caption_of(frame, shot.run, pace=pace, force=self._largest, crossings=known))
         return self._page.picture(panels, captions)
 
 
