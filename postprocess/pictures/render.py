@@ -15,7 +15,7 @@ from dem.errors import InputError
 from postprocess.pictures import film
 from postprocess.pictures.camera import Look
 from postprocess.pictures.canvas import Canvas
-from postprocess.pictures.captions import caption_of
+from postprocess.pictures.captions import caption_of, titles_of
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
 from postprocess.pictures.focus import focused
 from postprocess.pictures.moments import MOST, RATE, Moments
@@ -207,6 +207,7 @@ class _Set:
     ) -> None:
         self._shots = shots
         self._look = look
+        self._titles = titles_of([shot.run for shot in shots])
         pairs = list(zip(shots, indices, strict=True))
         self._values = [dict(zip(frames, shot.values(frames, look), strict=True)) for shot, frames in pairs]
         self.scale = ColourScale.of(look.colouring, *self._span(limits))
@@ -247,11 +248,12 @@ class _Set:
     def picture(self, indices: Sequence[int], *, pace: str = "") -> Image.Image:
         """One picture of a frame of each run."""
         panels, captions = [], []
-        for shot, canvas, values, index in zip(self._shots, self._canvases, self._values, indices, strict=True):
+        parts = zip(self._shots, self._canvases, self._values, self._titles, indices, strict=True)
+        for shot, canvas, values, title, index in parts:
             frame = shot.frames[index]
             panels.append(canvas.panel(frame, self.scale.colours(values[index])))
             known = values[index] if self._look.colouring is COLOURINGS["crossings"] else None
-            captions.append(caption_of(frame, shot.run, pace=pace, force=self._largest, crossings=known))
+            captions.append(caption_of(frame, shot.run, pace=pace, title=title, force=self._largest, crossings=known))
         return self._page.picture(panels, captions)
 
 
