@@ -33,6 +33,7 @@ def refusals(error: ValidationError, data: Any, *, described: str) -> str:
         described: where the keys are described, for one that is missing.
     """
     told: dict[str, str] = {}
+    filled: set[str] = set()  # places of values that the file does not hold
     for found in error.errors(include_url=False):
         # A default that follows from other keys is not asked for where one of them is wrong; that is no second error.
         # Nor is a list too short whose items are there, but wrong.
@@ -42,10 +43,15 @@ def refusals(error: ValidationError, data: Any, *, described: str) -> str:
         text = _text(found["type"], found["msg"], found["input"], found.get("ctx", {}), unit_of(place))
         if found["type"] == "missing":
             text += f", see {described}"
+        given = found["type"] == "missing" or _is_given(found["loc"], data)
         if place:
             place += "." if _OWN_KEY.match(text) else ": "
         told.setdefault(place, text)  # of one value, what was found first
-    lines = [place + text for place, text in told.items()]
+        if not given:
+            filled.add(place)
+    # What was filled in from a value that is wrong is wrong in the same words, and no second error.
+    said = {text for place, text in told.items() if place not in filled}
+    lines = [place + text for place, text in told.items() if place not in filled or text not in said]
     more = f" (and {len(lines) - _MOST_ERRORS} more)" if len(lines) > _MOST_ERRORS else ""
     return "; also ".join(lines[:_MOST_ERRORS]) + more
 
@@ -149,3 +155,18 @@ def _key(steps: Sequence[int | str], data: Any) -> str:
         elif isinstance(here, list) and isinstance(step, int):
             here = here[step] if step < len(here) else None  # one that is missing
     return ".".join(keys)
+
+
+def _is_given(steps: Sequence[int | str], data: Any) -> bool:
+    """Whether the file holds the value at the end of pydantic's path."""
+    here = data
+    for step in steps:
+        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
+            continue
+        if isinstance(here, Mapping):
+            if step not in here:
+                return False
+            here = here[step]
+        elif isinstance(here, list) and isinstance(step, int) and step < len(here):
+            here = here[step]
+    return True

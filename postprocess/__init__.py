@@ -5,6 +5,7 @@ return frozen results. Lengths are in metres, times in seconds. `heights`,
 `entanglement` and `linking` are functions of the modules of the same name and are imported from there.
 """
 
+from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import PhaseRecord, RunManifest, read_run
@@ -27,6 +28,13 @@ from postprocess.measures.entanglement import (
     link_crossings,
     linking_pairs,
 )
+from postprocess.measures.force_chains import (
+    ForceDistribution,
+    force_chains,
+    force_distribution,
+    force_participation,
+    strong_contacts,
+)
 from postprocess.measures.heights import Heights, material_height
 from postprocess.measures.linking import Linking, gauss_integral
 from postprocess.measures.nematic import NematicOrder, nematic_order
@@ -41,6 +49,7 @@ __all__ = [
     "ContactPairs",
     "CrossingPairs",
     "Entanglement",
+    "ForceDistribution",
     "Frame",
     "FrameSequence",
     "Heights",
@@ -52,12 +61,16 @@ __all__ = [
     "PackingFraction",
     "PackingProfile",
     "PhaseRecord",
+    "RecordedForces",
     "RunManifest",
     "Series",
     "UndefinedMeasureError",
     "centres_of_mass",
     "contact_pairs",
     "crossing_pairs",
+    "force_chains",
+    "force_distribution",
+    "force_participation",
     "gauss_integral",
     "has_plane",
     "link_crossings",
@@ -72,10 +85,12 @@ __all__ = [
     "packing_profile",
     "pairs_in_contact",
     "profile_table",
+    "read_forces",
     "read_frame",
     "read_frames",
     "read_run",
     "read_series",
+    "strong_contacts",
     "summarise_run",
     "touching_pairs",
     "write_table",

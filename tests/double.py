@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.chain import Tie
+from dem.body.forces import ContactForces, at_fixtures, at_links, contacts_of_points
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -351,6 +352,20 @@ class EngineDouble:
     def overlaps(self, limit: float) -> Overlaps:
         deep = self._standing & (self.deepest > limit)
         return Overlaps(self.deepest, deep, 0.0)
+
+    def contact_forces(self) -> ContactForces:
+        """Those that stand, each pressed by its weight onto the floor below its middle link."""
+        standing = np.flatnonzero(self._standing)
+        points, up = self.positions[standing] * [1, 1, 0], np.tile([0.0, 0.0, 1.0], (len(standing), 1))
+        weight = self.particle.boxes.mass * self.gravity
+        return contacts_of_points(
+            at_links(standing, np.ones_like(standing)),
+            at_fixtures(np.zeros_like(standing)),
+            loads=np.full(len(standing), weight),
+            points=points + np.array([0.0, 0.0, self.fixtures.floor]),
+            friction=0 * up,
+            forces=weight * up,
+        )
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

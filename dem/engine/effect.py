@@ -28,6 +28,7 @@ class EffectName(StrEnum):
     ENERGY_ACCOUNT = "energy account"
     SERIES = "series"
     FRAMES = "frames"
+    CONTACT_FORCES = "contact forces"
     SPHERE_GLYPHS = "sphere glyphs"
     CHECKPOINTS = "checkpoints"
 

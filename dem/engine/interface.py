@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.chain import Tie
+from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -329,6 +330,9 @@ class Engine(Protocol):
 
     def overlaps(self, limit: float) -> Overlaps:
         """How deep contacts are at present, and who has some deeper than a limit [m]."""
+
+    def contact_forces(self) -> ContactForces:
+        """Forces at all contacts at present, or in the last step; contacts of one pair of links are one."""
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

@@ -131,6 +131,12 @@ def frames(scene: Scene) -> Call:
     return _every(scene.recording.frame_interval_s, "frame_interval_s", "a frame")
 
 
+def contact_forces(scene: Scene) -> Call:
+    """Forces at contacts, where asked for."""
+    asked = scene.recording.contact_forces
+    return asked, "with each frame" if asked else "recording.contact_forces is false"
+
+
 def sphere_glyphs(scene: Scene) -> Call:
     """Frames of spheres."""
     return _every(scene.recording.sphere_interval_s, "sphere_interval_s", "all spheres")

@@ -15,6 +15,7 @@ from dem.plan import calls
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
+    FORCE_FIELDS,
     HOOK_COLUMNS,
     LEDGER_COLUMNS,
     MOTOR_COLUMNS,
@@ -125,6 +126,15 @@ EFFECTS = (
             ),
             files=("frames.pvd", "frames"),
             python="reads all contacts and writes one file per frame",
+        ),
+    ),
+    Effect(
+        name=EffectName.CONTACT_FORCES,
+        rule=calls.contact_forces,
+        adds=Adds(
+            arrays=tuple(FORCE_FIELDS),
+            files=("forces.pvd", "forces"),
+            python="reads the forces of all contacts and writes one file per frame",
         ),
     ),
     Effect(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dem.scene.scene import Scene
-from dem.setting.protocol import PARTS, PROTOCOLS
+from dem.setting.protocol import PARTS, PROTOCOLS, leaves_alone
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
@@ -26,7 +26,7 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 def _keys(scene: Scene, says: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
     """Key, the scene's value, and the protocol's, of all that the protocol speaks of."""
     for part in PARTS:
-        if part == "container" and (scene.plane is not None or scene.container.tiers is not None):
+        if leaves_alone(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
             continue
         for key, value in says[part].items():
             yield f"{part}.{key}", getattr(getattr(scene, part), key), value

@@ -147,6 +147,22 @@ FIELDS: Columns = {
     "floor_z_m": Column("m", "floor z", "height of the container's floor, likewise; heights are measured from it"),
     "phase": Column("1", "phase", "index of the phase in the scene, likewise"),
 }
+# Of the files of forces, one value per contact; only with `recording.contact_forces`.
+FORCE_FIELDS: Columns = {
+    "first_smarticle": Column("1", "first", "number of the one that the force acts on"),
+    "first_link": Column("1", "first link", "0 barb 1, 1 middle link, 2 barb 2"),
+    "second_smarticle": Column("1", "second", "number of the one that exerts it, the higher one; -1 for a fixture"),
+    "second_link": Column("1", "second link", "likewise; -1 for a fixture"),
+    "fixture": Column(
+        "1", "fixture", "-1 none, 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls"
+    ),
+    "normal_force_N": Column("N", "normal force", "sum of those at the points of contact; above 0"),
+    "tangential_force_N": Column("N", "tangential force", "size of the sum of those at the points of contact"),
+    "force_N": Column("N", "force", "on the first one (x, y, z), all points of contact together"),
+    "point_m": Column("m", "point", "where it acts (x, y, z), mean of the points, weighted by their normal forces"),
+    "time_s": Column("s", "time", "simulated time, the same for all contacts"),
+    "phase": Column("1", "phase", "index of the phase in the scene, likewise"),
+}
 # Only in scenes that actuate.
 MOTOR_FIELDS: Columns = {
     "angle_rad": Column("rad", "angle", "of a barb, 0 straight, pi/2 the U; NaN on middle links"),

@@ -204,10 +204,20 @@ def read_frame(path: Path | str) -> Frame:
         ARCHITECTURE.md, "The run directory".
     """
     path = Path(path)
-    return _FrameReader(path, _read_mesh(path)).frame()
+    return _FrameReader(path, read_mesh(path)).frame()
 
 
-def _read_mesh(path: Path) -> Any:
+def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
+    """A file of VTK as meshio has it.
+
+    Args:
+        path: the file.
+        what: what it is, for messages.
+        remedy: what to do about one that cannot be read; None: that of frames.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     # meshio's own dispatch prints and calls sys.exit on damaged files, hence the format's reader;
     # that one fails with whatever exception the damaged bytes happen to cause, or prints a warning
     # and goes on, which the checks of shapes catch.
@@ -220,10 +230,10 @@ def _read_mesh(path: Path) -> Any:
         ):
             return meshio.vtu.read(str(path))
     except OSError as error:
-        cannot_read("frame", path, error, _remedy(path))
+        cannot_read(what, path, error, remedy or _remedy(path))
     except (Exception, SystemExit) as error:
         cause = f"truncated or not VTK ({type(error).__name__})"
-        cannot_read("frame", path, cause, _remedy(path))
+        cannot_read(what, path, cause, remedy or _remedy(path))
 
 
 class _FrameReader:

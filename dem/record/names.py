@@ -18,6 +18,8 @@ FRAME = "frame"
 """Noun of the pictures of centrelines; see `collection` and `member`."""
 SPHERE = "sphere"
 """Noun of the pictures of spheres."""
+FORCE = "force"
+"""Noun of the pictures of forces at contacts."""
 
 MANIFEST_FORMAT = 1
 SERIES_FORMAT = 1

@@ -17,7 +17,7 @@ from dem.engine.kinds import engine_kind
 from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter
-from dem.record.names import SPHERE
+from dem.record.names import FORCE, SPHERE
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
@@ -56,6 +56,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
         progress=progress,
         interval=recording.series_interval_s,
         frame_every=recording.samples_in(recording.frame_interval_s),
+        forces=FrameWriter(out, FORCE) if called_for(scene, EffectName.CONTACT_FORCES) else None,
         spheres=FrameWriter(out, SPHERE) if called_for(scene, EffectName.SPHERE_GLYPHS) else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )

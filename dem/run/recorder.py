@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dem.body.state import State
 from dem.engine.interface import Engine
+from dem.record.forces import force_mesh
 from dem.record.frame import frame_mesh, sphere_mesh
 from dem.record.frames import FrameWriter
 from dem.record.progress import ProgressWriter
@@ -37,6 +38,7 @@ class Recorder:
         interval: time between samples [s].
         frame_every: samples between frames.
         watch_every: samples between the watchdog's looks; None: as many as have `WATCH_STEPS` steps, about.
+        forces: writes the forces at contacts, with each frame; None: nobody does.
         spheres: writes the spheres as points; None: nobody does.
         sphere_every: samples between these.
     """
@@ -50,6 +52,7 @@ class Recorder:
     interval: float
     frame_every: int
     watch_every: int | None = None
+    forces: FrameWriter | None = None
     spheres: FrameWriter | None = None
     sphere_every: int = 1
     samples: int = 0
@@ -80,6 +83,9 @@ class Recorder:
                 halted=None if motors is None else motors.halted,
             )
             self.frames.write(mesh, engine.time)
+            if self.forces is not None:
+                found = engine.contact_forces()
+                self.forces.write(force_mesh(found, state.positions, time=engine.time, phase=phase), engine.time)
             self.series.keep_up()
         if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
@@ -118,12 +124,16 @@ class Recorder:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns of the series."""
-        spheres = {} if self.spheres is None else {"spheres": self.spheres.times}
+        asked = {
+            name: writer.times
+            for name, writer in (("forces", self.forces), ("spheres", self.spheres))
+            if writer is not None
+        }
         return {
             "samples": self.samples,
             "next_step": self.next_step,
             "frames": self.frames.times,
-            **spheres,
+            **asked,
             "series": self.sampler.memory,
         }
 
@@ -138,5 +148,6 @@ class Recorder:
     def truncate(self, memory: Mapping[str, Any]) -> None:
         """Keep the frames of `memory` only; of an empty one none."""
         self.frames.truncate(memory.get("frames", []))
-        if self.spheres is not None:
-            self.spheres.truncate(memory.get("spheres", []))
+        for name, writer in (("forces", self.forces), ("spheres", self.spheres)):
+            if writer is not None:
+                writer.truncate(memory.get(name, []))

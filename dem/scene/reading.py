@@ -104,6 +104,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     data = scene.model_dump(mode="json")
     if scene.engine == DEFAULT_ENGINE:
         del data["engine"]
+    _leave_out(data["recording"], {"contact_forces": False})
     if scene.hooks is not None:
         _leave_out(data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1})
     if scene.protocol is None:

@@ -37,6 +37,11 @@ PROTOCOLS: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType(
 PARTS = ("motor", "contact", "container")
 
 
+def leaves_alone(part: str, *, plane: bool, tiers: bool) -> bool:
+    """Whether a protocol says nothing of a part: a plane has no container, and a mould of tiers no one radius."""
+    return part == "container" and (plane or tiers)
+
+
 def with_protocol(data: Any) -> Any:
     """A scene's data with what its protocol says where it is silent itself.
 
@@ -51,9 +56,9 @@ def with_protocol(data: Any) -> Any:
     filled = dict(data)
     for part in PARTS:
         given = data.get(part, {})
-        # A plane has no container, and a mould of tiers no one radius.
-        without = part == "container" and ("plane" in data or (isinstance(given, Mapping) and given.get("tiers")))
-        if isinstance(given, Mapping) and not without:
+        if not isinstance(given, Mapping):
+            continue
+        if not leaves_alone(part, plane=data.get("plane") is not None, tiers=bool(given.get("tiers"))):
             filled[part] = {**says[part], **given}
     if isinstance(data.get("phases"), list | tuple):
         filled["phases"] = [_filled(phase, says) for phase in data["phases"]]

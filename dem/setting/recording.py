@@ -19,6 +19,11 @@ class Recording(Part):
         description="time between VTK files of the spheres that stand for the smarticles, for ParaView's glyphs [s]; "
         "null: none",
     )
+    contact_forces: bool = Field(
+        False,
+        strict=True,
+        description="whether to record with each frame, in a file of its own, the forces at all contacts: force chains",
+    )
     series_interval_s: Duration = Field(0.004, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
         False,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from made.columns import export_fields, frame_fields, measure_columns, packing_definitions, series_columns
+from made.columns import export_fields, force_fields, frame_fields, measure_columns, packing_definitions, series_columns
 from made.commands import command_help, command_list
 from made.findings import results_index
 from made.mathml import show_block, show_inline
@@ -24,6 +24,7 @@ MADE: Mapping[str, Callable[[], str]] = MappingProxyType(
         "command help": command_help,
         "command list": command_list,
         "export fields": export_fields,
+        "force fields": force_fields,
         "frame fields": frame_fields,
         "measure columns": measure_columns,
         "packing definitions": packing_definitions,

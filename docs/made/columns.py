@@ -50,6 +50,14 @@ def frame_fields() -> str:
     return "\n".join(parts)
 
 
+def force_fields() -> str:
+    """Cell data of a file of forces, one value per contact."""
+    from dem.record.columns import FORCE_FIELDS  # noqa: PLC0415
+
+    rows = [(code(name), cell(field.unit), cell(field.description)) for name, field in FORCE_FIELDS.items()]
+    return table(("field", "unit", "what"), rows)
+
+
 def export_fields() -> str:
     """Fields of exported bodies."""
     from postprocess.export.fields import FIELDS  # noqa: PLC0415

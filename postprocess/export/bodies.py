@@ -16,11 +16,14 @@ import numpy as np
 import pyvista as pv
 
 from dem.errors import InputError, nearest
+from dem.record.forces import NO_FORCES, has_forces, read_forces
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.export.fields import Field, link_values
 from postprocess.measures.entanglement import link_passages
+from postprocess.measures.force_chains import strong_contacts
 from postprocess.pictures.canvas import link_boxes
+from postprocess.pictures.force_lines import force_lines, force_tubes
 from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.pictures.surroundings import Bounds, Surroundings, read_surroundings
 from postprocess.scene_file import read_phases, read_scene
@@ -36,14 +39,13 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "hooks": "the two crosses",
         "strings": "the two of a strain test, as lines",
         "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
+        "forces": "on request: lines from centre to contact to centre, where the run records forces",
     }
 )
 """What can be exported, and what it is."""
 
-ON_REQUEST = ("crossings",)
+ON_REQUEST = ("crossings", "forces")
 """Of these, what is left out unless asked for."""
-
-FORCE_CHAINS = "force-chains"
 
 ROUND = 96
 """Corners of a circle."""
@@ -61,12 +63,6 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
         InputError: An unknown kind, or nothing is left.
     """
     for name in (*wanted, *(name for name in unwanted if name not in also)):
-        if name == FORCE_CHAINS:
-            msg = (
-                f"{name}: frames record how many smarticles touch, and no force between them; "
-                "leave it out, or export crossings"
-            )
-            raise InputError(msg)
         if name not in KINDS:
             known = [*KINDS, *(also if name in unwanted else ())]
             msg = f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}"
@@ -120,6 +116,9 @@ class Bodies:
         Raises:
             InputError: Its scene or its series is damaged.
         """
+        if "forces" in kinds and not has_forces(run.directory):
+            msg = f"{run.directory}: records no forces; {NO_FORCES}"
+            raise InputError(msg)
         return cls(run, read_surroundings(run), read_strings(run) if run.planar else None, kinds, fields)
 
     def hold(self, frames: Iterable[Frame]) -> None:
@@ -141,6 +140,7 @@ class Bodies:
             "hooks": self._hooks,
             "strings": self._lines,
             "crossings": self._crossings,
+            "forces": self._forces,
         }
         made = {kind: makers[kind](frame) for kind in self.kinds}
         return {kind: mesh for kind, mesh in made.items() if mesh is not None and mesh.n_points}
@@ -230,6 +230,29 @@ class Bodies:
         mesh.point_data["direction"] = along / np.linalg.norm(along, axis=1, keepdims=True)
         return mesh
 
+    def _forces(self, frame: Frame) -> pv.PolyData | None:
+        forces = read_forces(frame)
+        found = forces.contacts
+        if not len(found.normal):
+            return None
+        mesh = force_lines(forces)
+        above = np.zeros(len(found.normal), dtype=np.int64)
+        if forces.between.any():
+            above[forces.between] = strong_contacts(found.normal[forces.between])
+        first, second = found.smarticles.T
+        values = {
+            "first_id": frame.smarticle_ids[first],  # as the field smarticle_id has them
+            "second_id": np.where(second < 0, second, frame.smarticle_ids[second]),
+            "fixture": found.fixtures,
+            "normal_force_N": found.normal,
+            "tangential_force_N": found.tangential,
+            "force_N": found.forces,
+            "strong": above,
+        }
+        for name, each in values.items():
+            mesh.cell_data[name] = each[mesh.cell_data["contact"]]
+        return mesh
+
 
 def cross(bars: Sequence[Bounds], height: float) -> pv.PolyData:
     """One hook, its centre at a height [m]; six quadrilaterals for each bar."""
@@ -239,11 +262,15 @@ def cross(bars: Sequence[Bounds], height: float) -> pv.PolyData:
 def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:
     """A body as triangles alone, for files that know nothing else.
 
-    Strings become tubes a fifth of a link thick, crossings arrows a third of w long; boxes stay what they are.
+    Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
+    most, whose thickness is in proportion to the normal force; boxes stay what they are.
     """
     thin = min(run.thickness_in_plane, run.thickness_normal)
     if kind == "strings":
         mesh = mesh.tube(radius=thin / 10, n_sides=8, capping=True)
+    if kind == "forces":
+        normal = np.asarray(mesh.cell_data["normal_force_N"])
+        mesh = force_tubes(mesh, normal, thickest=thin / 2, largest=float(normal.max()))
     if kind == "crossings":
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
         mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)

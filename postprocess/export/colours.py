@@ -42,6 +42,7 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
         "hooks": Paint("#b3261e"),
         "strings": Paint("#5b4636"),
         "crossings": Paint("#1a1a1a"),
+        "forces": Paint("#a11a2e"),
     }
 )
 """As in the pictures."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dem.errors import InputError, nearest
+from dem.record.forces import has_forces, read_forces
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
@@ -17,6 +18,7 @@ from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
+from postprocess.measures.force_chains import force_chains
 from postprocess.measures.registry import in_space
 from postprocess.pictures.colouring import COLOURINGS
 
@@ -85,6 +87,24 @@ def _local_packing(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
         return np.full(frame.count, np.nan)
     closed = np.isfinite(found) & (found > 0)
     return np.where(closed, run.solid_volume / np.where(closed, found, 1.0), np.nan)
+
+
+def _pressed(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
+    """(N,) [N]."""
+    forces = read_forces(frame)
+    found, between = forces.contacts, forces.between
+    total = np.zeros(frame.count)
+    np.add.at(total, found.smarticles[:, 0], found.normal)
+    np.add.at(total, found.smarticles[between, 1], found.normal[between])
+    return total
+
+
+def _chain(frame: Frame, _: RunManifest) -> NDArray[Any]:
+    """(N,) numbers; each its own where nobody touches."""
+    try:
+        return force_chains(frame).labels
+    except UndefinedMeasureError:
+        return np.arange(frame.count)
 
 
 FIELDS: tuple[Field, ...] = (
@@ -167,6 +187,21 @@ FIELDS: tuple[Field, ...] = (
         take=_local_packing,
         told_of=lambda run: in_space(run) and run.container_tiers == 1,
         costly=True,
+    ),
+    Field(
+        name="normal_force_N",
+        unit="N",
+        meaning="sum of the normal forces at all its contacts, fixtures among them; runs that record forces",
+        take=_pressed,
+        told_of=lambda run: has_forces(run.directory),
+    ),
+    Field(
+        name="force_chain",
+        unit="-",
+        kind="name",
+        meaning="number of its cluster of smarticles joined by forces above the mean, 0 the largest; likewise",
+        take=_chain,
+        told_of=lambda run: has_forces(run.directory),
     ),
     Field(
         name="angle_rad",

@@ -28,9 +28,16 @@ def paraview_here() -> Any:
 
 simple = paraview_here()
 
-COLOURS = {"wall": "#9db4c8", "floor": "#e9e9e7", "hooks": "#b3261e", "strings": "#5b4636", "crossings": "#1a1a1a"}
+COLOURS = {
+    "wall": "#9db4c8",
+    "floor": "#e9e9e7",
+    "hooks": "#b3261e",
+    "strings": "#5b4636",
+    "crossings": "#1a1a1a",
+    "forces": "#a11a2e",
+}
 SIZE = [1000, 800]  # pixels
-KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings")
+KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces")
 
 
 def rgb(colour: str) -> list[float]:
@@ -143,11 +150,24 @@ def arrows(kind: str, source: Any, view: Any) -> None:
     plain(kind, glyph, view)
 
 
+def forces(kind: str, source: Any, view: Any) -> None:
+    """Tubes as thick as the normal forces are large, the largest a link thick, through smarticles that show them."""
+    data = simple.CellDatatoPointData(registrationName="normal forces", Input=source)
+    data.UpdatePipeline()
+    largest = data.PointData.GetArray("normal_force_N").GetRange()[1]
+    tubes = simple.Tube(registrationName=kind, Input=data)
+    tubes.Scalars, tubes.VaryRadius = ["POINTS", "normal_force_N"], "By Absolute Scalar"
+    tubes.Radius = 3e-4 / largest
+    plain(kind, tubes, view)
+    simple.GetDisplayProperties(simple.FindSource("smarticles"), view).Opacity = 0.25
+
+
 SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
     "smarticles": boxes,
     "wall": wall,
     "strings": strings,
     "crossings": arrows,
+    "forces": forces,
 }
 
 

@@ -56,7 +56,7 @@ def contact_clusters(vertices: ArrayLike, distance: float) -> Clusters:
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = contact_pairs(vertices, distance)
-    return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
 def entanglement_clusters(vertices: ArrayLike) -> Clusters:
@@ -73,7 +73,7 @@ def entanglement_clusters(vertices: ArrayLike) -> Clusters:
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = crossing_pairs(vertices)
-    return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
 def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
@@ -91,7 +91,7 @@ def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = touching_pairs(vertices, diameter)
-    return _clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
 def contact_graph(frame: Frame, run: RunManifest) -> Clusters:
@@ -102,7 +102,7 @@ def contact_graph(frame: Frame, run: RunManifest) -> Clusters:
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = pairs_in_contact(frame, run)
-    return _clusters(frame.count, pairs.i, pairs.j)
+    return joined_clusters(frame.count, pairs.i, pairs.j)
 
 
 def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, floor_z: float) -> bool:
@@ -155,7 +155,12 @@ def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wal
     return False
 
 
-def _clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Clusters:
+def joined_clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Clusters:
+    """Clusters of so many smarticles of which some are joined, the i-th with the j-th.
+
+    Raises:
+        UndefinedMeasureError: There is no smarticle.
+    """
     if count == 0:
         msg = "a cluster needs at least 1 smarticle: got 0"
         raise UndefinedMeasureError(msg)

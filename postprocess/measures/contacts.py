@@ -1,8 +1,7 @@
 """Which smarticles touch, lie close to each other, or touch nothing.
 
-Contacts are counted by the engine and pairs found from vertices. There are no force chains here: a frame holds how many
-others each smarticle touches, but neither which nor the forces. They would need, per contact, both smarticles, the
-point, and the force (3,) [N], which only the engine has.
+Contacts are counted by the engine and pairs found from vertices: a frame holds how many others each smarticle touches,
+not which. Where a scene asks for the forces at contacts these are recorded beside, see `force_chains`.
 """
 
 from __future__ import annotations

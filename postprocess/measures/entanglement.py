@@ -90,11 +90,12 @@ class Entanglement:
     mean: float
 
 
-def entanglement(vertices: ArrayLike) -> Entanglement:
+def entanglement(vertices: ArrayLike, crossings: NDArray[np.int64] | None = None) -> Entanglement:
     """Crossings of all smarticles, with what the mean needs to skip.
 
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        crossings: What `link_crossings` found of them, where that is known already.
 
     Returns:
         The crossings and their mean.
@@ -108,7 +109,7 @@ def entanglement(vertices: ArrayLike) -> Entanglement:
     """
     vertices = checked_vertices(vertices)
     planes = has_plane(vertices)
-    crossings = link_crossings(vertices)
+    crossings = link_crossings(vertices) if crossings is None else crossings
     mean = float(crossings[planes].mean()) if np.any(planes) else float("nan")
     return Entanglement(crossings=crossings, has_plane=planes, mean=mean)
 

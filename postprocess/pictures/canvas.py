@@ -1,4 +1,4 @@
-"""The canvas of a picture: container, lights and smarticles, drawn by VTK. The only module here that imports PyVista.
+"""The canvas of a picture: container, lights and smarticles, drawn by VTK. It and `force_lines` alone import PyVista.
 
 The three-dimensional part is drawn at twice its size and scaled down; what stands around it is set by
 `postprocess.pictures.page`. No display is needed: VTK falls back to EGL.
@@ -20,6 +20,7 @@ import numpy as np
 from PIL import Image
 
 from dem.errors import InputError, RunError
+from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
@@ -33,6 +34,7 @@ from postprocess.pictures.camera import (
     millimetres_per_pixel,
     wall_corners,
 )
+from postprocess.pictures.force_lines import force_lines, force_tubes
 from postprocess.pictures.surroundings import Bounds, Surroundings
 
 with warnings.catch_warnings():
@@ -48,6 +50,9 @@ if TYPE_CHECKING:
 
 _OVERSAMPLING = 2
 _FIXTURE = "#b3261e"  # of hooks and strings
+_FORCE = "#a11a2e"
+_PALE = 0.15  # opacity of smarticles that let forces be seen
+_THICK = 0.8  # radius of the thickest line of force, in the thickness of a link
 
 # Corners of a box (along, in plane, normal) and its faces, seen from outside.
 _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
@@ -104,6 +109,7 @@ class Canvas:
         extent: (n, 3) [mm], what the camera has in view.
         axes: (3, 3) rows: right, up and forward from the camera; those of the look if not given.
         quick: Whether to draw as films are: without the shade in corners, which takes most of the time of a still.
+        largest_force: Normal force of the thickest line of force [N]; None: no forces are drawn.
     """
 
     def __init__(
@@ -115,8 +121,10 @@ class Canvas:
         *,
         axes: NDArray[np.float64] | None = None,
         quick: bool = False,
+        largest_force: float | None = None,
     ) -> None:
         self._run = run
+        self._largest_force = largest_force
         self._look = look
         self._axes = look.axes if axes is None else axes
         self._surroundings = surroundings
@@ -167,6 +175,8 @@ class Canvas:
         with _quiet_vtk():
             self._set_boxes(frame, colours)
             self._move(frame)
+            if self._largest_force is not None:
+                self._press(frame, self._largest_force)
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
         return np.asarray(Image.fromarray(pixels).reduce(_OVERSAMPLING))
@@ -195,6 +205,9 @@ class Canvas:
             scalars="colour",
             rgb=True,
             name="smarticles",
+            opacity=1.0 if self._largest_force is None else _PALE,
+            # Of a closed box nobody sees the faces behind; drawing them took a quarter of a film's time.
+            culling=self._largest_force is None and "back",
             ambient=0.22,
             diffuse=0.85,
             specular=0.12,
@@ -270,6 +283,18 @@ class Canvas:
         knots = [pv.Sphere(radius=3 * thick, center=end) for ends in lifted for end in ends]
         mesh = tubes[0].append_polydata(*tubes[1:], *knots)
         self._plotter.add_mesh(mesh, name="strings", color=_FIXTURE, lighting=False, reset_camera=False, render=False)
+
+    def _press(self, frame: Frame, largest: float) -> None:
+        """Draws lines of force, the thickest for the largest normal force [N]."""
+        self._plotter.remove_actor("forces", render=False)
+        forces = read_forces(frame)
+        if not len(forces.contacts.normal):
+            return
+        lines, thickest = force_lines(forces), _THICK * self._run.thickness_in_plane
+        normal = forces.contacts.normal[lines.cell_data["contact"]]
+        tubes = force_tubes(lines, normal, thickest=thickest, largest=largest)
+        tubes.points = (tubes.points - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
+        self._plotter.add_mesh(tubes, name="forces", color=_FORCE, ambient=0.35, reset_camera=False, render=False)
 
     def _add_container(self, around: Surroundings, radius: float, top: float) -> None:
         plotter, forward = self._plotter, self._axes[2]

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction that pictures tell, as the first column of `smarticles measure`."""
@@ -22,13 +28,38 @@ class Caption:
     lines: tuple[str, ...]
 
 
-def caption_of(frame: Frame, run: RunManifest, *, pace: str = "") -> Caption:
+def titles_of(runs: Sequence[RunManifest]) -> list[str]:
+    """What pictures of runs beside each other are called: by their names, with their folders where these are alike."""
+    names = [run.name for run in runs]
+    if len(set(names)) == len(names):
+        return names
+    folders = [run.directory.resolve() for run in runs]
+    # As much of the path as tells them apart: runs of sweeps differ in their last part, others may not.
+    depth = 1
+    longest = max(len(folder.parts) for folder in folders)
+    while len({folder.parts[-depth:] for folder in folders}) < len(set(folders)) and depth < longest:
+        depth += 1
+    return [f"{name} ({'/'.join(folder.parts[-depth:])})" for name, folder in zip(names, folders, strict=True)]
+
+
+def caption_of(
+    frame: Frame,
+    run: RunManifest,
+    *,
+    pace: str = "",
+    force: float | None = None,
+    crossings: NDArray[np.int64] | None = None,
+    title: str | None = None,
+) -> Caption:
     """The caption of a frame.
 
     Args:
         frame: One of the run's frames.
         run: The run.
         pace: How fast a film plays; empty for a picture.
+        title: What the run is called; its name if not given.
+        crossings: Of all smarticles, where they are known already.
+        force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
     count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
@@ -37,10 +68,12 @@ def caption_of(frame: Frame, run: RunManifest, *, pace: str = "") -> Caption:
     if pace:
         lines[0] += f"   {pace}"
     if not run.planar:  # neither packing nor crossings have a meaning there
-        mean = entanglement(frame.vertices).mean
-        crossings = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
-        lines.append(f"{packing_text(frame, run)}   {crossings}")
-    return Caption(run.name, tuple(lines))
+        mean = entanglement(frame.vertices, crossings).mean
+        passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
+        lines.append(f"{packing_text(frame, run)}   {passed}")
+    if force is not None:
+        lines[-1] += f"   widest line: {1e3 * force:.3g} mN"
+    return Caption(run.name if title is None else title, tuple(lines))
 
 
 def packing_text(frame: Frame, run: RunManifest) -> str:

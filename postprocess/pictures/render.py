@@ -15,8 +15,8 @@ from dem.errors import InputError
 from postprocess.pictures import film
 from postprocess.pictures.camera import Look
 from postprocess.pictures.canvas import Canvas
-from postprocess.pictures.captions import caption_of
-from postprocess.pictures.colouring import ColourScale
+from postprocess.pictures.captions import caption_of, titles_of
+from postprocess.pictures.colouring import COLOURINGS, ColourScale
 from postprocess.pictures.focus import focused
 from postprocess.pictures.moments import MOST, RATE, Moments
 from postprocess.pictures.page import Page, page_size
@@ -41,6 +41,7 @@ def render_run(
     smarticle: int | None = None,
     size: tuple[int, int] = (1200, 1200),
     view: str | None = None,
+    forces: bool = False,
     overwrite: bool = False,
 ) -> Path:
     """Draws one frame of a run: every link as its real box, in a container cut open in front, with hooks and strings.
@@ -60,6 +61,8 @@ def render_run(
             its mouth.
         size: Width and height of the picture of one run [pixel].
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
+        forces: Whether lines of force are drawn, through smarticles that let them be seen; as thick as the normal force
+            is large.
         overwrite: Whether an existing file may be replaced.
 
     Returns:
@@ -83,12 +86,12 @@ def render_run(
     # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
     figures.refuse_to_overwrite(output, overwrite=overwrite)
     if smarticle is not None:
-        if compare or color_by is not None or view is not None:
+        if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
             raise InputError(msg)
         image = focused(shots[0], indices[0][0], smarticle, size)
     else:
-        with _Set(shots, indices, look, limits, quick=False) as scenery:
+        with _Set(shots, indices, look, limits, quick=False, forces=forces) as scenery:
             image = scenery.picture([frames[0] for frames in indices])
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
@@ -109,6 +112,7 @@ def render_film(
     end: float | None = None,
     every: float | None = None,
     most_frames: int = MOST,
+    forces: bool = False,
     track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
@@ -131,6 +135,7 @@ def render_film(
         end: Simulated time at which it ends [s]; that of the last frame if not given.
         every: Simulated time from one picture to the next [s]; if not given, that between frames.
         most_frames: Unless `every` is given, longer runs are thinned evenly to so many pictures.
+        forces: As in `render_run`; the thickest line is that of the largest force of the film.
         track: Follows the drawing, see `Track`.
         overwrite: Whether an existing file may be replaced.
 
@@ -155,7 +160,7 @@ def render_film(
     figures.refuse_to_overwrite(output, overwrite=overwrite)
     numbers = range(len(moments.times))
     with (
-        _Set(shots, indices, look, limits, quick=True) as scenery,
+        _Set(shots, indices, look, limits, quick=True, forces=forces) as scenery,
         figures.whole_file(output, overwrite=overwrite) as temporary,
     ):
 
@@ -184,21 +189,38 @@ class _Set:
         look: Of each.
         limits: Ends of the scale.
         quick: See `Canvas`.
+        forces: Whether lines of force are drawn.
+
+    Raises:
+        InputError: A run records no forces, or as in `render_run`.
     """
 
     def __init__(
-        self, shots: Sequence[Shot], indices: Sequence[Sequence[int]], look: Look, limits: Limits, *, quick: bool
+        self,
+        shots: Sequence[Shot],
+        indices: Sequence[Sequence[int]],
+        look: Look,
+        limits: Limits,
+        *,
+        quick: bool,
+        forces: bool,
     ) -> None:
         self._shots = shots
         self._look = look
+        self._titles = titles_of([shot.run for shot in shots])
         pairs = list(zip(shots, indices, strict=True))
         self._values = [dict(zip(frames, shot.values(frames, look), strict=True)) for shot, frames in pairs]
         self.scale = ColourScale.of(look.colouring, *self._span(limits))
+        self._largest = max(shot.largest_force(frames) for shot, frames in pairs) if forces else None
         extents = [shot.extent(frames, look) for shot, frames in pairs]
         self._stack = ExitStack()
         with ExitStack() as stack:
             self._canvases = [
-                stack.enter_context(Canvas(shot.run, look, shot.around, np.concatenate(extents), quick=quick))
+                stack.enter_context(
+                    Canvas(
+                        shot.run, look, shot.around, np.concatenate(extents), quick=quick, largest_force=self._largest
+                    )
+                )
                 for shot in shots
             ]
             self._stack = stack.pop_all()
@@ -226,10 +248,12 @@ class _Set:
     def picture(self, indices: Sequence[int], *, pace: str = "") -> Image.Image:
         """One picture of a frame of each run."""
         panels, captions = [], []
-        for shot, canvas, values, index in zip(self._shots, self._canvases, self._values, indices, strict=True):
+        parts = zip(self._shots, self._canvases, self._values, self._titles, indices, strict=True)
+        for shot, canvas, values, title, index in parts:
             frame = shot.frames[index]
             panels.append(canvas.panel(frame, self.scale.colours(values[index])))
-            captions.append(caption_of(frame, shot.run, pace=pace))
+            known = values[index] if self._look.colouring is COLOURINGS["crossings"] else None
+            captions.append(caption_of(frame, shot.run, pace=pace, title=title, force=self._largest, crossings=known))
         return self._page.picture(panels, captions)
 
 

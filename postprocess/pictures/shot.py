@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from dem.errors import InputError
+from dem.record.forces import NO_FORCES, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import RunManifest, read_run
 from postprocess.pictures.camera import Look, extent
@@ -47,6 +48,18 @@ class Shot:
     def values(self, indices: Iterable[int], look: Look) -> list[NDArray[Any]]:
         """What the colours of some frames tell, (N,) each."""
         return [look.colouring.values(self.frames[int(i)]) for i in indices]
+
+    def largest_force(self, indices: Iterable[int]) -> float:
+        """The largest normal force at a contact in some frames [N]; a millinewton where there is none.
+
+        Raises:
+            InputError: The run records no forces.
+        """
+        if not has_forces(self.run.directory):
+            msg = f"{self.run.directory}: records no forces to draw; {NO_FORCES}"
+            raise InputError(msg)
+        found = [read_forces(self.frames[int(i)]).contacts.normal.max(initial=0.0) for i in indices]
+        return float(max(found)) or 1e-3
 
     def frame_at(self, time: float | None) -> int:
         """Index of the frame nearest to a time [s]; the last one for None.

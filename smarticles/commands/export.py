@@ -25,6 +25,8 @@ _FIELDS = """\
   contact_cluster [-]                  number of its cluster by contact, 0 the largest
   entanglement_cluster [-]             the same by entanglement
   local_packing_fraction [-]           its volume over that of its Voronoi cell; takes most of the time
+  normal_force_N [N]                   sum of the normal forces at its contacts; this and the next where recorded
+  force_chain [-]                      number of its cluster by forces above the mean
   angle_rad [rad]                      of a barb; this and the next of scenes that actuate
   motor_torque_N_m [N m]               of the motor at the barb's hinge
   motor_work_J [J]                     of that motor since the start
@@ -49,7 +51,8 @@ poses at rest, contact law, time step, and phases relax, shake and remove-contai
 carried over is refused by name.
 
 bodies: smarticles, wall, floor, hooks, strings; crossings with --with crossings: a point and a
-direction where a link passes through another smarticle's plane.
+direction where a link passes through another smarticle's plane; forces with --with forces: lines through
+the contacts of a run that records their forces (recording.contact_forces).
 
 fields, of each box:
 {_FIELDS}""",
@@ -70,7 +73,7 @@ fields, of each box:
     )
     export.add_argument("--time", type=float, metavar="S", help="simulated time [s], nearest frame; default: end")
     export.add_argument("--all", action="store_true", help="all frames: a folder of numbered files")
-    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings")
+    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings, forces")
     export.add_argument(
         "--without", dest="unwanted", type=_names, default=(), metavar="WHAT,…", help="bodies or fields to leave out"
     )

@@ -34,6 +34,7 @@ and .mp4 are films, which play at one speed and tell it.""",
   smarticles render runs/a --time 1.5 --color-by speed --output shaken.png
   smarticles render runs/a --output film.mp4 --from 1 --to 3 --fps 25
   smarticles render runs/a --compare runs/b --output both.png
+  smarticles render runs/a --forces --output chains.png
   smarticles render runs/a --smarticle 17 --output hooked.png
 """,
     )
@@ -59,6 +60,11 @@ and .mp4 are films, which play at one speed and tell it.""",
         type=_limits,
         metavar="LOW:HIGH",
         help="ends of the scale of colours, or run: those of all frames of the run; default: of what is shown",
+    )
+    render.add_argument(
+        "--forces",
+        action="store_true",
+        help="draw a line through each contact, as thick as its normal force is large, where the run records forces",
     )
     render.add_argument("--view", metavar="VIEW", help="front (default; of motion in a plane: top), oblique, top")
     render.add_argument(
@@ -98,6 +104,7 @@ def render_run(arguments: argparse.Namespace) -> int:
         "view": arguments.view,
         "limits": arguments.clim,
         "compare": arguments.compare,
+        "forces": arguments.forces,
         "overwrite": arguments.overwrite,
     }
     if arguments.size is not None:

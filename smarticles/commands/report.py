@@ -16,8 +16,8 @@ def add(commands: Commands) -> None:
         write_report,
         summary="one HTML page of a run, a sweep or a study",
         text="""
-Scene, effects and why, settings and their measured accuracy, measures, figures, a picture of the final
-state, comparison with the paper and with Gravish where a study has one, warnings of the logs, and how to
+Scene, effects and why, settings and their measured accuracy, measures, figures, the final state, which can
+be turned, comparison with the paper and with Gravish where a study has one, warnings of the logs, and how to
 repeat it. The file holds all that it shows: it can be sent, kept, and opened without a network.""",
         examples="""\
   smarticles report runs/a                                  runs/a/report.html

@@ -12,6 +12,8 @@ from pathlib import Path
 import jinja2
 
 TEMPLATE = "page.html.j2"
+PICTURES = ("figure", "turntable")
+"""Kinds of blocks that are pictures."""
 MOST_ROWS = 200
 """Of a table on a page."""
 
@@ -74,6 +76,31 @@ class Figure:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Turntable:
+    """One thing from all around, that is turned by hand: by the mouse over it, a finger on it, or the arrow keys.
+
+    It is a group of radio buttons, one per picture, so that the page needs no script.
+
+    Attributes:
+        caption: below it.
+        alt: what it shows, for who cannot see it.
+        views: data addresses of pictures of one size, at equal angles, the first one from the front.
+        name: of the group, unique on the page.
+    """
+
+    caption: str
+    alt: str
+    views: Sequence[str]
+    name: str
+    kind: str = field(default="turntable", init=False)
+
+    @property
+    def angles(self) -> list[int]:
+        """Angle of each view from the front [degree]."""
+        return [round(360 * number / len(self.views)) for number in range(len(self.views))]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Listing:
     """A text as it stands, such as a scene.
 
@@ -89,7 +116,7 @@ class Listing:
     kind: str = field(default="listing", init=False)
 
 
-Block = Words | Table | Figure | Listing
+Block = Words | Table | Figure | Turntable | Listing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,8 +133,8 @@ class Section:
 
     @property
     def parts(self) -> list[list[Block]]:
-        """The blocks, figures that follow each other together: they stand side by side where there is room."""
-        return [list(part) for _, part in groupby(self.blocks, key=lambda block: block.kind == "figure")]
+        """The blocks, pictures that follow each other together: they stand side by side where there is room."""
+        return [list(part) for _, part in groupby(self.blocks, key=lambda block: block.kind in PICTURES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +166,9 @@ def to_html(page: Page) -> str:
         lstrip_blocks=True,
     )
     sections = [section for section in page.sections if section.blocks]
-    return environment.get_template(TEMPLATE).render(page=page, sections=sections, most_rows=MOST_ROWS)
+    return environment.get_template(TEMPLATE).render(
+        page=page, sections=sections, most_rows=MOST_ROWS, pictures=PICTURES
+    )
 
 
 def _is_number(cell: str) -> bool:

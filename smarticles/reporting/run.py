@@ -19,8 +19,8 @@ from dem.record.series import Series, read_series
 from dem.scene.reading import load_scene
 from smarticles.measuring import measured
 from smarticles.reporting.accuracy import accuracy_blocks
-from smarticles.reporting.charts import Curve, against_time, embedded
-from smarticles.reporting.page import Block, Figure, Listing, Page, Section, Table, Words
+from smarticles.reporting.charts import Curve, address, against_time, embedded
+from smarticles.reporting.page import Block, Figure, Listing, Page, Section, Table, Turntable, Words
 from smarticles.reporting.tables import short_table, whole_table, word
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def run_page(directory: Path, table: Path | None, made: str) -> Page:
         lead=_lead(run),
         sections=(
             Section(title="Result", blocks=[*_ending(run), *_measures(directory)]),
-            Section(title="Final state", blocks=still_blocks(directory)),
+            Section(title="Final state", blocks=[*still_blocks(directory), *turntable_blocks(directory)]),
             Section(title="Against time", blocks=_curves(run)),
             Section(title="Scene", blocks=scene_blocks(directory, scene, why_not)),
             Section(title="Effects", blocks=effect_blocks(scene)),
@@ -130,6 +130,22 @@ def still_blocks(directory: Path, *, caption: str = "") -> list[Block]:
     kind = run.phases[-1].type if run.status == "done" else "its last frame"
     alt = f"The {run.count} smarticles of {run.name} at the end of {kind}, drawn as their true boxes"
     return [Figure(caption=caption or f"{alt}. Another view or time: smarticles render.", alt=alt, light=picture)]
+
+
+def turntable_blocks(directory: Path, *, caption: str = "") -> list[Block]:
+    """The last frame of a run from all around; nothing where there is no picture, see `still_blocks`."""
+    from postprocess.pictures.turntable import turntable  # noqa: PLC0415  (imports PyVista)
+
+    if not (directory / collection(FRAME)).is_file():
+        return []
+    try:
+        views = [address(content, "image/webp") for content in turntable(directory)]
+    except (InputError, RunError):
+        return []  # the still says why
+    run = read_run(directory)
+    alt = f"The last frame of {run.name} from all around"
+    told = "Move the pointer across it, tap on it, or use the arrow keys: it turns."
+    return [Turntable(caption=f"{caption or alt}. {told}", alt=alt, views=views, name="turntable")]
 
 
 def _curves(run: RunManifest) -> list[Block]:

@@ -19,7 +19,7 @@ from smarticles.reporting.accuracy import accuracy_blocks
 from smarticles.reporting.charts import Points, against_variable
 from smarticles.reporting.page import Block, Figure, Listing, Page, Section, Table, Words
 from smarticles.reporting.results import PROVENANCE, read_results
-from smarticles.reporting.run import scene_blocks, still_blocks, warning_blocks
+from smarticles.reporting.run import scene_blocks, still_blocks, turntable_blocks, warning_blocks
 from smarticles.reporting.tables import short_table, whole_table, word
 from studies.registry import STUDIES
 from templates.sweep.files import read_json
@@ -188,7 +188,7 @@ def _range(values: pd.Series) -> str:
 
 
 def _stills(folder: Folder) -> list[Block]:
-    """Pictures of a few finished runs of one seed, spread over the sweep."""
+    """Pictures of a few finished runs of one seed, spread over the sweep, and the last of them from all around."""
     done = [entry for entry in folder.entries if folder.is_done(entry)]
     if not done:
         return []
@@ -196,7 +196,9 @@ def _stills(folder: Folder) -> list[Block]:
     alike = [entry for entry in done if entry.values.get(SEED) == seed]
     count = min(_MOST_STILLS, len(alike))
     chosen = [alike[round(k * (len(alike) - 1) / max(count - 1, 1))] for k in range(count)]
-    return [block for entry in chosen for block in still_blocks(folder.run(entry), caption=f"Run {entry.name}")]
+    stills = [block for entry in chosen for block in still_blocks(folder.run(entry), caption=f"Run {entry.name}")]
+    last = chosen[-1]
+    return [*stills, *turntable_blocks(folder.run(last), caption=f"Run {last.name} from all around")]
 
 
 def _variables(varied: Mapping[str, Sequence[Any]]) -> list[Block]:

@@ -13,13 +13,7 @@ from dem.record.manifest import RunManifest
 from postprocess.geometry.outline import BALL
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from studies.base.engines import (
-    by_engine,
-    compared_engines,
-    engines_of,
-    judging,
-    told_engines,
-)
+from studies.base.engines import judging, tables_of, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
@@ -88,10 +82,7 @@ class Casting(PaperStudy):
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
         runs = in_order(found.table(), [SEED])
-        tables = {"runs": runs, "points": by_engine(runs, lambda part: means(part, [PROCEDURE], list(QUANTITIES)))}
-        if engines_of(runs):
-            tables["engines"] = compared_engines(runs, [PROCEDURE], QUANTITIES)
-        return tables
+        return tables_of(runs, [PROCEDURE], QUANTITIES, lambda part: means(part, [PROCEDURE], list(QUANTITIES)))
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
         """The findings, by runs of the engine that judges."""

@@ -18,14 +18,7 @@ from postprocess.measures.pull import END, FREE, WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
-from studies.base.engines import (
-    by_engine,
-    compared_engines,
-    engines_of,
-    judging,
-    told_by_engine,
-    told_engines,
-)
+from studies.base.engines import judging, tables_of, told_by_engine, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
 from studies.base.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
@@ -99,10 +92,7 @@ class Fracture(PaperStudy):
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
         runs = runs_table(found).sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True, kind="stable")
-        tables = {"runs": runs, "points": by_engine(runs, lambda part: points(part, QUANTITIES))}
-        if engines_of(runs):
-            tables["engines"] = compared_engines(runs, [PROCEDURE, THETA, ASPECT], QUANTITIES)
-        return tables
+        return tables_of(runs, [PROCEDURE, THETA, ASPECT], QUANTITIES, lambda part: points(part, QUANTITIES))
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
         """The findings, by runs of the engine that judges."""

@@ -15,13 +15,7 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.spread import OUTSIDE, TOUCHING
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from studies.base.engines import (
-    by_engine,
-    compared_engines,
-    engines_of,
-    judging,
-    told_engines,
-)
+from studies.base.engines import judging, tables_of, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
@@ -97,14 +91,8 @@ class Melting(PaperStudy):
         """Runs, points, and every measure of every run against time."""
         runs = in_order(found.table(), [LIFT, ASPECT, SEED])
         times = [pd.DataFrame({"run": run.name, **run.history}) for run in found.runs]
-        tables = {
-            "runs": runs,
-            "points": by_engine(runs, lambda part: means(part, _KEYS, list(QUANTITIES))),
-            "times": pd.concat(times, ignore_index=True),
-        }
-        if engines_of(runs):
-            tables["engines"] = compared_engines(runs, _KEYS, QUANTITIES)
-        return tables
+        tables = tables_of(runs, _KEYS, QUANTITIES, lambda part: means(part, _KEYS, list(QUANTITIES)))
+        return {**tables, "times": pd.concat(times, ignore_index=True)}
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
         """The findings, by runs of the engine that judges."""

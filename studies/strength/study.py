@@ -19,14 +19,7 @@ from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
-from studies.base.engines import (
-    by_engine,
-    compared_engines,
-    engines_of,
-    judging,
-    told_by_engine,
-    told_engines,
-)
+from studies.base.engines import judging, tables_of, told_by_engine, told_engines
 from studies.base.paper import PaperStudy
 from studies.base.procedures import ACTIVE, CROSSINGS, PROCEDURE, STATIC
 from studies.base.release import in_order, means
@@ -118,10 +111,7 @@ class Strength(PaperStudy):
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
         runs = in_order(found.table(), [ASPECT, UPPER, SEED])
-        tables = {"runs": runs, "points": by_engine(runs, lambda part: means(part, _KEYS, list(QUANTITIES)))}
-        if engines_of(runs):
-            tables["engines"] = compared_engines(runs, _KEYS, QUANTITIES)
-        return tables
+        return tables_of(runs, _KEYS, QUANTITIES, lambda part: means(part, _KEYS, list(QUANTITIES)))
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:
         """The findings, by runs of the engine that judges."""

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.links.account import LinksAccount
 from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
+from dem.engine.links.forces import contact_forces
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
 from dem.engine.links.strings import LinksStrings
@@ -202,6 +204,10 @@ class LinksEngine:
         return Overlaps(
             float(depths.max(initial=0.0)), deep, found.elastic_energy, self._held(found.held, deep, APART * limit)
         )
+
+    def contact_forces(self) -> ContactForces:
+        """See the interface; those that the next step begins with."""
+        return contact_forces(self._world)
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
         """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m]."""

@@ -77,6 +77,16 @@ class Assembly:
         """Smarticle by id of sphere."""
         return self._smarticle_of
 
+    @property
+    def link_of(self) -> Mapping[int, tuple[int, int]]:
+        """Smarticle and link by id of sphere."""
+        links = self._particle.links.tolist()
+        return {
+            sphere: (k, link)
+            for k, spheres in enumerate(self._spheres)
+            for sphere, link in zip(spheres, links, strict=True)
+        }
+
     def bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
         bodies = self._yade.omega.bodies

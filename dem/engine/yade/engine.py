@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -20,6 +21,7 @@ from dem.engine.yade.account import YadeAccount
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.construction import ADDS, add_engines, add_materials
 from dem.engine.yade.fixtures import YadeFixtures
+from dem.engine.yade.forces import contact_forces
 from dem.engine.yade.hinges import HingeLaw
 from dem.engine.yade.library import load_yade
 from dem.engine.yade.motors import YadeMotors
@@ -284,6 +286,10 @@ class YadeEngine:
     def overlaps(self, limit: float) -> Overlaps:
         """See the interface."""
         return measure_overlaps(self._yade, self._assembly, self.fixtures, self._law, limit)
+
+    def contact_forces(self) -> ContactForces:
+        """See the interface; those of the last step."""
+        return contact_forces(self._yade, self._assembly, self.fixtures)
 
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.forces import CHANNEL, FLOOR, LOWER_HOOK, WALL
 from dem.engine.yade.container import WALL_MATERIAL, add_channel, add_container
 from dem.engine.yade.library import Yade
 from dem.errors import RunError
@@ -200,6 +201,14 @@ class YadeFixtures:
             "the upper hook": (self.hooks[1], self.upper_height - floor - self._upper_start),
         }
         return found | ({"the wall": (wall, self.wall_bottom - floor - self._bottom)} if wall else {})
+
+    @property
+    def part_of(self) -> Mapping[int, int]:
+        """Place in `dem.body.forces.FIXTURES` by id of body."""
+        *walls, floor = self.container
+        numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
+        found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
+        return found | {bar: LOWER_HOOK + k for k, bars in enumerate(self.hooks) for bar in bars}
 
     # -- what smarticles may do --------------------------------------------------------------------------------
 

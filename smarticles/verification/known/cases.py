@@ -6,7 +6,7 @@ from functools import partial
 
 from smarticles.verification.case import Case, Ladder
 from smarticles.verification.hands.kinds import ENGINES
-from smarticles.verification.known import bouncing, clumps, floor, free, hinge, impact, kept, oblique
+from smarticles.verification.known import bouncing, clumps, floor, free, hinge, impact, kept, oblique, stacks
 
 DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
 OBLIQUE = "impulse theory with Coulomb friction, as in MFiX DEM-05 and Chung and Ooi (2011), tests 5 to 8"
@@ -136,6 +136,18 @@ CASES = (
         about="come to rest on the floor; MFiX DEM-03",
         theory="overlaps 2mg/k and mg/k",
         run=floor.stack_at_rest,
+    ),
+    Case(
+        name="crossed bars stacked",
+        about="five pairs of bars, each pair across the one below, come to rest",
+        theory="statics and symmetry: a contact bears a quarter of the weight above it",
+        run=stacks.crossed_bars,
+    ),
+    Case(
+        name="flat smarticles stacked",
+        about="four smarticles, link on link, come to rest",
+        theory="statics: contacts bear the weight above them",
+        run=stacks.flat_smarticles,
     ),
     *(
         Case(

@@ -16,6 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.errors import RunError
+from dem.record.forces import read_forces
+from dem.record.frames import read_frames
 from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.recorder import WATCH_STEPS, Recorder
@@ -88,6 +90,34 @@ def test_it_goes_on_from_its_memory_and_takes_away_what_came_after(tmp_path: Pat
     assert files(tmp_path) == ends[0]
     for name, column in ends[1].items():
         assert np.array_equal(again.series.columns[name], column, equal_nan=True), name
+
+
+def test_forces_are_asked_for_and_written_with_each_frame_where_the_scene_wants_them_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+    tell = EngineDouble.contact_forces
+    monkeypatch.setattr(EngineDouble, "contact_forces", lambda self: (asked.append(self.time), tell(self))[1])
+    without, wanting = tmp_path / "without", tmp_path / "wanting"
+    for out, more in ((without, {}), (wanting, {"recording.contact_forces": True})):
+        out.mkdir()
+        _, engine, recorder = start(out, **more)
+        take(engine, recorder, 40)
+        assert bool(asked) == (out == wanting)
+    assert not list(without.glob("force*"))
+    assert len(asked) == len(files(wanting)["frames"]) > 10
+    assert sorted(path.name for path in (wanting / "forces").iterdir()) == [
+        f"force_{k:06d}.vtu" for k in range(len(asked))
+    ]
+    # At the end both stand on the floor, with their weight.
+    last = read_forces(read_frames(wanting)[-1]).contacts
+    weight = engine.particle.boxes.mass * 9.81
+    assert last.smarticles.tolist() == [[0, -1], [1, -1]]
+    assert last.normal == pytest.approx([weight, weight])
+    memory = json.loads(json.dumps(recorder.memory))
+    memory["forces"] = memory["forces"][:2]
+    recorder.truncate(memory)
+    assert len(list((wanting / "forces").iterdir())) == 2
 
 
 def test_the_watchdog_looks_every_so_many_steps_and_after_the_frame_is_written(tmp_path: Path) -> None:

@@ -323,5 +323,15 @@ def test_one_line_with_key_value_and_way_out(
     assert "Value error" not in line  # as pydantic would begin it
 
 
+def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
+    line = refused(SMALL, {"hooks": {"length_m": 11.7}})
+    assert line.startswith("hooks.length_m: 11.7 means 11.7 m")
+    assert line.count("11.7 means") == 1
+    # Told twice where the file says it twice.
+    both = refused(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
+    assert both.count("11.7 means") == 2
+    assert "; also hooks.lower_length_m: 11.7 means" in both
+
+
 def test_sentences(snapshot: SnapshotAssertion) -> None:
     assert "\n".join(refused(good, changes) for good, changes, *_ in ALL) == snapshot

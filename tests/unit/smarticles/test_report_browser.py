@@ -107,6 +107,39 @@ def test_it_says_nothing_asks_for_nothing_and_shows_every_picture(
         assert name in seen.ask("document.querySelector('h1').textContent")
 
 
+SHOWN = (
+    "[...document.querySelectorAll('.turntable img')]"
+    ".flatMap((one, k) => getComputedStyle(one).visibility == 'visible' ? [k] : [])"
+)
+
+
+@pytest.mark.parametrize("name", [RUNS[0], "sweep"], ids=["run", "sweep"])
+def test_the_final_state_is_turned_by_pointer_finger_and_keys(name: str, pages: dict[str, Path], browser: Any) -> None:
+    seen = Seen(browser, pages[name], **DESK)
+    table = seen.page.locator(".turntable")
+    table.scroll_into_view_if_needed()
+    box = table.bounding_box()
+    assert seen.ask(SHOWN) == [0]
+    assert len(set(seen.ask("[...document.querySelectorAll('.turntable img')].map(one => one.src)"))) == 24
+    places = seen.ask("[...document.querySelectorAll('.turntable img')].map(one => one.getBoundingClientRect().x)")
+    assert set(places) == {box["x"]}
+    for share, number in ((0.99, 23), (0.51, 12), (0.01, 0)):
+        seen.page.mouse.move(box["x"] + share * box["width"], box["y"] + box["height"] / 3)
+        assert seen.ask(SHOWN) == [number]
+    seen.page.mouse.move(0, 0)
+    table.locator("input").first.focus()
+    seen.page.keyboard.press("ArrowLeft")  # all the way round
+    assert seen.ask(SHOWN) == [23]
+    phone = Seen(browser, pages[name], **PHONE, has_touch=True)
+    table = phone.page.locator(".turntable")
+    table.scroll_into_view_if_needed()
+    box = table.bounding_box()
+    phone.page.touchscreen.tap(box["x"] + 0.51 * box["width"], box["y"] + box["height"] / 3)
+    assert phone.ask(SHOWN) == [12]
+    assert (seen.said, phone.said, seen.outside, phone.outside) == ([], [], [], [])
+    assert pages[name].stat().st_size < 15e6
+
+
 def test_it_is_dark_where_that_is_wanted(pages: dict[str, Path], browser: Any, tmp_path: Path) -> None:
     light, dark = (
         Seen(browser, pages[RUNS[0]], **DESK, color_scheme=scheme).picture(tmp_path / f"{scheme}.png")

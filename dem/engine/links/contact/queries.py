@@ -161,3 +161,31 @@ def depth_at(
         return 1, 0.0
     up, away = height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
     return 1, radius + up if away >= 0.0 else radius - (up * up + away * away) ** 0.5
+
+
+@part
+def normal_at(ground: Ground, channel: Any, surface: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Unit normal of one of the surfaces, towards an end of a link that touches it, see `depth_at` [1]."""
+    if channel is not None:
+        return 0.0, 1.0 if surface == 0 else -1.0, 0.0
+    if surface == 0:
+        return 0.0, 0.0, 1.0
+    height, r, tiers = z - ground.place[1], (x * x + y * y) ** 0.5, ground.radii.shape[0]
+    ex, ey = x / r, y / r
+    lifted = ground.flags[1] != 0
+    if lifted and height < ground.bottoms[0]:
+        return _from_edge(ex, ey, r - ground.radii[0], height - ground.bottoms[0])
+    tier = 0
+    while tier + 1 < tiers and height > ground.bottoms[tier + 1]:
+        tier += 1
+    if surface == 1:
+        return (ex, ey, 0.0) if lifted and r > ground.radii[tier] else (-ex, -ey, 0.0)
+    up, away = height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
+    return (0.0, 0.0, -1.0) if away >= 0.0 else _from_edge(ex, ey, away, up)
+
+
+@part
+def _from_edge(ex: float, ey: float, out: float, up: float) -> tuple[float, float, float]:
+    """Unit vector from a round edge to what is `out` [m] outside of it and `up` [m] above it, (ex, ey) outwards."""
+    distance = (out * out + up * up) ** 0.5
+    return ex * out / distance, ey * out / distance, up / distance

@@ -168,7 +168,5 @@ def test_every_kind_can_be_left_out(hooked, kind):
 def test_refusals_name_what_is_meant():
     with pytest.raises(InputError, match=r"'wal' is nothing to export; did you mean 'wall'\?"):
         checked_kinds([], ["wal"])
-    with pytest.raises(InputError, match="force-chains: frames record how many smarticles touch, and no force"):
-        checked_kinds(["force-chains"], [])
     with pytest.raises(InputError, match="nothing is left to export"):
         checked_kinds([], list(KINDS))

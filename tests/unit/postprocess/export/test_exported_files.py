@@ -169,7 +169,8 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
     assert [float(entry["timestep"]) for entry in listed] == pytest.approx(frames.times.tolist(), rel=1e-8)
     mesh = pv.read(folder / listed[-1]["file"])
     assert mesh.n_cells == 12 * 3 * 6
-    rigid = {field.name for field in FIELDS} - {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted"}
+    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain"}
+    rigid = {field.name for field in FIELDS} - asked_for
     assert set(mesh.cell_data.keys()) == rigid
     assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
     assert {path.name for path in folder.glob("*.pvd")} == {
@@ -247,7 +248,7 @@ def test_a_time_takes_the_nearest_frame(pile, tmp_path):
         ({"to": "glb", "unwanted": ["wals"]}, r"'wals' is nothing to export; did you mean 'wall'"),
         ({"to": "glb", "color_by": "sped"}, "'sped' is no field"),
         ({"to": "glb", "color_by": "angle_rad"}, "no frame to export has it"),
-        ({"to": "vtp", "wanted": ["force-chains"]}, "no force between them"),
+        ({"to": "vtp", "wanted": ["forces"]}, "records no forces; .*recording.contact_forces: true"),
     ],
 )
 def test_refusals_are_one_line_and_leave_nothing(pile, asked, message):

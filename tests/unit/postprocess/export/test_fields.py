@@ -30,6 +30,7 @@ def values(directory, name):
 
 def test_names_end_in_their_units():
     endings = {"m": "_m", "m/s": "_m_per_s", "rad/s": "_rad_per_s", "rad": "_rad", "N m": "_N_m", "J": "_J", "-": ""}
+    endings["N"] = "_N"
     assert all(field.name.endswith(endings[field.unit]) for field in FIELDS)
     assert len(BY_NAME) == len(FIELDS)
 

@@ -14,7 +14,7 @@ from dem.record.frames import read_frames
 from dem.record.manifest import read_run
 from postprocess import measure_run
 from postprocess.pictures.camera import Look
-from postprocess.pictures.captions import Caption, caption_of, packing_text
+from postprocess.pictures.captions import Caption, caption_of, packing_text, titles_of
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
 from postprocess.pictures.page import Page, fitted, page_size, round_length
 from postprocess.pictures.render import render_run
@@ -44,6 +44,20 @@ def test_phi_of_a_picture_is_that_of_measure(tmp_path):
     for number, frame in enumerate(frames):
         expected = table["phi second-highest-com [-]"][number]
         assert packing_text(frame, manifest) == f"φ = {expected:.4f} (second-highest-com)"
+
+
+def test_runs_of_one_name_beside_each_other_are_told_apart_by_their_folders(tmp_path):
+    def runs(*names, name="pile"):
+        made = SyntheticRun(count=2, frames_per_phase=1, name=name)
+        return [read_run(write_run(tmp_path / folder, made)) for folder in names]
+
+    a, b = runs("runs/a", "runs/b")
+    assert titles_of([a, b]) == ["pile (a)", "pile (b)"]
+    assert titles_of([a]) == ["pile"]
+    assert titles_of([a, *runs("c", name="other")]) == ["pile", "other"]
+    assert titles_of(runs("one/x", "two/x")) == ["pile (one/x)", "pile (two/x)"]
+    assert titles_of([a, a]) == ["pile (a)", "pile (a)"]
+    assert caption_of(read_frames(a.directory)[-1], a, title="pile (a)").title == "pile (a)"
 
 
 def test_a_picture_without_phi_says_why(tmp_path):

@@ -1,0 +1,140 @@
+"""Forces at contacts at one recorded time: a small VTK file of lines, one for each contact; see ARCHITECTURE.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.forces import FIXTURES, NONE, ContactForces
+from dem.record.files import cannot_read
+from dem.record.frame import Frame, read_mesh
+from dem.record.names import FORCE, collection, member
+
+Array = NDArray[np.float64]
+
+_HEAD, _EMPTY = 512, b'NumberOfCells="0"'
+NO_FORCES = "a run does where its scene says recording.contact_forces: true"
+"""What to do about a run that records no forces."""
+_REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: true"
+
+
+def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
+    """All contacts as lines from the first smarticle's centre of mass to the second's, or to the point at a fixture.
+
+    Args:
+        found: the contacts.
+        positions: (N, 3) centres of mass of the smarticles at the same instant [m].
+        time: simulated time [s].
+        phase: index of the phase.
+    """
+    number, between = len(found.forces), found.fixtures == NONE
+    ends = np.empty((number, 2, 3))
+    ends[:, 0] = positions[found.smarticles[:, 0]]
+    ends[:, 1] = found.points
+    ends[between, 1] = positions[found.smarticles[between, 1]]
+    values = {
+        "first_smarticle": found.smarticles[:, 0],
+        "first_link": found.links[:, 0],
+        "second_smarticle": found.smarticles[:, 1],
+        "second_link": found.links[:, 1],
+        "fixture": found.fixtures,
+        "normal_force_N": found.normal,
+        "tangential_force_N": found.tangential,
+        "force_N": found.forces,
+        "point_m": found.points,
+        "time_s": np.full(number, time),
+        "phase": np.full(number, phase, dtype=np.int64),
+    }
+    lines = np.arange(2 * number).reshape(-1, 2)
+    return meshio.Mesh(ends.reshape(-1, 3), [("line", lines)], cell_data={name: [v] for name, v in values.items()})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedForces:
+    """The forces at contacts at one recorded time.
+
+    Attributes:
+        path: The file that they came from.
+        contacts: The contacts.
+        ends: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a fixture [m].
+    """
+
+    path: Path
+    contacts: ContactForces = field(repr=False)
+    ends: Array = field(repr=False)
+
+    @property
+    def between(self) -> NDArray[np.bool_]:
+        """(M,) which contacts are between two smarticles."""
+        found: NDArray[np.bool_] = self.contacts.fixtures == NONE
+        return found
+
+
+def has_forces(directory: Path) -> bool:
+    """Whether a run directory holds forces at contacts."""
+    return (directory / collection(FORCE)).is_file()
+
+
+def read_forces(frame: Frame) -> RecordedForces:
+    """The forces at contacts that were recorded with a frame.
+
+    Args:
+        frame: One of a run's frames.
+
+    Returns:
+        The forces.
+
+    Raises:
+        InputError: The run recorded none, or the file is damaged.
+
+    Source:
+        ARCHITECTURE.md, "The run directory".
+    """
+    path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
+    points, data = _content(path)
+    number = len(points) // 2
+
+    def values(name: str, *shape: int) -> Array:
+        if not number:
+            return np.zeros((0, *shape))
+        found = data.get(name)
+        if found is None or found.shape != (number, *shape):
+            told = "is missing" if found is None else f"has shape {found.shape}, for {number} contacts"
+            cannot_read("forces", path, f"cell data '{name}' {told}", _REMEDY)
+        if not np.all(np.isfinite(found)):
+            cannot_read("forces", path, f"cell data '{name}' is not finite", _REMEDY)
+        return found.astype(np.float64)
+
+    def numbers(*names: str, below: int) -> NDArray[np.int64]:
+        found = np.column_stack([values(name) for name in names]).astype(np.int64)
+        if np.any((found < NONE) | (found >= below)):
+            cannot_read("forces", path, f"cell data '{names[0]}' holds numbers of nothing that there is", _REMEDY)
+        return found
+
+    contacts = ContactForces(
+        smarticles=numbers("first_smarticle", "second_smarticle", below=frame.count),
+        links=numbers("first_link", "second_link", below=3),
+        fixtures=numbers("fixture", below=len(FIXTURES))[:, 0],
+        points=values("point_m", 3),
+        normal=values("normal_force_N"),
+        tangential=values("tangential_force_N"),
+        forces=values("force_N", 3),
+    )
+    return RecordedForces(path=path, contacts=contacts, ends=points.reshape(-1, 2, 3))
+
+
+def _content(path: Path) -> tuple[Array, dict[str, NDArray[Any]]]:
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        cannot_read("forces", path, error, _REMEDY)
+    if _EMPTY in head:
+        return np.empty((0, 3)), {}  # VTK reads it, meshio does not
+    mesh = read_mesh(path, "forces", _REMEDY)
+    return np.asarray(mesh.points, np.float64), {name: np.asarray(each[0]) for name, each in mesh.cell_data.items()}

@@ -1,0 +1,188 @@
+"""Force chains: how contacts share the load, where a run recorded their forces (`recording.contact_forces`).
+
+A contact is all points at which a pair of links touches; those with floor, wall and hooks are left out. A contact is
+strong if its normal force is above the mean of the frame, and smarticles that strong contacts join make a chain: the
+strong network, which carries the stress of granular matter while the weak contacts prop it (Radjai, Jean, Moreau &
+Roux, Phys. Rev. Lett. 77, 274 (1996); Radjai, Wolf, Jean & Moreau, Phys. Rev. Lett. 80, 61 (1998)).
+
+The participation of the forces is 1 / (M Σ q²), q = f / Σ f: 1 where all M contacts carry alike, 1/M where one carries
+all (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000)). Forces that are distributed as exp(-f/⟨f⟩) have
+e⁻¹ = 0.37 strong contacts, which carry 2/e = 0.74 of the load, and a participation of 0.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dem.errors import InputError
+from dem.record.forces import RecordedForces, has_forces, read_forces
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.errors import UndefinedMeasureError
+from postprocess.measures.clusters import Clusters, joined_clusters
+from postprocess.measures.registry import FrameMeasure, Quantity
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+class ForceDistribution(NamedTuple):
+    """P(f), the density of normal forces over their mean.
+
+    Attributes:
+        edges: (B + 1,) float64, of the bins, f / ⟨f⟩ [-].
+        density: (B,) float64 [-], its integral is 1 where the bins hold all forces.
+    """
+
+    edges: NDArray[np.float64]
+    density: NDArray[np.float64]
+
+
+def checked_forces(normal: ArrayLike) -> NDArray[np.float64]:
+    """Normal forces as an array.
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0.
+        UndefinedMeasureError: There is none.
+    """
+    normal = np.asarray(normal, dtype=np.float64)
+    if normal.ndim != 1 or not np.all(np.isfinite(normal)) or np.any(normal <= 0):
+        msg = f"normal forces must be (M,) finite numbers above 0 N: got an array of shape {normal.shape}"
+        raise InputError(msg)
+    if len(normal) == 0:
+        msg = "force chains need at least 1 contact that carries a force: got 0"
+        raise UndefinedMeasureError(msg)
+    return normal
+
+
+def strong_contacts(normal: ArrayLike) -> NDArray[np.bool_]:
+    """Which contacts are strong: those whose normal force is above the mean.
+
+    Args:
+        normal: (M,) normal forces [N].
+
+    Returns:
+        (M,) bool.
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0.
+        UndefinedMeasureError: There is none.
+
+    Source:
+        Radjai et al., Phys. Rev. Lett. 80, 61 (1998).
+
+    Example:
+        >>> strong_contacts([1.0, 2.0, 6.0]).tolist()
+        [False, False, True]
+    """
+    normal = checked_forces(normal)
+    found: NDArray[np.bool_] = normal > normal.mean()
+    return found
+
+
+def force_participation(normal: ArrayLike) -> float:
+    """How evenly contacts share the load [-]: 1 where all carry alike, 1/M where one carries all.
+
+    Args:
+        normal: (M,) normal forces [N].
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0.
+        UndefinedMeasureError: There is none.
+
+    Source:
+        Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000).
+
+    Example:
+        >>> force_participation([2.0, 2.0]), round(force_participation([1e-9, 1.0]), 6)
+        (1.0, 0.5)
+    """
+    normal = checked_forces(normal)
+    return float(normal.sum() ** 2 / (len(normal) * (normal**2).sum()))
+
+
+def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
+    """P(f), the density of normal forces over their mean; of several frames, each over its own mean, joined by hand.
+
+    Args:
+        normal: (M,) normal forces [N].
+        edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
+            the bins, and counted in the density.
+
+    Returns:
+        Bins and density.
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0, or edges that do not ascend.
+        UndefinedMeasureError: There is none.
+
+    Source:
+        Radjai et al., Phys. Rev. Lett. 77, 274 (1996): an exponential above the mean.
+    """
+    normal = checked_forces(normal)
+    edges = np.arange(0.0, 8.01, 0.25) if edges is None else np.asarray(edges, dtype=np.float64)
+    if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
+        msg = f"edges must be numbers that ascend, two or more: got {edges.tolist()}"
+        raise InputError(msg)
+    counts, _ = np.histogram(normal / normal.mean(), bins=edges)
+    return ForceDistribution(edges=edges, density=counts / (len(normal) * np.diff(edges)))
+
+
+def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
+    """Smarticles joined by strong contacts, directly or through others.
+
+    Args:
+        frame: One of a run's frames.
+        forces: Recorded with it; read if not given.
+
+    Returns:
+        The clusters; those of one smarticle are no chain.
+
+    Raises:
+        InputError: The run recorded no forces, or they are damaged.
+        UndefinedMeasureError: There is no smarticle, or none touches another.
+    """
+    forces = read_forces(frame) if forces is None else forces
+    between = forces.between
+    pairs = forces.contacts.smarticles[between][strong_contacts(forces.contacts.normal[between])]
+    return joined_clusters(frame.count, pairs[:, 0], pairs[:, 1])
+
+
+def _taken_of(frame: Frame, _: RunManifest) -> tuple[float, ...]:
+    forces = read_forces(frame)
+    between = forces.between
+    normal, tangential = forces.contacts.normal[between], forces.contacts.tangential[between]
+    if not len(normal):
+        return (0.0, *(math.nan,) * 6)
+    above = strong_contacts(normal)
+    return (
+        float(len(normal)),
+        float(normal.mean()),
+        float(tangential.sum() / normal.sum()),
+        float(above.mean()),
+        float(normal[above].sum() / normal.sum()),
+        force_participation(normal),
+        force_chains(frame, forces).largest,
+    )
+
+
+MEASURES = (
+    FrameMeasure(
+        name="force chains",
+        place=58,
+        quantities=(
+            Quantity("force contacts", "-"),
+            Quantity("normal force mean", "N"),
+            Quantity("tangential over normal force", "-"),
+            Quantity("strong contacts", "-"),
+            Quantity("strong share of force", "-"),
+            Quantity("force participation", "-"),
+            Quantity("force chain largest share", "-"),
+        ),
+        take=_taken_of,
+        told_of=lambda run: has_forces(run.directory),
+    ),
+)

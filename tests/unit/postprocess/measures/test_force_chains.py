@@ -1,0 +1,121 @@
+"""Force chains, on forces whose answer is on paper; and on what a run has recorded."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import SyntheticRun, write_run
+from synthetic.forces import pressed, write_forces
+
+from dem.errors import InputError
+from dem.record.forces import has_forces, read_forces
+from dem.record.frames import read_frames
+from dem.record.manifest import read_run
+from postprocess.errors import UndefinedMeasureError
+from postprocess.measures.force_chains import (
+    MEASURES,
+    force_chains,
+    force_distribution,
+    force_participation,
+    strong_contacts,
+)
+from postprocess.measures.table import measure_run
+
+MEASURE = MEASURES[0]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "run", SyntheticRun(count=6, frames_per_phase=1, phases=("relax",)))
+
+
+def test_exponential_forces_have_the_shares_of_theory() -> None:
+    forces = np.random.default_rng(1).exponential(3e-3, 200_000)
+    above = strong_contacts(forces)
+    assert above.mean() == pytest.approx(math.exp(-1), rel=0.01)
+    assert forces[above].sum() / forces.sum() == pytest.approx(2 / math.e, rel=0.01)
+    assert force_participation(forces) == pytest.approx(0.5, rel=0.01)
+    found = force_distribution(forces)
+    middles = (found.edges[1:] + found.edges[:-1]) / 2
+    near = middles < 3
+    np.testing.assert_allclose(found.density[near], np.exp(-middles[near]), rtol=0.05)
+    assert (found.density * np.diff(found.edges)).sum() == pytest.approx(1 - math.exp(-8), abs=1e-4)
+
+
+@pytest.mark.parametrize("count", [1, 7])
+def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> None:
+    assert force_participation([2.0] * count) == pytest.approx(1.0)
+    assert not strong_contacts([2.0] * count).any()
+
+
+def test_one_force_alone_participates_for_one_of_all() -> None:
+    assert force_participation([1.0, *[1e-12] * 9]) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("wrong", [[1.0, 0.0], [1.0, -2.0], [math.nan], [[1.0]]])
+def test_what_is_no_force_is_refused(wrong: object) -> None:
+    with pytest.raises(InputError, match=r"normal forces must be \(M,\) finite numbers above 0 N"):
+        strong_contacts(wrong)  # type: ignore[arg-type]
+
+
+def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
+    with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
+        force_participation([])
+    with pytest.raises(InputError, match="edges must be numbers that ascend"):
+        force_distribution([1.0], edges=[0.0, 0.0])
+
+
+def test_chains_are_joined_by_strong_contacts_alone(run: Path) -> None:
+    # 0 - 1 - 2 carry much, 3 - 4 hold 1 up with little; the floor carries all and counts for nothing.
+    write_forces(run, pressed([(0, 1), (1, 2), (1, 3), (3, 4), (2, -1)], [5.0, 4.0, 1.0, 1.0, 90.0]))
+    frame, manifest = read_frames(run)[-1], read_run(run)
+    chains = force_chains(frame)
+    assert chains.sizes.tolist() == [3, 1, 1, 1]
+    assert chains.labels.tolist()[:3] == [0, 0, 0]
+    values = MEASURE.columns(frame, manifest)
+    assert list(values.values()) == pytest.approx([4, 2.75, 0.1, 0.5, 9 / 11, 121 / (4 * 43), 0.5])
+    table = measure_run(run)
+    assert float(table["strong share of force [-]"].iloc[-1]) == pytest.approx(9 / 11)
+
+
+def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) -> None:
+    assert not has_forces(run)
+    assert not MEASURE.told_of(read_run(run))
+    assert not [name for name in measure_run(run).columns if "force" in name and "chain" in name]
+    with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
+        read_forces(read_frames(run)[0])
+
+
+def test_nobody_touching_is_no_error(run: Path) -> None:
+    write_forces(run, pressed([], []))
+    frame = read_frames(run)[-1]
+    assert len(read_forces(frame).contacts.normal) == 0
+    contacts, *rest = MEASURE.columns(frame, read_run(run)).values()
+    assert contacts == 0
+    assert np.isnan(rest).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("normal_force_N", "normal_force_X", "cell data 'normal_force_N' is missing"),
+        ("</VTKFile>", "", "truncated or not VTK"),
+    ],
+)
+def test_a_damaged_file_is_named(run: Path, old: str, new: str, message: str) -> None:
+    write_forces(run, pressed([(0, 1)], [1.0]))
+    file = run / "forces" / "force_000000.vtu"
+    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_forces(read_frames(run)[0])
+
+
+def test_numbers_of_smarticles_that_there_are_not_are_refused(run: Path) -> None:
+    write_forces(run, pressed([(0, 1)], [1.0]))
+    few = write_run(run.parent / "few", SyntheticRun(count=1, frames_per_phase=1, phases=("relax",)))
+    (run / "forces").rename(few / "forces")
+    with pytest.raises(InputError, match="'first_smarticle' holds numbers of nothing that there is"):
+        read_forces(read_frames(few)[0])
