@@ -34,6 +34,8 @@ def check_carried(scene: SceneView) -> None:
         found.append("recording.energy: the work of the container is not added up")
     if scene.recording.dissipation_interval_s is not None:
         found.append("recording.dissipation_interval_s: what contacts dissipate is not added up")
+    if scene.recording.contact_forces:
+        found.append("recording.contact_forces: forces at contacts are not read from it")
     if found:
         msg = f"engine: lammps cannot compute {'; '.join(found)}; leave that out, or use engine: yade or links"
         raise ValueError(msg)

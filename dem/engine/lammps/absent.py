@@ -1,4 +1,4 @@
-"""What LAMMPS has none of here: motors and strings. Scenes that call for them are refused before there is an engine."""
+"""What LAMMPS has none of here: motors, strings, forces at contacts. Scenes that call for them are refused before there is an engine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ from dem.physics.strings import StringLaw
 Array = NDArray[np.float64]
 
 
-def _refuse(what: str) -> NoReturn:
+def refuse(what: str) -> NoReturn:
+    """Say that there is none.
+
+    Raises:
+        RunError: always.
+    """
     msg = f"engine: lammps has no {what}"
     raise RunError(msg)
 
@@ -33,14 +38,14 @@ class NoMotors:
 
     def articulate(self) -> None:
         """See the interface."""
-        _refuse("motors")
+        refuse("motors")
 
     def weld(self) -> None:
         """See the interface: they are."""
 
     def actuate(self, targets: Array, interval: float) -> None:
         """See the interface."""
-        _refuse("motors")
+        refuse("motors")
 
     def gaps(self) -> Array:
         """See the interface."""
@@ -65,7 +70,7 @@ class NoStrings:
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
         """See the interface."""
-        _refuse("strings")
+        refuse("strings")
 
     def untie(self) -> None:
         """See the interface: there are none."""

@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.lammps import text
-from dem.engine.lammps.absent import NoMotors, NoStrings
+from dem.engine.lammps.absent import NoMotors, NoStrings, refuse
 from dem.engine.lammps.account import LammpsAccount
 from dem.engine.lammps.child import Child
 from dem.engine.lammps.contacts import Contacts
@@ -275,6 +275,10 @@ class LammpsEngine:
     def overlaps(self, limit: float) -> Overlaps:
         """See the interface."""
         return self.contacts.overlaps(limit, self._law)
+
+    def contact_forces(self) -> NoReturn:
+        """See the interface: LAMMPS keeps them to itself; scenes that ask for them are refused."""
+        refuse("forces at contacts")
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

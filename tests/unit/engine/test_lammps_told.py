@@ -38,6 +38,7 @@ PHASES = [{"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0
         ({"phases": [*PHASES, {"type": "shape-change"}]}, ["phases.2 (shape-change): motors"]),
         ({"recording.energy": True}, ["recording.energy"]),
         ({"recording.dissipation_interval_s": 2e-4}, ["recording.dissipation_interval_s"]),
+        ({"recording.contact_forces": True}, ["recording.contact_forces"]),
         (
             {"hooks": {"lower_height_m": 0.03, "upper_height_m": 0.04}, "recording.energy": True},
             ["hooks", "recording.energy"],
