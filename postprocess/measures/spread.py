@@ -1,4 +1,4 @@
-"""A pile that no wall holds any more: how far it spreads, how it leans, and what came off it."""
+"""How many smarticles there are, how many escaped, and how a pile spreads, leans and sheds that no wall holds any more."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
-from postprocess.measures.registry import FrameMeasure, Quantity
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 from postprocess.statistics.bisection import least_reaching
 
 if TYPE_CHECKING:
@@ -244,7 +244,27 @@ def _free_pile_of(frame: Frame, run: RunManifest) -> tuple[float, ...]:
     return pile.touching, pile.entangled, pile.radius_half, pile.radius_most, pile.sloughed, pile.tilt
 
 
+def escaped(frame: Frame, run: RunManifest) -> int:
+    """Smarticles with their centre of mass beside or below the container."""
+    centres = centres_of_mass(frame.vertices)
+    outside = np.hypot(centres[:, 0], centres[:, 1]) > run.container_radius
+    return int((outside | (centres[:, 2] < frame.floor_z)).sum())
+
+
 MEASURES = (
+    FrameMeasure(
+        name="smarticles",
+        place=10,
+        quantities=(Quantity("smarticles", "-", Shown(heading="smarticles", place=0, form=".4g")),),
+        take=lambda frame, _: (frame.count,),
+    ),
+    FrameMeasure(
+        name="escaped",
+        place=20,
+        quantities=(Quantity("escaped", "-"),),
+        take=lambda frame, run: (escaped(frame, run),),
+        told_of=in_space,
+    ),
     FrameMeasure(
         name="free pile",
         place=60,

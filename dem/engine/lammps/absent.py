@@ -1,4 +1,7 @@
-"""What LAMMPS has none of here: motors, strings, forces at contacts. Scenes that call for them are refused before there is an engine."""
+"""What LAMMPS has none of here: motors, strings, forces at contacts.
+
+Scenes that call for them are refused before there is an engine.
+"""
 
 from __future__ import annotations
 
