@@ -2,10 +2,13 @@
 
 Each kill is a run of its own: it begins, SIGKILL meets it after a random share of the processor time that the whole run
 took, loading and closing among it, and it is resumed. Processor time, since it is the same however busy the machine is.
+On one thread a run begins with its pour. On several it takes over a pile that one thread poured and is ten times
+shorter: where threads have to share a core with others, each of a step's barriers may wait for milliseconds.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import re
@@ -23,22 +26,29 @@ import pandas as pd
 from dem.errors import RunError
 from dem.record.files import write_text
 from dem.run.run import _git_revision
-from dem.scene.reading import dump_scene
-from smarticles.verification.bench import scene_of
 from smarticles.verification.hands.kinds import hands_on
 from smarticles.verification.hard.scenes import scene, swing
 
-EVERY_S = 0.04  # of simulated time between checkpoints; of frames, half as much
+EVERY_S = 0.04  # of simulated time between checkpoints of a run from its pour on; of frames, half as much
 LONGER = 1.1  # moments are drawn from the whole run's processor time and a little more, to meet the end as well
 LEAST_FILES = 20  # to compare nothing with nothing proves nothing
 SAME, STATE = "same bits", "killed in"
 
 
-def scene_to_kill(engine: str, seed: int) -> dict[str, Any]:
-    """Pour, rest, shake, swing, with a checkpoint every few hundred steps."""
-    phases = ({"type": "relax", "duration_s": 0.05}, {"type": "shake", "duration_s": 0.1}, swing(0.1))
-    recording = {"checkpoint_interval_s": EVERY_S, "frame_interval_s": EVERY_S / 2}
-    return scene(hands_on(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
+def scene_to_kill(engine: str, seed: int, pile: Path | None = None) -> dict[str, Any]:
+    """Pour, or take over a pile of a run; rest, shake, swing, with a checkpoint every few hundred steps."""
+    share = 1.0 if pile is None else 0.25
+    every, frames = (EVERY_S, EVERY_S / 2) if pile is None else (0.3 * EVERY_S, 0.1 * EVERY_S)
+    recording = {"checkpoint_interval_s": every, "frame_interval_s": frames}
+    phases = (
+        {"type": "relax", "duration_s": 0.05 * share},
+        {"type": "shake", "duration_s": 0.2 * share},
+        swing(0.2 * share),
+    )
+    data = scene(hands_on(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
+    if pile is not None:
+        data["phases"][0] = {"type": "take-over", "run": str(pile), "frame": "last"}
+    return data
 
 
 def start(path: Path, out: Path, threads: int) -> subprocess.Popen[bytes]:
@@ -132,7 +142,16 @@ def kills(engine: str, threads: int, number: int, folder: Path, *, seed: int) ->
         RunError: a run failed, or left nothing to compare.
     """
     rng, path, whole = random.Random(1000 * seed + threads), folder / f"{seed}.yaml", folder / f"whole-{seed}-{threads}"
-    write_text(path, dump_scene(scene_of(scene_to_kill(engine, seed))))
+    if threads == 1:
+        data = scene_to_kill(engine, seed)
+    else:
+        pile = folder / f"pile-{seed}"
+        if not (pile / "done.json").exists():
+            poured = scene_to_kill(engine, seed)
+            write_text(path, json.dumps({**poured, "phases": poured["phases"][:2]}))
+            finish(start(path, pile, 1), str(pile))
+        data = scene_to_kill(engine, seed, pile)
+    write_text(path, json.dumps(data))
     # Twice: the first compiles what is not in the cache yet.
     finish(start(path, whole, threads), str(whole))
     again = folder / f"again-{seed}-{threads}"
@@ -175,11 +194,12 @@ def run_kills(out: Path, scratch: Path, engine: str, *, threads: Sequence[int], 
     shares = [len(range(k, number, 3)) for k in range(3)]
     good = True
     for each in threads:
-        rows = [row for k, share in enumerate(shares) for row in kills(engine, each, share, scratch, seed=k + 1)]
-        kept = table[(table["engine"] != engine) | (table["threads"] != each)]
-        found = pd.DataFrame(rows).assign(commit=commit)
-        table = pd.concat([kept, found], ignore_index=True) if len(kept) else found
-        write_text(path, table.to_csv(index=False, float_format="%.4g"))
+        kept, rows = table[(table["engine"] != engine) | (table["threads"] != each)], []
+        for k, share in enumerate(shares):
+            rows += kills(engine, each, share, scratch, seed=k + 1)
+            found = pd.DataFrame(rows).assign(commit=commit)
+            table = pd.concat([kept, found], ignore_index=True) if len(kept) else found
+            write_text(path, table.to_csv(index=False, float_format="%.4g"))
         same = int((found[SAME] == "yes").sum())
         where = ", ".join(f"{count} {what}" for what, count in found[STATE].value_counts().items())
         print(f"{engine}, {each} thread{'s' if each > 1 else ''}: {same} of {len(found)} the same bits ({where})")
