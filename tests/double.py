@@ -27,7 +27,7 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
@@ -350,6 +350,9 @@ class EngineDouble:
     def overlaps(self, limit: float) -> Overlaps:
         deep = self._standing & (self.deepest > limit)
         return Overlaps(self.deepest, deep, 0.0)
+
+    def glance(self, state: State) -> Glance | None:
+        return None
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
@@ -325,6 +325,16 @@ class Engine(Protocol):
 
     def overlaps(self, limit: float) -> Overlaps:
         """How deep contacts are at present, and who has some deeper than a limit [m]."""
+
+    def glance(self, state: State) -> Glance | None:
+        """The extremes of all smarticles, for less than it costs to ask for each one.
+
+        Args:
+            state: at this instant.
+
+        Returns:
+            None where the engine has no such way, or knows of something that must be looked at closely.
+        """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

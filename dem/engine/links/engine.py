@@ -18,6 +18,7 @@ from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.links.account import LinksAccount
+from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
 from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
@@ -26,7 +27,7 @@ from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
-from dem.physics.overlaps import APART, Held, Overlaps
+from dem.physics.overlaps import APART, Glance, Held, Overlaps
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -199,6 +200,22 @@ class LinksEngine:
         deep = ~(depths <= limit)
         return Overlaps(
             float(depths.max(initial=0.0)), deep, found.elastic_energy, self._held(found.held, deep, APART * limit)
+        )
+
+    def glance(self, state: State) -> Glance | None:
+        """See the interface; hinges do not give way."""
+        found, bodies = self._world.glance(state.link_velocities), self._world.bodies
+        if not found[BETWEEN] <= PASSES * self.particle.chain.diameter:
+            return None
+        bodies.deepest[:] = 0.0
+        return Glance(
+            fastest=found[FASTEST],
+            lowest=found[LOWEST],
+            highest=found[HIGHEST],
+            widest=found[WIDEST],
+            gap=0.0,
+            deepest=found[DEEPEST],
+            elastic_energy=found[ELASTIC],
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:

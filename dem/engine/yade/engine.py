@@ -284,6 +284,9 @@ class YadeEngine:
         """See the interface."""
         return measure_overlaps(self._yade, self._assembly, self.fixtures, self._law, limit)
 
+    def glance(self, state: State) -> None:
+        """See the interface: there is none."""
+
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""
         force = np.zeros(3)
