@@ -45,7 +45,7 @@ bench: setup ## measure speed, and what each effect costs (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	for engine in yade links; do for part in onset figure cases; do \
+	for engine in yade links; do for part in onset figure cases kills; do \
 	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification $$part --engine $$engine || exit 1; done; done
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
