@@ -53,7 +53,7 @@ rivals: setup ## install the engines that make bench compares with, into .venv (
 	@command -v lmp >/dev/null || echo "LAMMPS is a package of Debian: apt-get install lammps"
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	for engine in yade links; do for part in onset figure cases; do \
+	for engine in yade links; do for part in onset figure cases kills; do \
 	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification $$part --engine $$engine || exit 1; done; done
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)

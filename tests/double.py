@@ -28,7 +28,7 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
@@ -366,6 +366,9 @@ class EngineDouble:
             friction=0 * up,
             forces=weight * up,
         )
+
+    def glance(self, state: State) -> Glance | None:
+        return None
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
@@ -333,6 +333,16 @@ class Engine(Protocol):
 
     def contact_forces(self) -> ContactForces:
         """Forces at all contacts at present, or in the last step; contacts of one pair of links are one."""
+
+    def glance(self, state: State) -> Glance | None:
+        """The extremes of all smarticles, for less than it costs to ask for each one.
+
+        Args:
+            state: at this instant.
+
+        Returns:
+            None where the engine has no such way, or knows of something that must be looked at closely.
+        """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

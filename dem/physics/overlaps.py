@@ -1,4 +1,4 @@
-"""How deep contacts are: what the watchdog asks of an engine."""
+"""How deep contacts are, and how far all goes: what the watchdog asks of an engine."""
 
 from __future__ import annotations
 
@@ -40,3 +40,26 @@ class Overlaps:
     deep: NDArray[np.bool_]
     elastic_energy: float
     held: tuple[Held, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glance:
+    """The extremes of all smarticles at one instant. What is no number is within no limit.
+
+    Args:
+        fastest: speed of the fastest link's centre [m/s].
+        lowest: height of the lowest point that must stay inside [m].
+        highest: the same of the highest one [m].
+        widest: the farthest one's distance from the vertical axis [m].
+        gap: how far the links of a hinge are apart at most [m].
+        deepest: overlap of the deepest contact [m].
+        elastic_energy: as in `Overlaps` [J].
+    """
+
+    fastest: float
+    lowest: float
+    highest: float
+    widest: float
+    gap: float
+    deepest: float
+    elastic_energy: float

@@ -107,19 +107,18 @@ class Recorder:
             RunError: it stopped the run.
         """
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
-        watchdog.check(
-            state,
-            floor=engine.fixtures.floor,
-            time=time,
-            points=self.points(state),
-            raised=engine.fixtures.raised,
-            gaps=engine.motors.gaps() if engine.motors.articulated else None,
-        )
-        overlaps = engine.overlaps(watchdog.depth)
-        watchdog.check_depths(overlaps, time=time)
+        floor, raised, glance = engine.fixtures.floor, engine.fixtures.raised, engine.glance(state)
+        if glance is not None and watchdog.content(glance, floor=floor, raised=raised):
+            elastic = glance.elastic_energy
+        else:
+            gaps = engine.motors.gaps() if engine.motors.articulated else None
+            watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)
+            overlaps = engine.overlaps(watchdog.depth)
+            watchdog.check_depths(overlaps, time=time)
+            elastic = overlaps.elastic_energy
         given = engine.account.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
-        watchdog.check_energy(state, energy=energy, elastic=overlaps.elastic_energy, time=time)
+        watchdog.check_energy(state, energy=energy, elastic=elastic, time=time)
 
     @property
     def memory(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dem.body.state import State
 from dem.errors import refuse
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -39,6 +39,22 @@ class Watchdog:
     energy: float = math.inf
     # What kinetic and potential energy less the work done may amount to from now on [J].
     _ceiling: float = math.inf
+
+    def content(self, glance: Glance, *, floor: float, raised: float | None = 0.0) -> bool:
+        """Whether all smarticles are within all limits but that of the energy, for certain: then nobody need be asked.
+
+        Args:
+            glance: their extremes.
+            floor: as in `check` [m].
+            raised: the same [m].
+        """
+        inside = glance.lowest >= floor
+        if raised is not None:
+            cylinder = self.cylinder
+            narrowest = min([cylinder.radius, *(radius for _, radius in cylinder.upper)])
+            inside &= glance.widest <= cylinder.corner_radius_of(narrowest)
+            inside &= glance.highest - floor < cylinder.height
+        return inside and glance.fastest <= self.speed and glance.gap <= self.gap and glance.deepest <= self.depth
 
     def check(
         self,

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from dem.errors import RunError
 from smarticles.verification.hands.kinds import ENGINES
 
 STABILITY = {"yade": Path("results/stability"), "links": Path("results/stability/links")}
+# On YADE bits are the same on one thread only.
+THREADS = {"yade": (1,), "links": (1, 2)}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -54,6 +57,12 @@ def _done(arguments: argparse.Namespace) -> int:
     elif arguments.part == "cases":
         good = tables.run_cases(out, arguments.engine, form=arguments.form, only=arguments.only, again=arguments.again)
         return 0 if good else 1
+    elif arguments.part == "kills":
+        from smarticles.verification.hard.kills import run_kills  # noqa: PLC0415
+
+        with tempfile.TemporaryDirectory() as scratch:
+            threads, number = arguments.threads or THREADS[arguments.engine], arguments.number
+            return 0 if run_kills(out, Path(scratch), arguments.engine, threads=threads, number=number) else 1
     else:
         from smarticles.verification.hard.onset import run_onset  # noqa: PLC0415
 
@@ -72,10 +81,13 @@ def _parser() -> argparse.ArgumentParser:
     cases.add_argument("--again", action="store_true", help="run cases whose rows are there already, too")
     onset = parts.add_parser("onset", help="run the same scenes at steps around the stable one and above")
     onset.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="seeds of every scene")
+    kills = parts.add_parser("kills", help="kill runs at random moments, resume them, and compare bits")
+    kills.add_argument("--threads", type=int, nargs="+", help="numbers of threads (default: those with the same bits)")
+    kills.add_argument("--number", type=int, default=50, help="kills on each (default: %(default)s)")
     figure = parts.add_parser("figure", help="draw the figure of the onset from its table")
-    for part in (known, cases, onset, figure):
+    for part in (known, cases, onset, kills, figure):
         part.add_argument("--engine", choices=ENGINES, default="yade", help="what computes (default: yade)")
-    for part in (cases, onset, figure):
+    for part in (cases, onset, kills, figure):
         part.add_argument("--out", type=Path, help="folder of tables and figure")
     return parser
 

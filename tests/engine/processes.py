@@ -30,8 +30,8 @@ def start(scene: Path, out: Path, variables: Mapping[str, str] | None = None, *o
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
-    _, said = process.communicate(timeout=TIMEOUT_S)
+def finish(process: subprocess.Popen[str], timeout_s: float = TIMEOUT_S) -> tuple[int, str]:
+    _, said = process.communicate(timeout=timeout_s)
     return process.returncode, said
 
 

@@ -12,6 +12,8 @@ import pytest
 from processes import complete, differing, finish, gate, results, start
 from test_restart import INTERVAL_S, kill_often, log_of
 
+from smarticles.verification.hard.kills import SAME, kills
+
 SCENE = """\
 schema_version: 1
 engine: links
@@ -52,12 +54,15 @@ def test_a_run_killed_four_times_gives_the_same_bits(tmp_path: Path) -> None:
     assert max(tally.lost_s, default=0.0) <= INTERVAL_S + 1e-6
 
 
+COMPILING_S = 1800.0  # of wall time, for what takes 75 s of a processor's on two threads for the first time
+
+
 @pytest.mark.validation  # in seconds on free cores, in minutes where threads have to wait for one
 def test_a_run_on_two_threads_killed_and_resumed_gives_the_same_bits(scene: Path, tmp_path: Path) -> None:
     threads = ("--threads", "2")
     for name in ("whole", "killed", "other"):
         kill = {} if name == "whole" else gate("checkpoint.zip", 4, "SIGKILL")
-        status, said = finish(start(scene, tmp_path / name, kill, *threads))
+        status, said = finish(start(scene, tmp_path / name, kill, *threads), COMPILING_S)
         assert status == (0 if name == "whole" else -signal.SIGKILL), said
         assert "12 smarticles gain little by more than one thread" in said
     assert json.loads((tmp_path / "whole/run.json").read_text())["threads"] == 2
@@ -68,6 +73,13 @@ def test_a_run_on_two_threads_killed_and_resumed_gives_the_same_bits(scene: Path
     status, said = finish(start(scene, tmp_path / "other", {}, "--threads", "1"))
     assert status == 0
     assert "--threads 1: the run began with 2" in said
+
+
+@pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.validation)])
+def test_kills_at_random_moments_change_no_bit(tmp_path: Path, threads: int) -> None:
+    rows = kills("links", threads, 2, tmp_path, seed=1)
+    assert [row[SAME] for row in rows] == ["yes", "yes"]
+    assert all(row["files [1]"] > 20 for row in rows)
 
 
 @pytest.mark.validation

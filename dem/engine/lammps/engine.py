@@ -276,6 +276,9 @@ class LammpsEngine:
         """See the interface."""
         return self.contacts.overlaps(limit, self._law)
 
+    def glance(self, state: State) -> None:
+        """See the interface: there is none."""
+
     def contact_forces(self) -> NoReturn:
         """See the interface: LAMMPS keeps them to itself; scenes that ask for them are refused."""
         refuse("forces at contacts")

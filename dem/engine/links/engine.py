@@ -19,6 +19,7 @@ from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.links.account import LinksAccount
+from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
 from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
 from dem.engine.links.forces import contact_forces
 from dem.engine.links.motors import LinksMotors
@@ -28,7 +29,7 @@ from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
-from dem.physics.overlaps import APART, Held, Overlaps
+from dem.physics.overlaps import APART, Glance, Held, Overlaps
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -208,6 +209,22 @@ class LinksEngine:
     def contact_forces(self) -> ContactForces:
         """See the interface; those that the next step begins with."""
         return contact_forces(self._world)
+
+    def glance(self, state: State) -> Glance | None:
+        """See the interface; hinges do not give way."""
+        found, bodies = self._world.glance(state.link_velocities), self._world.bodies
+        if not found[BETWEEN] <= PASSES * self.particle.chain.diameter:
+            return None
+        bodies.deepest[:] = 0.0
+        return Glance(
+            fastest=found[FASTEST],
+            lowest=found[LOWEST],
+            highest=found[HIGHEST],
+            widest=found[WIDEST],
+            gap=0.0,
+            deepest=found[DEEPEST],
+            elastic_energy=found[ELASTIC],
+        )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
         """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m]."""

@@ -33,7 +33,7 @@ from dem.engine.links.arrays import (
     pairs_for,
 )
 from dem.engine.links.contact.meeting import COLUMNS, ROWS
-from dem.engine.links.contact.queries import look_at_fixtures, look_at_pairs
+from dem.engine.links.contact.queries import ELASTIC, glance, look_at_all
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
@@ -286,16 +286,31 @@ class World:
         bodies, n = self.posed(), self.count
         touches, depths, held = np.zeros(n, np.int64), np.zeros(n), np.zeros((n, 6), np.bool_)
         met = np.zeros((self.pairs.counts[0], 2), np.int32)
-        stiffness = self.laws[0].stiffness
-        count, energy = look_at_pairs(self.shape, bodies, self.pairs, stiffness, met, touches, depths, self.out)
-        energy += look_at_fixtures(
-            self.shape, bodies, self.ground, self.channel, self.hooks, self.rims, self.laws[1].stiffness,
-            touches, held, depths, self.out,
+        count, energy = look_at_all(
+            self.shape, bodies, self.pairs, self.ground, self.channel, self.hooks, self.rims, self.laws[0].stiffness,
+            self.laws[1].stiffness, met, touches, held, depths, self.out,
         )  # fmt: skip
         sheared = [self.pairs.slip[: self.pairs.counts[0]], self.ends.slip]
         sheared += [more.slip for more in (self.hooks, self.rims) if more is not None]
         energy += sum(float(slip[..., 3].sum()) for slip in sheared)
         return Contacts(met[:count].astype(np.int64), touches, depths, held, energy)
+
+    def glance(self, velocities: Array) -> list[float]:
+        """The extremes of all smarticles at the instant of the last `state`, see `queries.glance`.
+
+        Args:
+            velocities: (N, 3, 3) of the links' centres, from that state [m/s].
+        """
+        n, found = self.count, np.empty(7)
+        met = np.empty((self.pairs.counts[0], 2), np.int32)
+        glance(
+            self.shape, self.bodies, self.pairs, self.ends, self.ground, self.channel, self.hooks, self.rims,
+            self.laws[0].stiffness, self.laws[1].stiffness, velocities, met, np.zeros(n, np.int64),
+            np.zeros((n, 6), np.bool_), np.zeros(n), self.out, found,
+        )  # fmt: skip
+        told: list[float] = found.tolist()
+        told[ELASTIC] += sum(float(more.slip[..., 3].sum()) for more in (self.hooks, self.rims) if more is not None)
+        return told
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

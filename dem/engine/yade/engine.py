@@ -291,6 +291,9 @@ class YadeEngine:
         """See the interface; those of the last step."""
         return contact_forces(self._yade, self._assembly, self.fixtures)
 
+    def glance(self, state: State) -> None:
+        """See the interface: there is none."""
+
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""
         force = np.zeros(3)

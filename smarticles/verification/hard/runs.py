@@ -14,7 +14,7 @@ import numpy as np
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
-from dem.physics.overlaps import Overlaps
+from dem.physics.overlaps import Glance, Overlaps
 from dem.plan.steps import time_steps
 from dem.record.progress import ProgressWriter
 from dem.run import build, run
@@ -37,6 +37,10 @@ class Noting(Watchdog):
 
     def _note(self, limit: str, share: float) -> None:
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
+
+    def content(self, glance: Glance, **options: Any) -> bool:
+        """See `Watchdog`; it is to look closely every time."""
+        return False
 
     def check(self, state: State, **options: Any) -> None:
         """See `Watchdog`."""

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.errors import RunError
+from dem.physics.overlaps import Glance
 from dem.record.forces import read_forces
 from dem.record.frames import read_frames
 from dem.record.progress import ProgressWriter
@@ -142,6 +143,25 @@ def test_energy_from_nowhere_is_seen_against_what_was_given(tmp_path: Path) -> N
         engine.advance(50)
         recorder.watch(engine)
     engine.fixtures.stop()
+    engine.velocities[:, 2] = 3.0
+    with pytest.raises(RunError, match="an energy that has risen by"):
+        recorder.watch(engine)
+
+
+def test_where_a_glance_is_enough_nobody_is_asked_but_the_energy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, engine, recorder = start(tmp_path)
+    told = {"fastest": 0.1, "lowest": 1.0, "highest": 1.0, "widest": 0.0, "gap": 0.0, "deepest": 0.0}
+    seen = Glance(**told, elastic_energy=0.0)
+    monkeypatch.setattr(engine, "glance", lambda state: seen)
+    engine.deepest = recorder.watchdog.depth * 1.1
+    monkeypatch.setattr(engine.fixtures, "floor", 0.99)
+    recorder.watch(engine)  # by the glance all is well
+    monkeypatch.setattr(engine.fixtures, "floor", 1.01)
+    with pytest.raises(RunError, match="left through the wall or the floor"):
+        recorder.watch(engine)
+    monkeypatch.setattr(engine.fixtures, "floor", 0.99)
     engine.velocities[:, 2] = 3.0
     with pytest.raises(RunError, match="an energy that has risen by"):
         recorder.watch(engine)

@@ -11,7 +11,7 @@ from scenes import make_boxes
 
 from dem.body.state import State
 from dem.errors import RunError
-from dem.physics.overlaps import Held, Overlaps
+from dem.physics.overlaps import Glance, Held, Overlaps
 from dem.run.watchdog import Watchdog
 from dem.setting.container import Cylinder
 
@@ -213,3 +213,34 @@ def test_it_knows_the_tiers() -> None:
     TIERED.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
     with pytest.raises(RunError, match="left through the wall"):
         TIERED.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)
+
+
+GLANCE = {"fastest": 4.9, "lowest": 1.0, "highest": 1.09, "widest": 0.0234, "gap": 1e-5, "deepest": 1e-4}
+STRICT = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed=5.0, gap=2e-5, depth=2e-4)
+
+
+def content(raised: float | None = 0.0, dog: Watchdog = STRICT, **changes: float) -> bool:
+    glance = Glance(**{**GLANCE, "elastic_energy": 0.0, **changes})
+    return dog.content(glance, floor=1.0, raised=raised)
+
+
+def test_extremes_within_all_limits_need_no_close_look() -> None:
+    assert content()
+    assert content(widest=1.0, highest=5.0, raised=None)  # nothing holds them
+    assert not content(lowest=0.999, raised=None)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("fastest", 5.1), ("lowest", 0.999), ("highest", 1.101), ("widest", 0.0236), ("gap", 3e-5), ("deepest", 3e-4)],
+)
+def test_an_extreme_beyond_a_limit_or_no_number_needs_one(name: str, value: float) -> None:
+    assert not content(**{name: value})
+    assert not content(**{name: math.nan})
+
+
+def test_of_tiers_the_narrowest_counts() -> None:
+    cylinder = Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),))
+    tiers = Watchdog(cylinder=cylinder, speed=5.0)
+    assert content(widest=0.0119, dog=tiers)
+    assert not content(widest=0.0234, dog=tiers)

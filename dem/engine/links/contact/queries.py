@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from dem.engine.links.arrays import LOWER, WALL, Array, Bodies, Ground, Indices, Pairs
+from dem.engine.links.arrays import LOWER, WALL, Array, Bodies, Ends, Ground, Indices, Pairs
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.bars import meet_bar
 from dem.engine.links.contact.meeting import ENERGY, POINTS, meet
 from dem.engine.links.contact.rims import nearest_to_circle
 from dem.engine.links.shape import Shape
 
+FASTEST, LOWEST, HIGHEST, WIDEST, DEEPEST, BETWEEN, ELASTIC = range(7)  # places in what `glance` finds
 
-@kernel
+
+@part
 def look_at_pairs(
     shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, met: Indices, touches: Any, depth: Array, out: Array
 ) -> tuple[int, float]:
@@ -62,7 +65,7 @@ def _overlap(p: Array, q: Array, diameter: float, stiffness: float, out: Array) 
     return float((2 * out[ENERGY, 0] / (stiffness * (2 - share))) ** 0.5)
 
 
-@kernel
+@part
 def look_at_fixtures(
     shape: Shape, bodies: Bodies, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float,
     touches: Any, held: Any, depth: Array, out: Array,
@@ -125,6 +128,85 @@ def look_at_fixtures(
                         depth[i] = max(depth[i], out[0, 7])
                         squares += out[0, 7] ** 2 * (2 - out[0, 8])
     return 0.5 * stiffness * squares
+
+
+@kernel
+def look_at_all(
+    shape: Shape, bodies: Bodies, pairs: Pairs, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float,
+    wall_stiffness: float, met: Indices, touches: Any, held: Any, depth: Array, out: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """Look at all contacts; see `look_at_pairs` and `look_at_fixtures`.
+
+    Returns:
+        Rows of `met` that were written, and the energy of all normal springs [J].
+    """
+    count, energy = look_at_pairs(shape, bodies, pairs, stiffness, met, touches, depth, out)
+    energy += look_at_fixtures(shape, bodies, ground, channel, hooks, rims, wall_stiffness, touches, held, depth, out)
+    return count, energy
+
+
+@kernel
+def glance(
+    shape: Shape, bodies: Bodies, pairs: Pairs, ends: Ends, ground: Ground, channel: Any, hooks: Any, rims: Any,
+    stiffness: float, wall_stiffness: float, velocities: Array, met: Indices, touches: Any, held: Any, depth: Array,
+    out: Array, found: Array,
+) -> None:  # fmt: skip
+    """Find the extremes of all smarticles in one call, which is what a watchdog asks as long as nothing is wrong.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles, posed.
+        pairs: as in `look_at_pairs`.
+        ends: what contacts with floor and wall remember.
+        ground: the fixtures.
+        channel: as in `look_at_fixtures`.
+        hooks: the same.
+        rims: the same.
+        stiffness: kn between smarticles [N/m].
+        wall_stiffness: kn with fixtures [N/m].
+        velocities: (N, 3, 3) of the links' centres [m/s].
+        met: scratch.
+        touches: scratch.
+        held: scratch.
+        depth: zeros; scratch.
+        out: scratch.
+        found: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis [m];
+            distance of the farthest one from the vertical axis [m]; deepest contact now and between two looks [m];
+            energy of all springs of contacts [J]. A speed that is no number makes the first one no number.
+    """
+    _, energy = look_at_pairs(shape, bodies, pairs, stiffness, met, touches, depth, out)
+    energy += look_at_fixtures(shape, bodies, ground, channel, hooks, rims, wall_stiffness, touches, held, depth, out)
+    for k in range(pairs.counts[0]):
+        if pairs.used[k]:
+            for slot in range(pairs.slip.shape[1]):
+                energy += pairs.slip[k, slot, 3]
+    for p in range(ends.slip.shape[0]):
+        for end in range(ends.slip.shape[1]):
+            for slot in range(ends.slip.shape[2]):
+                energy += ends.slip[p, end, slot, 3]
+    fastest, total = 0.0, 0.0
+    for i in range(velocities.shape[0]):
+        for link in range(3):
+            x, y, z = velocities[i, link, 0], velocities[i, link, 1], velocities[i, link, 2]
+            square = x * x + y * y + z * z
+            total += square
+            fastest = max(fastest, square)
+    lowest, highest, widest = math.inf, -math.inf, 0.0
+    segments = bodies.segments
+    for p in range(segments.shape[0]):
+        for end in range(2):
+            x, y = segments[p, 0] + end * segments[p, 3], segments[p, 1] + end * segments[p, 4]
+            z = segments[p, 2] + end * segments[p, 5]
+            lowest, highest, widest = min(lowest, z), max(highest, z), max(widest, x * x + y * y)
+    deepest, between = 0.0, 0.0
+    for i in range(depth.shape[0]):
+        deepest = max(deepest, depth[i])
+        # One that is no number must not be lost in the comparison.
+        between = bodies.deepest[i] if not bodies.deepest[i] <= between else between
+        total += bodies.deepest[i]
+    found[FASTEST] = fastest**0.5 if math.isfinite(total) else math.nan
+    found[LOWEST], found[HIGHEST], found[WIDEST] = lowest, highest, widest**0.5
+    found[DEEPEST], found[BETWEEN], found[ELASTIC] = deepest, between, energy
 
 
 @part
