@@ -40,7 +40,7 @@ def draw(path: Path, table: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
             for engine, (shape, colour) in LOOKS.items():
                 own = rows[rows["engine"] == engine].sort_values(DEPTH)
                 if len(own):
-                    axes.plot(1e3 * own[DEPTH], own[COST], marker=shape, color=colour, label=engine, linewidth=0.8)
+                    axes.plot(1e3 * own[DEPTH], own[COST], marker=shape, color=colour, label=engine, linestyle="none")
                 for row in own.to_dict("records"):
                     axes.annotate(
                         row["setting"], (1e3 * row[DEPTH], row[COST]), xytext=(3, 3), textcoords="offset points",

@@ -80,7 +80,13 @@ ENGINES: Mapping[str, Peer] = {
 }
 
 BOTH = (SHAKE, OSCILLATE)
-STIFFNESSES: Mapping[str, float] = {"4 N/mm": 4e3, "32 N/mm": 3.2e4, "256 N/mm": 2.56e5, "2048 N/mm": 2.048e6}
+STIFFNESSES: Mapping[str, float] = {
+    "2 N/mm": 2e3,
+    "4 N/mm": 4e3,
+    "32 N/mm": 3.2e4,
+    "256 N/mm": 2.56e5,
+    "2048 N/mm": 2.048e6,
+}
 
 
 def _ours() -> Iterator[Setting]:
