@@ -1,4 +1,4 @@
-"""How many smarticles there are and how many escaped; how a pile spreads, leans and sheds that no wall holds any more."""
+"""How many smarticles there are, and how many escaped; how a pile spreads, leans and sheds that no wall holds."""
 
 from __future__ import annotations
 
