@@ -6,20 +6,16 @@ The three-dimensional part is drawn at twice its size and scaled down; what stan
 
 from __future__ import annotations
 
-import ctypes
 import math
-import os
-import sys
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from PIL import Image
 
-from dem.errors import InputError, RunError
+from dem.errors import InputError
 from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
@@ -35,6 +31,7 @@ from postprocess.pictures.camera import (
     wall_corners,
 )
 from postprocess.pictures.force_lines import force_lines, force_tubes
+from postprocess.pictures.graphics import check_graphics, quiet_vtk
 from postprocess.pictures.surroundings import Bounds, Surroundings
 
 with warnings.catch_warnings():
@@ -42,8 +39,6 @@ with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     import pyvista as pv
     import pyvista.plotting
-
-from vtkmodules.vtkCommonCore import vtkLogger
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -133,8 +128,8 @@ class Canvas:
         self._ghost: Any = None  # what is left of it then
         self._hooks: list[Any] = []  # the lower and the upper one
         self._boxes: pv.PolyData | None = None
-        _check_graphics()
-        with _quiet_vtk():
+        check_graphics()
+        with quiet_vtk():
             width, height = look.panel
             self._plotter: Any = pv.Plotter(
                 off_screen=True,
@@ -172,7 +167,7 @@ class Canvas:
             (height, width, 3) of `Look.panel`.
         """
         colours = colours if colours.ndim == 3 else np.repeat(colours[:, None], 3, axis=1)
-        with _quiet_vtk():
+        with quiet_vtk():
             self._set_boxes(frame, colours)
             self._move(frame)
             if self._largest_force is not None:
@@ -372,34 +367,3 @@ def _cross(bars: Sequence[Bounds]) -> pv.PolyData:
     first, *rest = (pv.Box(tuple(MILLIMETRE * bound for bound in bar)) for bar in bars)
     mesh: pv.PolyData = first.append_polydata(*rest)
     return mesh
-
-
-def _check_graphics() -> None:
-    """Complains where VTK, instead of complaining, would end the process by a segmentation fault.
-
-    Raises:
-        RunError: There is neither a display nor a library to draw without one.
-    """
-    if sys.platform != "linux" or os.environ.get("DISPLAY"):
-        return
-    for library in ("libEGL.so.1", "libOSMesa.so.8"):
-        try:
-            ctypes.CDLL(library)
-        except OSError:
-            continue
-        return
-    msg = (
-        "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
-    )
-    raise RunError(msg)
-
-
-@contextmanager
-def _quiet_vtk() -> Iterator[None]:
-    """Keeps VTK from warning, on standard error, that there is no display."""
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    try:
-        yield
-    finally:
-        vtkLogger.SetStderrVerbosity(before)
