@@ -112,6 +112,12 @@ def pairs(seconds: float, hinged_step: float) -> Sequence[Pair]:
             with_=plain,
         ),
         Pair(
+            effect="contact forces",
+            pays="forces at all contacts read and written every 40 ms",
+            without=plain,
+            with_=recorded(contact_forces=True),
+        ),
+        Pair(
             effect="sphere glyphs",
             pays="a file every 40 ms, a point per sphere",
             without=plain,

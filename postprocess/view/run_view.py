@@ -12,7 +12,7 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import read_run
-from postprocess.export.bodies import KINDS, Bodies
+from postprocess.export.bodies import KINDS, ON_REQUEST, Bodies
 from postprocess.export.colours import colour_field, painted, scalars, scale, span
 from postprocess.export.fields import FIELDS, IDENTITY, Field, fields_of, link_values
 from postprocess.view.window import BOX_FACES, Window
@@ -55,7 +55,7 @@ class RunView:
         self.field = colour_field(None, self.run)
         self.pick: Pick | None = None
         self.window = Window(self.run)
-        kinds = [kind for kind in KINDS if kind != "crossings"]
+        kinds = [kind for kind in KINDS if kind not in ON_REQUEST]
         self._bodies = Bodies.read(self.run, kinds, [each for each in self.fields if each.name in IDENTITY])
         self._bodies.hold(self.frames[index] for index in self._spread(_SAMPLES))
         self._bounds: dict[str, tuple[float, float]] = {}

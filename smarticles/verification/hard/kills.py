@@ -56,8 +56,8 @@ def start(path: Path, out: Path, threads: int) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "smarticles", "run", str(path), "--out", str(out), "--threads", str(threads)]
     if (out / "run.json").exists():
         command.append("--resume")
-    said = out.with_suffix(".txt").open("ab")
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+    with out.with_suffix(".txt").open("ab") as said:
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
 
 
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
