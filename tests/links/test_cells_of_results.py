@@ -38,12 +38,18 @@ CELLS = [
     ("procedures-code", "shape-change_lw1.10_links_seed1"),
     ("factors", "text_halt_mu0.4_lw1.00_seed1"),
     ("engines", "hook_links_seed2"),
+    ("melting-code", "static_lw0.70_links_seed1"),
+    ("casting", "static_links_seed1"),
+    ("fracture", "static_lw0.70_links_seed1"),
 ]
 OTHERS = [
     ("procedures", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
     ("procedures-code", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
     ("factors", "text_halt_mu0.4_lw1.00_seed1", "text_halt_mu0.2_lw1.00_seed1"),
     ("engines", "internal_links_seed7", "shape-change_links_seed5"),
+    ("melting-code", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
+    ("casting", "static_links_seed1", "internal_links_seed1"),
+    ("fracture", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
 ]
 
 
