@@ -48,7 +48,6 @@ OTHERS = [
     ("factors", "text_halt_mu0.4_lw1.00_seed1", "text_halt_mu0.2_lw1.00_seed1"),
     ("engines", "internal_links_seed7", "shape-change_links_seed5"),
     ("melting-code", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
-    ("casting", "static_links_seed1", "internal_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
 ]
 
