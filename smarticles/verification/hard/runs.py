@@ -64,14 +64,14 @@ class Noting(Watchdog):
 
 @dataclass
 class Timing(Recorder):
-    """The same recorder, which adds up the processor time of the watchdog's looks, and spoils what it looks at.
+    """The same recorder, which times the watchdog's looks, and spoils what it looks at.
 
     Args:
-        spent: processor time of all looks [s].
+        looks: processor time of each [s].
         spoil: done to the engine before each record; None: nothing is.
     """
 
-    spent: float = 0.0
+    looks: list[float] = field(default_factory=list)
     spoil: Callable[[Engine], None] | None = None
 
     def record(self, engine: Engine, phase: int) -> None:
@@ -86,7 +86,7 @@ class Timing(Recorder):
         try:
             super().watch(engine, state)
         finally:
-            self.spent += time.process_time() - begun
+            self.looks.append(time.process_time() - begun)
 
 
 @dataclass
@@ -98,7 +98,8 @@ class Watched:
         error: kind and text of the error that it ended in; None: it was done.
         series: by name.
         nearest: largest share of each limit of the watchdog that was reached.
-        cost: share of the processor time that the watchdog took [1].
+        cost: share of the processor time that the watchdog took, but for its first look [1].
+        first_look: processor time of that, in which compiled code is loaded [s].
     """
 
     scene: Scene | None
@@ -106,6 +107,7 @@ class Watched:
     series: dict[str, np.ndarray] = field(default_factory=dict)
     nearest: dict[str, float] = field(default_factory=dict)
     cost: float = 0.0
+    first_look: float = 0.0
 
     @property
     def weight(self) -> float:
@@ -198,4 +200,5 @@ def whole(
         with h5py.File(out / "series.h5") as file:
             series = {name: dataset[()] for name, dataset in file.items()}
     nearest = {limit: share for _, noting in built if noting for limit, share in noting.nearest.items()}
-    return Watched(scene, error, series, nearest, sum(timing.spent for timing, _ in built) / total)
+    looks = [look for timing, _ in built for look in timing.looks] or [0.0]
+    return Watched(scene, error, series, nearest, sum(looks[1:]) / total, looks[0])
