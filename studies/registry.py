@@ -28,6 +28,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
         for study in (
             gravish.SHIPPED,
             friction.SHIPPED,
+            friction.COMPACTION,
             sensitivity.SHIPPED,
             sensitivity.SECTION,
             procedures.SHIPPED,

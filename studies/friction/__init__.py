@@ -1,4 +1,4 @@
-"""The study `friction`: which friction packs smarticles as Gravish et al. found, and is it that of steel?"""
+"""The studies `friction` and `compaction`: which friction packs smarticles as Gravish et al. found, how φ goes on."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from studies.base.shipped import Shipped
 
 if TYPE_CHECKING:
+    from studies.friction.compaction import Compaction
     from studies.friction.study import Friction
 
 
@@ -19,6 +20,12 @@ def _load(*, quick: bool) -> Friction:
     return Friction({} if quick else AT_THE_PAPERS)
 
 
+def _load_compaction(*, quick: bool) -> Compaction:
+    from studies.friction.compaction import Compaction  # noqa: PLC0415  (pandas, matplotlib, scipy)
+
+    return Compaction()
+
+
 SHIPPED = Shipped(
     name="friction",
     folder=Path(__file__).parent,
@@ -27,4 +34,14 @@ SHIPPED = Shipped(
     about="""\
 U-shapes of three aspect ratios l/w, poured and shaken for Gravish's 20 s, at coefficients of friction μ from 0.2
 to 0.8: which μ gives Gravish's packing fractions, whether one does at every l/w, and how steel compares.""",
+)
+
+COMPACTION = Shipped(
+    name="compaction",
+    folder=Path(__file__).parent,
+    load=_load_compaction,
+    pictured={"friction": 0.4},
+    about="""\
+U-shapes of l/w = 0.7 shaken for 200 s, ten times as long as Gravish's, at two coefficients of friction: whether φ
+still grows, and by which law. 16 runs of about five minutes each.""",
 )
