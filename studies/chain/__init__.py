@@ -25,5 +25,5 @@ SHIPPED = Shipped(
     about="""\
 strain test of a chain of two or six robots between two walls, against the findings of Savoie et al. (Soft Matter
 2023): force, yield, width, fracture against confinement; and what friction, servos and strings, which the paper
-does not tell, matter. 288 runs, on links, trial by trial. --quick takes minutes.""",
+does not tell, matter. 144 runs, on links, trial by trial. --quick takes minutes.""",
 )

@@ -41,6 +41,7 @@ CELLS = [
     ("melting-code", "static_lw0.70_links_seed1"),
     ("casting", "static_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1"),
+    ("chain", "baseline_n2_hH0.520_seed1"),
 ]
 OTHERS = [
     ("procedures", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
@@ -49,6 +50,7 @@ OTHERS = [
     ("engines", "internal_links_seed7", "shape-change_links_seed5"),
     ("melting-code", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
+    ("chain", "baseline_n2_hH0.520_seed1", "friction-0.4_n2_hH0.750_seed1"),
 ]
 
 
