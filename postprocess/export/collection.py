@@ -21,6 +21,9 @@ SCRIPT = "show_in_paraview.py"
 class Collection:
     """Files of one export: `smarticles.pvd` lists `smarticles/smarticles_000000.vtp` and so on, likewise of each kind.
 
+    A kind has a file for every frame, without a point where there is none of it: ParaView would show the one before, a
+    wall that is gone or the forces of a moment ago.
+
     Args:
         folder: To write into; it exists.
         run: Whose frames they are.
@@ -29,32 +32,58 @@ class Collection:
     def __init__(self, folder: Path, run: RunManifest) -> None:
         self._folder = folder
         self._run = run
-        self._listed: dict[str, list[tuple[float, str]]] = {}
+        self._frames: list[tuple[int, float, int]] = []  # number, time, phase
+        self._without: dict[str, pv.PolyData] = {}  # of each kind that there was: what stands where there is none
 
     def add(self, number: int, frame: Frame, bodies: Mapping[str, pv.PolyData]) -> None:
         """Write the bodies of a frame."""
         for kind, mesh in bodies.items():
-            name = f"{kind}/{kind}_{number:06d}.vtp"
-            (self._folder / kind).mkdir(exist_ok=True)
-            # The name by which VTK's readers know the time.
-            mesh.field_data["TimeValue"] = np.array([frame.time])
-            mesh.field_data["phase"] = np.array([frame.phase])
-            mesh.GetFieldData().AddArray(_text("run_name", self._run.name))
-            mesh.GetFieldData().AddArray(_text("scene_sha256", self._run.scene_sha256))
-            mesh.save(self._folder / name)
-            self._listed.setdefault(kind, []).append((frame.time, name))
+            if kind not in self._without:
+                (self._folder / kind).mkdir()
+                self._without[kind] = _without_points(mesh)
+                for before in self._frames:
+                    self._write(kind, self._without[kind], before)
+        self._frames.append((number, frame.time, frame.phase))
+        for kind, none in self._without.items():
+            self._write(kind, bodies.get(kind, none), self._frames[-1])
+
+    def _write(self, kind: str, mesh: pv.PolyData, frame: tuple[int, float, int]) -> None:
+        number, time, phase = frame
+        run = self._run
+        # The name by which VTK's readers know the time.
+        mesh.field_data["TimeValue"] = np.array([time])
+        mesh.field_data["phase"] = np.array([phase])
+        mesh.field_data["middle_length_m"] = np.array([run.middle_length])
+        mesh.field_data["thickness_m"] = np.array([min(run.thickness_in_plane, run.thickness_normal)])
+        mesh.GetFieldData().AddArray(_text("run_name", run.name))
+        mesh.GetFieldData().AddArray(_text("scene_sha256", run.scene_sha256))
+        mesh.save(self._folder / _file(kind, number))
 
     def close(self) -> None:
         """Write what lists the files, and the script."""
-        for kind, entries in self._listed.items():
+        for kind in self._without:
             root = ET.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
             parent = ET.SubElement(root, "Collection")
-            for time, name in entries:
-                ET.SubElement(parent, "DataSet", timestep=f"{time:.9g}", group="", part="0", file=name)
+            for number, time, _ in self._frames:
+                place = _file(kind, number)
+                ET.SubElement(parent, "DataSet", timestep=f"{time:.9g}", group="", part="0", file=place)
             tree = ET.ElementTree(root)
             ET.indent(tree)
             tree.write(self._folder / f"{kind}.pvd", encoding="utf-8", xml_declaration=True)
         shutil.copyfile(Path(__file__).with_name(SCRIPT), self._folder / SCRIPT)
+
+
+def _file(kind: str, number: int) -> str:
+    """Where the bodies of one kind are, of the frame of this number."""
+    return f"{kind}/{kind}_{number:06d}.vtp"
+
+
+def _without_points(mesh: pv.PolyData) -> pv.PolyData:
+    """Nothing, with the fields of this mesh: what reads or filters them finds them at all times."""
+    empty = pv.PolyData()
+    empty.GetPointData().CopyStructure(mesh.GetPointData())
+    empty.GetCellData().CopyStructure(mesh.GetCellData())
+    return empty
 
 
 def _text(name: str, value: str) -> vtkStringArray:

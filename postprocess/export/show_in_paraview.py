@@ -93,6 +93,23 @@ def plain(kind: str, source: Any, view: Any) -> Any:
     return shown
 
 
+def times(source: Any) -> list[float]:
+    """All times of a collection, the last one first; one alone is no list in ParaView."""
+    told = source.TimestepValues
+    return list(reversed([told] if isinstance(told, float) else list(told)))
+
+
+def points_at(source: Any, time: float) -> int:
+    """How many points it has at a time, which is read."""
+    source.UpdatePipeline(time)
+    return int(source.GetDataInformation().GetNumberOfPoints())
+
+
+def size(source: Any, name: str) -> float:
+    """A length of all smarticles [m]."""
+    return float(source.FieldData[name].GetRange()[0])
+
+
 def boxes(_kind: str, source: Any, view: Any) -> None:
     """Coloured by crossings, one scale for all times; of motion in a plane, which has none, by number."""
     shown = simple.Show(source, view)
@@ -123,7 +140,8 @@ def colouring(source: Any) -> str:
 
 def wall(kind: str, source: Any, view: Any) -> None:
     """The half behind the pile, seen from the front; of a plane all of it."""
-    source.UpdatePipeline()
+    # One that was taken away is none at the end.
+    next(time for time in times(source) if points_at(source, time))
     low_x, high_x, low_y, high_y = source.GetDataInformation().GetBounds()[:4]
     if abs((high_x - low_x) - (high_y - low_y)) > 0.01 * (high_x - low_x):
         plain(kind, source, view)
@@ -145,19 +163,19 @@ def arrows(kind: str, source: Any, view: Any) -> None:
     glyph = simple.Glyph(registrationName="passages", Input=source, GlyphType="Arrow")
     glyph.OrientationArray = ["POINTS", "direction"]
     glyph.ScaleArray = ["POINTS", "No scale array"]
-    glyph.ScaleFactor = 0.004
+    glyph.ScaleFactor = size(source, "middle_length_m") / 3
     glyph.GlyphMode = "All Points"
     plain(kind, glyph, view)
 
 
 def forces(kind: str, source: Any, view: Any) -> None:
-    """Tubes as thick as the normal forces are large, the largest a link thick, through smarticles that show them."""
+    """Tubes as thick as the normal forces are large, the largest of all times a link thick, through the smarticles."""
+    name = "normal_force_N"
+    largest = max(source.CellData[name].GetRange()[1] for time in times(source) if points_at(source, time))
     data = simple.CellDatatoPointData(registrationName="normal forces", Input=source)
-    data.UpdatePipeline()
-    largest = data.PointData.GetArray("normal_force_N").GetRange()[1]
-    tubes = simple.Tube(registrationName=kind, Input=data)
-    tubes.Scalars, tubes.VaryRadius = ["POINTS", "normal_force_N"], "By Absolute Scalar"
-    tubes.Radius = 3e-4 / largest
+    tubes = simple.Tube(registrationName="force chains", Input=data)
+    tubes.Scalars, tubes.VaryRadius = ["POINTS", name], "By Absolute Scalar"
+    tubes.Radius = size(source, "thickness_m") / 2 / largest
     plain(kind, tubes, view)
     simple.GetDisplayProperties(simple.FindSource("smarticles"), view).Opacity = 0.25
 

@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 import pyvista as pv
 from synthetic import T1, T2, SyntheticRun, W, u_shape, write_frame, write_run
+from synthetic.forces import pressed
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
 from dem.errors import InputError, RunError
-from dem.record.frames import read_frames
+from dem.record.forces import force_mesh
+from dem.record.frames import FrameWriter, read_frames
+from dem.record.names import FORCE
 from postprocess.export.export import FORMATS, export_run
 from postprocess.export.fields import FIELDS
 from postprocess.export.solids import SUFFIXES
+from postprocess.geometry.links import centres_of_mass
 
 HOSTILE = [
     "<script>alert(1)</script>",
@@ -177,6 +181,38 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
         "smarticles.pvd", "wall.pvd", "floor.pvd", "crossings.pvd",
     }  # fmt: skip
     assert (folder / "show_in_paraview.py").is_file()
+
+
+def test_a_kind_that_comes_or_goes_is_nothing_at_the_other_times(pile, tmp_path):
+    # ParaView shows the file before of a collection that has none at a time: a wall that was taken away would stay.
+    laid = pressed([(0, 1)], [2.0])
+    writer = FrameWriter(pile, FORCE)
+    for index, frame in enumerate(read_frames(pile)):
+        found = laid if index in (2, 3) else pressed([], [])
+        writer.write(force_mesh(found, centres_of_mass(frame.vertices), time=frame.time, phase=frame.phase), frame.time)
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    for name in ("run.json", "done.json"):
+        content = json.loads((pile / name).read_text())
+        content["phases"][3]["type"] = "remove-container"
+        (pile / name).write_text(json.dumps(content))
+    (pile / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in kinds]}))
+    folder = export_run(
+        pile, to="vtp", output=tmp_path / "out", every_frame=True, wanted=["forces"],
+        unwanted=["local_packing_fraction"],
+    )  # fmt: skip
+    found = {}
+    for kind in ("wall", "forces"):
+        listed = [entry.attrib["file"] for entry in ET.parse(folder / f"{kind}.pvd").getroot().iter("DataSet")]
+        assert listed == [f"{kind}/{kind}_{k:06d}.vtp" for k in range(8)]
+        found[kind] = [pv.read(folder / file) for file in listed]
+    assert [mesh.n_points > 0 for mesh in found["wall"]] == 6 * [True] + 2 * [False]
+    assert [mesh.n_points > 0 for mesh in found["forces"]] == [k in (2, 3) for k in range(8)]
+    # A filter finds its fields at all times.
+    assert {tuple(mesh.cell_data.keys()) for mesh in found["forces"]} == {tuple(found["forces"][2].cell_data.keys())}
+    assert {float(mesh.field_data["thickness_m"][0]) for mesh in found["forces"]} == {T2}
+    assert [float(mesh.field_data["TimeValue"][0]) for mesh in found["wall"]] == pytest.approx(
+        read_frames(pile).times.tolist()
+    )
 
 
 def test_fields_can_be_left_out_but_not_who_is_who(pile, tmp_path):

@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 from synthetic import RADIUS, SyntheticRun, write_manifest, write_run
+from synthetic.forces import pressed
 
-from dem.record.frames import read_frames
+from dem.record.forces import force_mesh
+from dem.record.frames import FrameWriter, read_frames
+from dem.record.names import FORCE
 from postprocess.export.export import export_run
+from postprocess.geometry.links import centres_of_mass
 
 PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")
 XVFB = [] if os.environ.get("DISPLAY") or os.environ.get("PVPYTHON") else ["xvfb-run", "--auto-servernum"]
@@ -35,6 +39,13 @@ cut = simple.FindSource("wall, cut open")
 if cut is not None:
     cut.UpdatePipeline()
     told["cut"] = list(cut.GetDataInformation().GetBounds())
+told["points"] = {}
+for (name, _), proxy in simple.GetSources().items():
+    counts = []
+    for time in boxes.TimestepValues:
+        proxy.UpdatePipeline(time)
+        counts.append(proxy.GetDataInformation().GetNumberOfPoints())
+    told["points"][name] = counts
 names = {proxy.SMProxy: name for (name, _), proxy in simple.GetSources().items()}
 view = simple.GetActiveView()
 inputs = [part.Input.SMProxy for part in view.Representations if part.Visibility and hasattr(part, "Input")]
@@ -72,6 +83,30 @@ def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path):
     coloured = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in pictures]
     assert min(coloured) > 3000
     assert all((one != other).any() for one, other in itertools.pairwise(pictures))
+
+
+def test_forces_are_tubes_and_a_wall_that_is_taken_away_is_gone(tmp_path):
+    made = SyntheticRun(count=12, frames_per_phase=1, phases=("relax", "remove-container"), packing=(0.05, 0.05))
+    run = write_run(tmp_path / "run", made)
+    (run / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in made.phases]}))
+    # None at first: what reads the collection finds no force before there is one.
+    writer = FrameWriter(run, FORCE)
+    for found, frame in zip([pressed([], []), pressed([(0, 1), (2, 3)], [2.0, 1.0])], read_frames(run), strict=True):
+        mesh = force_mesh(found, centres_of_mass(frame.vertices), time=frame.time, phase=frame.phase)
+        writer.write(mesh, frame.time)
+    folder = export_run(
+        run, to="vtp", every_frame=True, wanted=["forces", "crossings"], unwanted=["local_packing_fraction"]
+    )
+    told = shown(folder, tmp_path, "--film", tmp_path / "film")
+    assert [count > 0 for count in told["points"]["wall, cut open"]] == [True, False]
+    assert [count > 0 for count in told["points"]["force chains"]] == [False, True]
+    assert "force chains" in told["shown"]
+    red = [
+        int(((picture[..., 0] > 90) & (picture[..., 1:].max(axis=2) < 70)).sum())
+        for picture in map(pixels, sorted((tmp_path / "film").glob("*.png")))
+    ]
+    assert red[0] == 0
+    assert red[1] > 100
 
 
 def test_a_chain_in_a_plane(tmp_path):
