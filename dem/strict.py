@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -62,11 +63,11 @@ class Strict(BaseModel):
 def _as_a_number(text: str) -> str:
     """What to do about text where a number is wanted."""
     try:
-        float(text)
+        number = float(text)
     except ValueError:
         pass
     else:
-        return "leave out the quotes"
+        return "leave out the quotes" if math.isfinite(number) else "write a finite one"
     if _WITH_COMMA.fullmatch(text):
         return f"write {text.strip().replace(',', '.')}, with a point"
     return "leave out the unit, which the key names" if _WITH_UNIT.fullmatch(text) else "write it in digits"

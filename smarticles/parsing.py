@@ -33,7 +33,7 @@ class Parser(argparse.ArgumentParser):
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
             what = message.partition(":")[0].removeprefix("argument ")
-            message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known, cutoff=0.5)}"
+            message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known)}"
         wrong = re.fullmatch(r"(argument .*): invalid (?:float|int) value: ('.*')", message, flags=re.DOTALL)
         if wrong:
             message = f"{wrong[1]}: {wrong[2]} is not a number"

@@ -35,6 +35,11 @@ class Collection:
         self._frames: list[tuple[int, float, int]] = []  # number, time, phase
         self._without: dict[str, pv.PolyData] = {}  # of each kind that there was: what stands where there is none
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Of what there was any so far."""
+        return tuple(self._without)
+
     def add(self, number: int, frame: Frame, bodies: Mapping[str, pv.PolyData]) -> None:
         """Write the bodies of a frame."""
         for kind, mesh in bodies.items():

@@ -84,11 +84,16 @@ def export_run(
             painter = Painter.of(run, color_by, (frames[index] for index in chosen))
             if folder:
                 made.mkdir()
+            found = 0
             for done, index in enumerate(chosen):
                 frame = frames[index]
-                content = solids_file(painter.solids(bodies, frame), to, painter.told(frame))
-                (made / f"frame_{index:06d}.{to}" if folder else made).write_bytes(content)
+                solids = painter.solids(bodies, frame)
+                found += len(solids)
+                if solids:  # a wall alone that was taken away is no file
+                    target = made / f"frame_{index:06d}.{to}" if folder else made
+                    target.write_bytes(solids_file(solids, to, painter.told(frame)))
                 tell(done + 1, len(chosen))
+            _refuse_nothing(found, kinds)
     return path
 
 
@@ -99,7 +104,19 @@ def _write_collection(folder: Path, bodies: Bodies, frames: FrameSequence, chose
         frame = frames[index]
         collection.add(index, frame, bodies.at(frame))
         tell(done + 1, len(chosen))
+    _refuse_nothing(len(collection.kinds), bodies.kinds)
     collection.close()
+
+
+def _refuse_nothing(found: int, kinds: Sequence[str]) -> None:
+    """A file without a body is none that was wanted.
+
+    Raises:
+        InputError: nothing was found.
+    """
+    if not found:
+        msg = f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less"
+        raise InputError(msg)
 
 
 def _checked_output(directory: Path, output: Path | str | None, to: str, *, folder: bool) -> Path:

@@ -113,9 +113,14 @@ def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surrounding
         # The upper one may be above the pile.
         upper = circle(surroundings.hooks.length / 2, surroundings.hooks.heights(frame.time)[1])
         points = np.concatenate([points, upper * MILLIMETRE])
-    parts = [points, circle(run.container_radius * MILLIMETRE, 0.0)]
     top = _wall_height(float(points[:, 2].max()), run)
-    for radius, height in wall_corners(top, run, surroundings)[1:]:
+    return np.concatenate([points, circle(run.container_radius * MILLIMETRE, 0.0), rims(top, run, look, surroundings)])
+
+
+def rims(top: float, run: RunManifest, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
+    """Points (n, 3) [mm] of a wall that is drawn up to `top` [mm]; none in a plane."""
+    parts = [np.empty((0, 3))]
+    for radius, height in [] if run.planar else wall_corners(top, run, surroundings)[1:]:
         rim = circle(radius, height)
         # The front is cut open.
         parts.append(rim if look.elevation >= 90 else rim[rim @ look.axes[2] > look.axes[2, 2] * height])

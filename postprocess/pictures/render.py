@@ -213,6 +213,9 @@ class _Set:
         self.scale = ColourScale.of(look.colouring, *self._span(limits))
         self._largest = max(shot.largest_force(frames) for shot, frames in pairs) if forces else None
         extents = [shot.extent(frames, look) for shot, frames in pairs]
+        # All walls are drawn as high as the highest pile asks for, and some are wider than that one's.
+        top = float(np.concatenate(extents)[:, 2].max())
+        extents += [shot.rims(top, look) for shot in shots]
         self._stack = ExitStack()
         with ExitStack() as stack:
             self._canvases = [

@@ -13,7 +13,7 @@ from dem.errors import InputError
 from dem.record.forces import NO_FORCES, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import RunManifest, read_run
-from postprocess.pictures.camera import Look, extent
+from postprocess.pictures.camera import Look, extent, rims
 from postprocess.pictures.surroundings import Surroundings, read_surroundings
 
 if TYPE_CHECKING:
@@ -44,6 +44,10 @@ class Shot:
     def extent(self, indices: Iterable[int], look: Look) -> NDArray[np.float64]:
         """(n, 3) [mm], what the camera must have in view to show some frames."""
         return np.concatenate([extent(self.frames[int(i)], self.run, look, self.around) for i in indices])
+
+    def rims(self, top: float, look: Look) -> NDArray[np.float64]:
+        """(n, 3) [mm], what of a wall that reaches up to `top` [mm] the camera must have in view."""
+        return rims(top, self.run, look, self.around)
 
     def values(self, indices: Iterable[int], look: Look) -> list[NDArray[Any]]:
         """What the colours of some frames tell, (N,) each."""

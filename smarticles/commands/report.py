@@ -48,6 +48,7 @@ def write_report(arguments: argparse.Namespace) -> int:
     if arguments.output is not None and not output.parent.is_dir():
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg)
+    _refuse_what_is_no_table(arguments.accuracy)
     from smarticles.reporting.kinds import page_of  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.page import to_html  # noqa: PLC0415
 
@@ -56,3 +57,19 @@ def write_report(arguments: argparse.Namespace) -> int:
         temporary.write_text(text, encoding="utf-8")
     print(f"{output}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser")
     return 0
+
+
+def _refuse_what_is_no_table(table: Path | None) -> None:
+    """A table that was asked for is on the page; of the one that ships the page says why it is not there.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    if table is None:
+        return
+    from dem.plan.measured import QUANTITIES, read_table  # noqa: PLC0415
+
+    try:
+        read_table(table, of=tuple(QUANTITIES))
+    except InputError as error:
+        raise InputError(str(error).replace("--table", "--accuracy")) from None

@@ -70,6 +70,8 @@ def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict
         ("1:30", "write it in digits"),
         ("20", "leave out the quotes"),
         ("1e3", "leave out the quotes"),
+        ("nan", "write a finite one"),
+        ("-inf", "write a finite one"),
         ("3 h", "leave out the unit, which the key names"),
         ("2.5mm", "leave out the unit, which the key names"),
         ("0,5", "write 0.5, with a point"),

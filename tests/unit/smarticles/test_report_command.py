@@ -145,6 +145,9 @@ def test_what_exists_is_kept_and_what_is_no_run_refused(run: Path, tmp_path: Pat
     assert "let its name end in .html" in smarticles("report", run, "--output", tmp_path / "a.pdf").err
     assert "does not exist; make it" in smarticles("report", run, "--output", tmp_path / "no" / "a.html").err
     assert "is no run, sweep or study" in smarticles("report", tmp_path, "--output", tmp_path / "a.html").err
+    none = smarticles("report", run, "--output", tmp_path / "b.html", "--accuracy", tmp_path / "none.csv")
+    assert (none.status, f"--accuracy {tmp_path / 'none.csv'}: cannot be read" in none.err) == (2, True)
+    assert not (tmp_path / "b.html").exists()
 
 
 # -- sweeps and studies ------------------------------------------------------------------------------------------------

@@ -295,6 +295,18 @@ def test_refusals_are_one_line_and_leave_nothing(pile, asked, message):
     assert sorted(pile.rglob("*")) == before
 
 
+@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_file_of_nothing_is_refused(pile, tmp_path, suffix, every):
+    # This run has neither hooks nor strings.
+    with pytest.raises(InputError, match="of hooks, strings there is none here; leave out less"):
+        export_run(
+            pile, to=suffix, output=tmp_path / f"out.{suffix}", every_frame=every,
+            unwanted=["smarticles", "wall", "floor"],
+        )  # fmt: skip
+    assert list(tmp_path.iterdir()) == [pile]
+
+
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_nothing_is_replaced(pile, tmp_path, suffix):
     target = tmp_path / f"there.{suffix}"

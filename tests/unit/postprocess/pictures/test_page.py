@@ -182,6 +182,24 @@ def test_runs_beside_each_other_have_one_scale_one_time_and_one_bar(tmp_path):
     assert (np.abs(alone[60:370, :part] - right).max(axis=2) > 30).sum() > 100
 
 
+def test_a_wide_container_beside_a_tall_pile_is_whole(tmp_path):
+    """Walls are drawn as high as the tallest pile asks for: the rim of a wider one is in the picture too."""
+    flat = u_shape(0.7 * W)[None]
+    wide = one(tmp_path / "a", flat + np.array([0.0, 0.0, 0.001]))
+    tall = one(tmp_path / "b", np.concatenate([flat + np.array([0.0, 0.0, z]) for z in (0.001, 0.06)]))
+    manifest = json.loads((tall / "run.json").read_text())
+    (tall / "run.json").write_text(json.dumps(manifest | {"container_radius_m": 0.012}))
+    look = {"size": (400, 400), "color_by": "id"}
+    image = pixels(render_run(wide, compare=[tall], output=tmp_path / "c.png", **look))
+    across = image.shape[1] // 2
+    for number in (0, 1):
+        panel = image[60:360, number * across : (number + 1) * across]
+        drawn = np.flatnonzero((panel.min(axis=2) < 250).any(axis=0))
+        assert drawn[0] > 0.005 * across, f"panel {number} is cut off on the left"
+        assert drawn[-1] < 0.995 * across - 1, f"panel {number} is cut off on the right"
+        assert np.ptp(drawn) > 0.2 * across
+
+
 def test_runs_are_compared_at_the_last_time_that_all_have(tmp_path):
     """The picture of two runs is that of either at this time."""
     short = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=2, phases=("deposit", "relax")))
