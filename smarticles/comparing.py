@@ -196,7 +196,9 @@ def same_bits(one: Path, other: Path) -> Bits:
     same = sum(a.read_bytes() == b.read_bytes() for a, b in zip(*frames, strict=False))
     series: bool | None = None
     differs_at, alike = None, len(frames[0]) == len(frames[1])
-    if all((path / SERIES).is_file() for path in (one, other)):
+    recorded = [(path / SERIES).is_file() for path in (one, other)]
+    alike = alike and recorded[0] == recorded[1]
+    if all(recorded):
         a, b = read_series(one), read_series(other)
         alike = alike and len(a) == len(b) and a.data.keys() == b.data.keys()
         length = min(len(a), len(b))

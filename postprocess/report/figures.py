@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from dem.record.files import whole
 
 with warnings.catch_warnings():
@@ -214,13 +214,18 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
 
     Raises:
         InputError: the file exists and must not be replaced, or its folder does not exist.
+        RunError: the disk is full, or the folder cannot be written.
     """
     refuse_to_overwrite(path, overwrite=overwrite)
     if not path.parent.is_dir():
         msg = f"{path}: the folder {path.parent} does not exist: create it or choose another output"
         raise InputError(msg)
-    with whole(path, shared=True) as temporary:
-        yield temporary
+    try:
+        with whole(path, shared=True) as temporary:
+            yield temporary
+    except OSError as error:  # which names the temporary file, or none
+        msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
+        raise RunError(msg) from error
 
 
 def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:

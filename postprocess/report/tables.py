@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from dem.record.files import whole
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
 
     Raises:
         InputError: The file exists already, its folder does not, or it is no `.csv`.
+        RunError: The disk is full, or the like.
     """
     path = Path(path)
     if path.suffix != ".csv":
@@ -39,4 +40,7 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
     except (FileNotFoundError, PermissionError) as error:
         msg = f"cannot write table {path}: {error.strerror}; choose a folder that can be written"
         raise InputError(msg) from None
+    except OSError as error:  # which names the temporary file, or none
+        msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
+        raise RunError(msg) from error
     return path

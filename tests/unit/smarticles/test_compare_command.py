@@ -28,6 +28,16 @@ def test_a_run_and_its_copy_are_the_same(tmp_path: Path, write_run: WriteRun, sm
     assert {"scene: the same", "versions: the same", "measures: the same"} <= {*said.out.splitlines()}
 
 
+def test_a_run_that_lost_its_series_is_not_the_same(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a")
+    shutil.copytree(run, tmp_path / "b")
+    (tmp_path / "b" / "series.h5").unlink()
+    said = smarticles("compare", run, tmp_path / "b")
+    assert "identical bits: no, one has more samples, columns or frames, 16 of 16 frames are the same" in said.out
+
+
 def test_what_differs_is_told_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     one = write_run(tmp_path / "a")
     other = write_run(tmp_path / "b", packing=(0.1, 0.105, 0.15, 0.132), shake_time=10.0)

@@ -261,3 +261,11 @@ def test_run_radius_is_drawn_to_scale(tmp_path):
     ratio = np.ptp(inside) / np.ptp(columns)
     # The rim is nearer to the camera than the U, so the U looks a little smaller.
     assert 0.8 * (W + T2) / (2 * RADIUS) < ratio < (W + T2) / (2 * RADIUS)
+
+
+def test_a_disk_that_is_full_is_told_with_the_picture(make_run, mount_disk):
+    # What draws tells of no file, and what moves it of a temporary one.
+    disk = mount_disk("16k")
+    with pytest.raises(RunError, match=rf"^{disk / 'a.png'}: cannot be written \(No space left on device\); free"):
+        render_run(make_run(), output=disk / "a.png")
+    assert list(disk.iterdir()) == []

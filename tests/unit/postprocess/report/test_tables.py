@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from postprocess import measure_run, write_table
 
 
@@ -34,7 +34,7 @@ class Unwritable:
 def test_failed_write_leaves_the_old_table(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("old")
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(RunError, match=rf"cannot write table {path}: disk full; free space"):
         write_table(Unwritable(), path, overwrite=True)
     assert path.read_text() == "old"
     assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
