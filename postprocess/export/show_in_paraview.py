@@ -99,15 +99,27 @@ def times(source: Any) -> list[float]:
     return list(reversed([told] if isinstance(told, float) else list(told)))
 
 
+def data_at(source: Any, time: float) -> Any:
+    """What is there at a time, itself: what ParaView tells of it may be of another time."""
+    source.UpdatePipeline(time)
+    found = simple.servermanager.Fetch(source)
+    return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found
+
+
 def points_at(source: Any, time: float) -> int:
     """How many points it has at a time, which is read."""
-    source.UpdatePipeline(time)
-    return int(source.GetDataInformation().GetNumberOfPoints())
+    return int(data_at(source, time).GetNumberOfPoints())
 
 
 def size(source: Any, name: str) -> float:
     """A length of all smarticles [m]."""
-    return float(source.FieldData[name].GetRange()[0])
+    return float(data_at(source, times(source)[0]).GetFieldData().GetArray(name).GetValue(0))
+
+
+def largest_at(source: Any, time: float, name: str) -> float:
+    """The largest value of a field of cells at a time; 0 where there is none."""
+    values = data_at(source, time).GetCellData().GetArray(name)
+    return float(values.GetRange()[1]) if values is not None and values.GetNumberOfTuples() else 0.0
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
@@ -171,7 +183,7 @@ def arrows(kind: str, source: Any, view: Any) -> None:
 def forces(kind: str, source: Any, view: Any) -> None:
     """Tubes as thick as the normal forces are large, the largest of all times a link thick, through the smarticles."""
     name = "normal_force_N"
-    largest = max(source.CellData[name].GetRange()[1] for time in times(source) if points_at(source, time))
+    largest = max(largest_at(source, time, name) for time in times(source))
     data = simple.CellDatatoPointData(registrationName="normal forces", Input=source)
     tubes = simple.Tube(registrationName="force chains", Input=data)
     tubes.Scalars, tubes.VaryRadius = ["POINTS", name], "By Absolute Scalar"
