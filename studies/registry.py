@@ -45,6 +45,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
             casting.CODE,
             collapse.SHIPPED,
             chain.SHIPPED,
+            chain.BODIES,
             engines.SHIPPED,
         )
     }

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Particle
@@ -44,12 +45,17 @@ class Chain:
     @property
     def offset(self) -> float:
         """Distance of the two rows of middle links: the tips of each row are a gap away from the other's links."""
-        return self.particle.boxes.barb_length + self.gap + self.particle.radius
+        return self.particle.boxes.barb_length + self.gap + self._half
+
+    @property
+    def _half(self) -> float:
+        """Distance of a middle link's faces from its axis."""
+        return self.particle.boxes.bulge + self.particle.radius
 
     @property
     def width(self) -> float:
         """h, the whole width [m]."""
-        return self.offset + 2 * self.particle.radius
+        return self.offset + 2 * self._half
 
     @property
     def step(self) -> float:
@@ -83,11 +89,21 @@ class Chain:
 
 def parted(state: State, diameter: float) -> bool:
     """Whether a straight line across the chain separates two neighbours, which can then not hook again."""
-    places = state.vertices[..., 0]
+    places = _corners(state)[..., 0]
     return bool((places[:-1].max(axis=1) + diameter < places[1:].min(axis=1)).any())
 
 
 def extent(state: State, diameter: float) -> float:
     """Width of the chain across its axis, with the links' thickness [m]."""
-    places = state.vertices[..., 1]
+    places = _corners(state)[..., 1]
     return float(np.ptp(places) + diameter)
+
+
+def _corners(state: State) -> NDArray[np.float64]:
+    """(N, V, 3) [m]: where the axes of the spheres' rows end, but for tips; the hinges, and of thicker middle links more."""
+    bulge, vertices = state.boxes.bulge, state.vertices
+    if not bulge:
+        return vertices
+    across = bulge * state.link_rotations[:, None, 1, :, 1]
+    hinges = vertices[:, 1:3]
+    return np.concatenate([vertices, hinges - across, hinges + across], axis=1)

@@ -5,6 +5,9 @@ apart and how thick is a choice of accuracy against cost (`Fidelity`), and no ch
 
 Body frame: origin at the centre of mass, axes along the principal axes of inertia, z along the normal of the plane.
 For the symmetric U (both angles 90°) x runs along the middle link and y from the middle link to the mouth.
+
+A middle link may be thicker in the plane than the barbs, like the body of a robot: the same spheres in rows beside each
+other in the plane, and barbs that begin where they are out of it.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +28,8 @@ LINKS = 3
 # Free distance between a barb's first sphere and the hinge's, in diameters: as much as a loaded hinge may give way
 # before the links of one smarticle touch, so that they need no exclusion from contact while they turn.
 HINGE_CLEARANCE = 0.01
+# How far barbs turn inwards beyond the right angle [rad]: what of them stands out of a thicker middle link stays out.
+INWARDS = math.radians(15)
 
 
 def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
@@ -71,7 +77,7 @@ def chain_mean_width(pitch: float) -> float:
 class Boxes:
     """Exact geometry of a smarticle. Lengths in m, angles in rad, density in kg/m³.
 
-    `angles` are (α1, α2): 0 is straight, π/2 the U.
+    `angles` are (α1, α2): 0 is straight, π/2 the U. `middle_thickness_in_plane` is that of the barbs where it is None.
     """
 
     middle_length: float
@@ -80,6 +86,23 @@ class Boxes:
     thickness_in_plane: float
     density: float
     angles: tuple[float, float] = (math.pi / 2, math.pi / 2)
+    middle_thickness_in_plane: float | None = None
+
+    @property
+    def thicknesses_in_plane(self) -> tuple[float, float, float]:
+        """Of barb 1, middle link, barb 2 [m]."""
+        barb, middle = self.thickness_in_plane, self.middle_thickness_in_plane
+        return (barb, barb if middle is None else middle, barb)
+
+    @property
+    def bulge(self) -> float:
+        """By how much the middle link is thicker than the barbs, to either side in the plane [m]."""
+        return (self.thicknesses_in_plane[1] - self.thickness_in_plane) / 2
+
+    @property
+    def _weights(self) -> Array:
+        """(3,) float64 [m]: what masses go with, lengths of links as thick in the plane as the barbs."""
+        return self.lengths * (np.array(self.thicknesses_in_plane) / self.thickness_in_plane)
 
     @property
     def lengths(self) -> Array:
@@ -88,8 +111,8 @@ class Boxes:
 
     @property
     def volume(self) -> float:
-        """Solid volume t1 t2 (w + 2l) [m³]; the small overlap at the hinges is counted as in the paper."""
-        return float(self.thickness_normal * self.thickness_in_plane * self.lengths.sum())
+        """Solid volume t1 t2 (w + 2l) [m³], each link with its own t2; overlap at the hinges counts, as in the paper."""
+        return float(self.thickness_normal * self.thickness_in_plane * self._weights.sum())
 
     @property
     def mass(self) -> float:
@@ -125,18 +148,20 @@ class Boxes:
     @cached_property
     def plain_centre_of_mass(self) -> Array:
         """(3,) [m]: centre of mass in the middle link's frame."""
-        return np.average(self._plain_centres, axis=0, weights=self.lengths)
+        return np.average(self._plain_centres, axis=0, weights=self._weights)
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
         """Principal moments (3,) [kg m²] and rotation (3, 3): columns are the body axes in the middle link's frame."""
         tensor = np.zeros((3, 3))
-        for length, direction, centre in zip(self.lengths, self.directions, self._plain_centres, strict=True):
-            mass = self.density * length * self.thickness_normal * self.thickness_in_plane
+        for length, in_plane, direction, centre in zip(
+            self.lengths, self.thicknesses_in_plane, self.directions, self._plain_centres, strict=True
+        ):
+            mass = self.density * length * self.thickness_normal * in_plane
             u, n = direction, np.array([0.0, 0.0, 1.0])
             v = np.cross(n, u)
             # Second moments of the box about its centre, along its own axes: length, in-plane, normal.
-            second = mass / 12 * np.array([length**2, self.thickness_in_plane**2, self.thickness_normal**2])
+            second = mass / 12 * np.array([length**2, in_plane**2, self.thickness_normal**2])
             axes = np.stack([u, v, n], axis=1)
             arm = centre - self.plain_centre_of_mass
             moment = axes @ np.diag(second) @ axes.T + mass * np.outer(arm, arm)
@@ -153,13 +178,14 @@ class Boxes:
     @property
     def link_masses(self) -> Array:
         """(3,) float64 [kg]."""
-        return self.density * self.thickness_normal * self.thickness_in_plane * self.lengths
+        return self.density * self.thickness_normal * np.array(self.thicknesses_in_plane) * self.lengths
 
     @property
     def link_inertias(self) -> Array:
         """(3, 3) float64 [kg m²]: principal moments of each link, along its length, in the plane, along the normal."""
-        t1, t2, length = self.thickness_normal, self.thickness_in_plane, self.lengths
-        squares = np.stack([np.full(LINKS, t1**2 + t2**2), length**2 + t1**2, length**2 + t2**2], axis=1)
+        t1, length = self.thickness_normal, self.lengths
+        t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
+        squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)
         moments: Array = self.link_masses[:, None] * squares / 12
         return moments
 
@@ -240,6 +266,29 @@ class Particle:
         reach = (self.boxes.thickness_normal - self.chain.diameter) / 2
         return np.linspace(-reach, reach, self.chain.rows)
 
+    @cached_property
+    def _sides(self) -> Array:
+        """(sides,) [m]: offsets of the middle link's rows across it in the plane, no further apart than a diameter.
+
+        Outermost spheres lie further out than the barbs' by what the link is thicker: of spheres as thick as barbs they
+        reach its face, and of others the section keeps its mean width.
+        """
+        bulge = self.boxes.bulge
+        if not bulge:
+            return np.zeros(1)
+        return np.linspace(-bulge, bulge, 2 * math.ceil(bulge / self.chain.diameter) + 1)
+
+    @property
+    def barb_start(self) -> float:
+        """Distance from the hinge to a barb's first sphere [m].
+
+        A little more than one diameter away from the hinge's sphere. Out of a thicker middle link a barb stands as far
+        from its outer row, wherever it turns: up to the right angle by the triangle's inequality, beyond it by the
+        cosine.
+        """
+        start = self.chain.diameter * (1 + HINGE_CLEARANCE)
+        return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start
+
     def _stations(self, link: int) -> Array:
         """Distances [m] of the sphere centres along a link, from its start (hinge, or hinge 1)."""
         d, pitch = self.chain.diameter, self.chain.pitch
@@ -249,8 +298,8 @@ class Particle:
             inset = 0.0 if self.boxes.barb_length > 0 else d / 2
             start, end = inset, self.boxes.middle_length - inset
         else:
-            # A little more than one diameter away from the hinge's sphere; the last sphere's surface is the tip.
-            start, end = d * (1 + HINGE_CLEARANCE), self.boxes.barb_length - d / 2
+            # The last sphere's surface is the tip.
+            start, end = self.barb_start, self.boxes.barb_length - d / 2
             if end <= 0:
                 return np.empty(0)
             if end <= start:
@@ -265,11 +314,12 @@ class Particle:
         centres: list[Array] = []
         links: list[int] = []
         for link in range(LINKS):
-            for station in self._stations(link):
-                for offset in self._rows:
-                    centre = starts[link] + station * self.boxes.directions[link]
-                    centres.append(centre + np.array([0.0, 0.0, offset]))
-                    links.append(link)
+            # Across the middle link is y.
+            sides = self._sides if link == 1 else np.zeros(1)
+            for station, side, offset in product(self._stations(link), sides, self._rows):
+                centre = starts[link] + station * self.boxes.directions[link]
+                centres.append(centre + np.array([0.0, side, offset]))
+                links.append(link)
         return self.boxes.to_body(np.array(centres)), np.array(links, dtype=np.int64)
 
     @property
@@ -298,7 +348,7 @@ class Particle:
     def reach(self) -> float:
         """Largest distance [m] of any material point, boxes or spheres, from the centre of mass."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
-        half = math.hypot(self.boxes.thickness_normal, self.boxes.thickness_in_plane) / 2
+        half = math.hypot(self.boxes.thickness_normal, max(self.boxes.thicknesses_in_plane)) / 2
         return max(spheres, float(np.linalg.norm(self.boxes.vertices, axis=1).max()) + half)
 
     @cached_property

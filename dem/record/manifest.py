@@ -60,8 +60,9 @@ class RunManifest:
         barb_length: l [m].
         thickness_normal: Thickness t1 along the normal of the smarticle's plane [m].
         thickness_in_plane: Thickness t2 in the smarticle's plane [m].
+        middle_thickness_in_plane: That of the middle link, where it has its own [m]; None otherwise.
         smarticle_mass: Mass of one smarticle [kg].
-        solid_volume: Volume of one smarticle, t1 t2 (w + 2l) [m³].
+        solid_volume: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2 [m³].
         container_radius: [m]; of the widest tier.
         packing_radius: That packing fractions are computed with [m], where it is not the container's; None otherwise.
         container_tiers: Cylinders of different radii that stand on each other.
@@ -103,6 +104,7 @@ class RunManifest:
     time_step: float
     phases: tuple[PhaseRecord, ...]
     status: str
+    middle_thickness_in_plane: float | None = None
     packing_radius: float | None = None
     container_tiers: int = 1
     planar: bool = False
@@ -113,6 +115,17 @@ class RunManifest:
     steps: int | None = None
     wall_time: float | None = None
     taken_over: Mapping[str, Any] | None = None
+
+    @property
+    def thicknesses_in_plane(self) -> tuple[float, float, float]:
+        """Of barb 1, middle link, barb 2 [m]."""
+        middle = self.middle_thickness_in_plane
+        return (self.thickness_in_plane, middle or self.thickness_in_plane, self.thickness_in_plane)
+
+    @property
+    def bulge(self) -> float:
+        """By how much the middle link is thicker than the barbs, to either side in the plane [m]."""
+        return (self.thicknesses_in_plane[1] - self.thickness_in_plane) / 2
 
     @property
     def measured_radius(self) -> float:
@@ -131,6 +144,7 @@ class RunManifest:
 def manifest_data(run: RunManifest) -> dict[str, Any]:
     """The content of `run.json`: what made a run; how it ended is in another file."""
     plane = {"planar": True, "channel_width_m": run.channel_width} if run.planar else {}
+    middle = {} if (own := run.middle_thickness_in_plane) is None else {"middle_thickness_in_plane_m": own}
     measured = {} if run.packing_radius is None else {"packing_radius_m": run.packing_radius}
     return {
         "format": MANIFEST_FORMAT,
@@ -149,6 +163,7 @@ def manifest_data(run: RunManifest) -> dict[str, Any]:
         "barb_length_m": run.barb_length,
         "thickness_normal_m": run.thickness_normal,
         "thickness_in_plane_m": run.thickness_in_plane,
+        **middle,
         "smarticle_mass_kg": run.smarticle_mass,
         "solid_volume_m3": run.solid_volume,
         "container_radius_m": run.container_radius,
@@ -320,6 +335,9 @@ def read_run(directory: Path | str) -> RunManifest:
         barb_length=run.number("barb_length_m"),
         thickness_normal=run.number("thickness_normal_m", positive=True),
         thickness_in_plane=run.number("thickness_in_plane_m", positive=True),
+        middle_thickness_in_plane=run.number("middle_thickness_in_plane_m", positive=True)
+        if "middle_thickness_in_plane_m" in run.data
+        else None,
         smarticle_mass=run.number("smarticle_mass_kg", positive=True),
         solid_volume=run.number("solid_volume_m3", positive=True),
         container_radius=run.number("container_radius_m", positive=True),

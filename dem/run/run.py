@@ -258,6 +258,7 @@ def manifest(
         barb_length=boxes.barb_length,
         thickness_normal=boxes.thickness_normal,
         thickness_in_plane=boxes.thickness_in_plane,
+        middle_thickness_in_plane=boxes.middle_thickness_in_plane,
         smarticle_mass=boxes.mass,
         solid_volume=boxes.volume,
         container_radius=scene.container.radius_m,

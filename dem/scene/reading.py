@@ -105,6 +105,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     if scene.engine == DEFAULT_ENGINE:
         del data["engine"]
     _leave_out(data["recording"], {"contact_forces": False})
+    _leave_out(data["smarticle"], {"middle_thickness_in_plane_m": None})
     if scene.hooks is not None:
         _leave_out(data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1})
     if scene.protocol is None:

@@ -27,6 +27,7 @@ def check(scene: SceneView) -> None:
     else:
         _check_plane(scene)
     _check_section(scene)
+    _check_body(scene)
     _check_recording(scene)
     for index, phase in enumerate(scene.phases):
         phase.check(scene, index)
@@ -77,6 +78,29 @@ def _check_section(scene: SceneView) -> None:
         msg = (
             f"fidelity.rows: {rows} rows of {diameter:g} m do not fit into thickness_normal_m = {t1:g} m; "
             "use one row or a smaller diameter_m"
+        )
+        raise ValueError(msg)
+
+
+def _check_body(scene: SceneView) -> None:
+    """A middle link with a thickness of its own: where it can be had, and whether barbs stand out of it."""
+    thickness = scene.smarticle.middle_thickness_in_plane_m
+    if thickness is None:
+        return
+    key = f"smarticle.middle_thickness_in_plane_m: {thickness:g} m"
+    if scene.plane is None:
+        msg = f"{key} in a scene without the key plane; links of their own thickness move in a plane, or leave it out"
+        raise ValueError(msg)
+    if scene.smooth:
+        msg = f"{key} on engine: links, whose links are all as thick; use engine: yade, or leave it out"
+        raise ValueError(msg)
+    particle = scene.particle
+    least = particle.barb_start + particle.radius
+    if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
+        msg = (
+            f"{key} leaves nothing of barbs that are {particle.boxes.barb_length:.4g} m long from the hinge, in its "
+            f"middle; use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}) or a "
+            "thinner middle link"
         )
         raise ValueError(msg)
 

@@ -20,6 +20,11 @@ class Smarticle(Part):
         1.27e-3, description="t1, thickness along the normal of the smarticle's plane [m]"
     )
     thickness_in_plane_m: Length = Field(0.5e-3, description="t2, thickness in the smarticle's plane [m]")
+    middle_thickness_in_plane_m: Length | None = Field(
+        None,
+        description="thickness of the middle link alone in the smarticle's plane [m], as of robots with a body, half of "
+        "it to either side of the line from hinge to hinge; for scenes with the key plane; default: as the barbs",
+    )
     density_kg_per_m3: float = Field(
         7850.0,
         json_schema_extra={"minimum": 50, "maximum": 25000},
@@ -45,11 +50,22 @@ class Smarticle(Part):
 
     @model_validator(mode="after")
     def _thinner_than_long(self) -> Self:
-        thickest = max(self.thickness_normal_m, self.thickness_in_plane_m)
+        thickest = max(self.thickness_normal_m, self.thickness_in_plane_m, self.middle_thickness_in_plane_m or 0.0)
         if thickest > self.middle_length_m / 2:
             msg = (
                 f"thickness {thickest:g} m is more than half of middle_length_m = {self.middle_length_m:g} m; "
                 "a smarticle is a chain of thin links"
+            )
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _body_holds_barbs(self) -> Self:
+        middle, barbs = self.middle_thickness_in_plane_m, self.thickness_in_plane_m
+        if middle is not None and middle < barbs:
+            msg = (
+                f"middle_thickness_in_plane_m: {middle:g} m is less than thickness_in_plane_m = {barbs:g} m, that of the "
+                "barbs; a middle link is as thick as they are or thicker, or leave it out"
             )
             raise ValueError(msg)
         return self
@@ -77,6 +93,7 @@ class Smarticle(Part):
             barb_length=self.aspect_ratio * self.middle_length_m,
             thickness_normal=self.thickness_normal_m,
             thickness_in_plane=self.thickness_in_plane_m,
+            middle_thickness_in_plane=self.middle_thickness_in_plane_m,
             density=self.density_kg_per_m3,
             angles=(math.radians(self.angles_deg[0]), math.radians(self.angles_deg[1])),
         )

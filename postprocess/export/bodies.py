@@ -148,7 +148,7 @@ class Bodies:
     def _smarticles(self, frame: Frame) -> pv.PolyData:
         run = self.run
         mesh = link_boxes(
-            frame.vertices, thickness_normal=run.thickness_normal, thickness_in_plane=run.thickness_in_plane
+            frame.vertices, thickness_normal=run.thickness_normal, thickness_in_plane=run.thicknesses_in_plane
         )
         owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
         for field in self.fields:

@@ -127,13 +127,13 @@ FIELDS: tuple[Field, ...] = (
         name="speed_m_per_s",
         unit="m/s",
         meaning="of the smarticle's centre of mass",
-        take=lambda frame, _: COLOURINGS["speed"].values(frame),
+        take=lambda frame, run: COLOURINGS["speed"].values(frame, run),
     ),
     Field(
         name="height_m",
         unit="m",
         meaning="of the smarticle's centre of mass above the floor",
-        take=lambda frame, _: COLOURINGS["height"].values(frame) / 1e3,
+        take=lambda frame, run: COLOURINGS["height"].values(frame, run) / 1e3,
     ),
     Field(
         name="velocity_m_per_s",

@@ -17,7 +17,8 @@ from postprocess.geometry.links import link_lengths, plane_frames, swept_axes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_CLEARANCE = 0.01  # `dem.body.particle.HINGE_CLEARANCE`; a test holds the two together
+# `dem.body.particle.HINGE_CLEARANCE` and `INWARDS`; a test holds the two places together.
+_CLEARANCE, _INWARDS = 0.01, math.radians(15)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +30,15 @@ class Chain:
         rows: Rows, or strands, side by side along the smarticle's normal.
         width: Of the rows together, along the normal [m].
         pitch: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links.
+        bulge: By how much the middle link is thicker than the barbs, to either side in the plane [m]; not of what is
+            swept.
     """
 
     diameter: float
     rows: int
     width: float
     pitch: float
+    bulge: float = 0.0
 
     @property
     def _offsets(self) -> NDArray[np.float64]:
@@ -52,7 +56,7 @@ def spheres(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
 
     Source:
         `dem.body.particle`: the hinges' spheres belong to the middle link; a barb's begin a diameter and a little from
-        there, and end where the last one's surface is the tip.
+        there, and end where the last one's surface is the tip; a thicker middle link has rows beside each other.
     """
     lengths = link_lengths(vertices).mean(axis=0)
     parts = []
@@ -60,7 +64,12 @@ def spheres(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
         along = vertices[:, end] - vertices[:, start]
         along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
         stations = _stations(float(lengths[link]), chain, middle=link == 1, barbs=bool(lengths[[0, 2]].any()))
-        parts.append(vertices[:, start, None] + stations[:, None] * along[:, None])
+        points = vertices[:, start, None] + stations[:, None] * along[:, None]
+        if link == 1 and chain.bulge:
+            across = np.cross(plane_frames(vertices)[:, 2], along)[:, None]
+            parts += [points + side * across for side in _sides(chain)]
+        else:
+            parts.append(points)
     return _side_by_side(np.concatenate(parts, axis=1), vertices, chain).reshape(len(vertices), -1, 3)
 
 
@@ -73,6 +82,11 @@ def _side_by_side(points: NDArray[np.float64], vertices: NDArray[np.float64], ch
     return shifted
 
 
+def _sides(chain: Chain) -> NDArray[np.float64]:
+    """Offsets of a thicker middle link's rows in the plane [m]."""
+    return np.linspace(-chain.bulge, chain.bulge, 2 * math.ceil(chain.bulge / chain.diameter) + 1)
+
+
 def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> NDArray[np.float64]:
     """Distances of the centres along a link from its hinge [m]."""
     if middle:
@@ -80,6 +94,8 @@ def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> NDAr
         start, end = inset, length - inset
     else:
         start, end = chain.diameter * (1 + _CLEARANCE), length - chain.diameter / 2
+        if chain.bulge:
+            start = (chain.bulge + start) / math.cos(_INWARDS)
         if end <= 0:
             return np.empty(0)
         if end <= start:

@@ -143,6 +143,7 @@ def chain_of(run: RunManifest) -> Chain:
         rows=rows,
         width=run.thickness_normal,
         pitch=pitch * run.sphere_diameter if run.engine == "yade" else 0.0,
+        bulge=run.bulge,
     )
 
 

@@ -104,7 +104,7 @@ def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surrounding
     """Points (n, 3) [mm] above the floor that must be in the picture; the floor is at z = 0."""
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
     if run.planar:
-        thick = run.thickness_in_plane * MILLIMETRE
+        thick = max(run.thicknesses_in_plane) * MILLIMETRE
         if surroundings.strings is not None:
             strings = surroundings.strings.lines(frame).reshape(-1, 3)
             points = np.concatenate([points, (strings - [0.0, 0.0, frame.floor_z]) * MILLIMETRE])

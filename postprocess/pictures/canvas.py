@@ -54,7 +54,9 @@ _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1
 _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 
 
-def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float) -> pv.PolyData:
+def link_boxes(
+    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
+) -> pv.PolyData:
     """The links of all smarticles as one mesh of boxes.
 
     The section of a straight smarticle, or of one without barbs, is turned about its length by an
@@ -63,7 +65,7 @@ def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_pla
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
 
     Returns:
         Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
@@ -73,7 +75,8 @@ def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_pla
         InputError: Bad vertices or thicknesses.
     """
     vertices = checked_vertices(vertices)
-    if not (thickness_normal > 0 and thickness_in_plane > 0):
+    in_plane = np.broadcast_to(thickness_in_plane, 3)
+    if not (thickness_normal > 0 and (in_plane > 0).all()):
         msg = f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m"
         raise InputError(msg)
     lengths = link_lengths(vertices)
@@ -85,7 +88,7 @@ def link_boxes(vertices: ArrayLike, *, thickness_normal: float, thickness_in_pla
     # Square to the link even where the four vertices are not quite in one plane.
     normal = np.cross(along, across)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    edges = np.stack([along, thickness_in_plane * across, thickness_normal * normal], axis=1)
+    edges = np.stack([along, in_plane[link, None] * across, thickness_normal * normal], axis=1)
     points = ((start + end) / 2)[:, None] + np.einsum("ce,bex->bcx", _CORNERS, edges)
     faces: Any = _FACES + 8 * np.arange(len(points))[:, None, None]
     mesh: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
@@ -186,7 +189,7 @@ class Canvas:
         boxes = link_boxes(
             frame.vertices - [0.0, 0.0, frame.floor_z],
             thickness_normal=self._run.thickness_normal,
-            thickness_in_plane=self._run.thickness_in_plane,
+            thickness_in_plane=self._run.thicknesses_in_plane,
         )
         boxes.points *= MILLIMETRE
         boxes.cell_data["colour"] = colours[boxes.cell_data["smarticle"], boxes.cell_data["link"]]

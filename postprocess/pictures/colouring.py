@@ -15,6 +15,7 @@ from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 from matplotlib.ticker import FuncFormatter
 
 from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
 from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.measures.entanglement import link_crossings
 from postprocess.report import figures
@@ -34,20 +35,21 @@ class Colouring:
     Attributes:
         label: For the colour bar, with the unit.
         kind: "count" for whole numbers, "value" for a continuous quantity, "name" for identity.
-        values: (N,) of a frame.
+        values: (N,) of a frame of a run.
     """
 
     label: str
     kind: Literal["count", "value", "name"]
-    values: Callable[[Frame], NDArray[Any]]
+    values: Callable[[Frame, RunManifest], NDArray[Any]]
 
 
-def _height(frame: Frame) -> NDArray[np.float64]:
+def _height(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
     return (centres_of_mass(frame.vertices)[:, 2] - frame.floor_z) * 1e3
 
 
-def _speed(frame: Frame) -> NDArray[np.float64]:
-    weights = link_lengths(frame.vertices)[:, :, None]
+def _speed(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
+    sections = np.array(run.thicknesses_in_plane) / run.thickness_in_plane
+    weights = (link_lengths(frame.vertices) * sections)[:, :, None]
     velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
     speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
     return speed
@@ -58,12 +60,12 @@ COLOURINGS: Mapping[str, Colouring] = MappingProxyType(
         "crossings": Colouring(
             label="links of others through its plane",
             kind="count",
-            values=lambda frame: link_crossings(frame.vertices),
+            values=lambda frame, _: link_crossings(frame.vertices),
         ),
-        "contacts": Colouring(label="smarticles that it touches", kind="count", values=lambda frame: frame.contacts),
+        "contacts": Colouring(label="smarticles that it touches", kind="count", values=lambda frame, _: frame.contacts),
         "height": Colouring(label="height of its centre of mass [mm]", kind="value", values=_height),
         "speed": Colouring(label="speed of its centre of mass [m/s]", kind="value", values=_speed),
-        "id": Colouring(label="smarticle", kind="name", values=lambda frame: frame.smarticle_ids),
+        "id": Colouring(label="smarticle", kind="name", values=lambda frame, _: frame.smarticle_ids),
     }
 )
 """What `color_by` can be."""

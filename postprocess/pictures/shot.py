@@ -51,7 +51,7 @@ class Shot:
 
     def values(self, indices: Iterable[int], look: Look) -> list[NDArray[Any]]:
         """What the colours of some frames tell, (N,) each."""
-        return [look.colouring.values(self.frames[int(i)]) for i in indices]
+        return [look.colouring.values(self.frames[int(i)], self.run) for i in indices]
 
     def largest_force(self, indices: Iterable[int]) -> float:
         """The largest normal force at a contact in some frames [N]; a millinewton where there is none.

@@ -81,7 +81,7 @@ def read_strings(run: RunManifest) -> ChainStrings | None:
         return None
     strain, gap = phases[_STRAIN], phases[_ARRANGE].number("gap_m")
     radius, barb = run.sphere_diameter / 2, run.barb_length
-    offset = barb + gap + radius  # of the two rows of middle links
+    offset = barb + gap + run.bulge + radius  # of the two rows of middle links
     from_hinge = barb - radius if strain.values.get("tied_at") == "tip" else offset / 2
     reach = ((run.count - 1) * (run.middle_length - 2 * radius - gap) + run.middle_length) / 2
     length = strain.number("string_length_m", positive=True)

@@ -1,4 +1,4 @@
-"""The study `chain`: strain tests of a chain of robots between two walls, against Savoie et al."""
+"""The studies `chain` and `chain-bodies`: strain tests of a chain of robots between two walls, against Savoie et al."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 def _load(*, quick: bool) -> Chain:
     from studies.chain.study import Chain  # noqa: PLC0415  (pandas, matplotlib)
 
-    return Chain()
+    return Chain("chain")
+
+
+def _load_bodies(*, quick: bool) -> Chain:
+    from studies.chain.study import Chain  # noqa: PLC0415  (pandas, matplotlib)
+
+    return Chain("chain-bodies")
 
 
 SHIPPED = Shipped(
@@ -26,4 +32,14 @@ SHIPPED = Shipped(
 strain test of a chain of two or six robots between two walls, against the findings of Savoie et al. (Soft Matter
 2023): force, yield, width, fracture against confinement; and what friction, servos and strings, which the paper
 does not tell, matter. 144 runs, on links, trial by trial. --quick takes minutes.""",
+)
+
+BODIES = Shipped(
+    name="chain-bodies",
+    folder=Path(__file__).parent,
+    load=_load_bodies,
+    pictured={"variant": "baseline", "count": 2, "h_over_H": 0.65},
+    about="""\
+the same of robots with bodies 2.1 cm thick, between walls where the paper's are, which then act in its range of
+confinement. 88 runs, seed by seed, on YADE alone.""",
 )

@@ -14,6 +14,11 @@ from postprocess.statistics.points import averaged
 BASELINE = "baseline"
 
 VARIANT, COUNT, CONFINEMENT, SPEED = "variant", "smarticles [-]", "h/H [-]", "speed [m/s]"
+START = "width at the start [m]"
+
+PAPER_WIDTH = 0.062
+"""h of the paper [m]. Links of one thickness are chosen such that a chain is as wide; with bodies of their own it is not
+its outer width, and stands for itself: walls are where the paper's are."""
 
 
 def chain_row(run: RunManifest) -> dict[str, object]:
@@ -27,13 +32,14 @@ def chain_row(run: RunManifest) -> dict[str, object]:
         msg = f"{run.directory}: {len(strained)} phases that strain a chain; give runs of the study chain"
         raise InputError(msg)
     pull = read_strain_test(run)
+    width = float(pull.widths[0]) if run.middle_thickness_in_plane is None else PAPER_WIDTH
     row: dict[str, object] = {
         VARIANT: run.name,
         COUNT: run.count,
-        CONFINEMENT: round(pull.widths[0] / run.channel_width, 3) if run.channel_width else 0.0,
+        CONFINEMENT: round(width / run.channel_width, 3) if run.channel_width else 0.0,
         SEED: run.seed,
         SPEED: strained[0].number("speed_m_per_s"),
-        "width at the start [m]": float(pull.widths[0]),
+        START: float(pull.widths[0]),
         **measured(pull),
         "scene_sha256": run.scene_sha256,
         "run": run.directory.name,

@@ -1,4 +1,4 @@
-"""The study `chain`: strain tests of a chain of robots between two walls against the findings of Savoie et al.
+"""The studies `chain` and `chain-bodies`: strain tests of a chain of robots between two walls against the findings of Savoie et al.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical experiment".
 What is measured of a run is in `studies.chain.measure`, what the paper found and how it is judged in
@@ -35,13 +35,16 @@ from studies.base.runs import Collected, MeasuredRun, told_range
 from studies.base.study import Analysis, Tables
 from studies.chain import figures
 from studies.chain.findings import findings, sensitivity
-from studies.chain.measure import CONFINEMENT, COUNT, SPEED, VARIANT, chain_row, points
+from studies.chain.measure import CONFINEMENT, COUNT, PAPER_WIDTH, SPEED, START, VARIANT, chain_row, points
 
 
 class Chain(PaperStudy):
-    """Runs of one strain test each; runs of one seed have the same servos."""
+    """Runs of one strain test each; runs of one seed have the same servos.
 
-    name = "chain"
+    Args:
+        name: which of the two shipped studies.
+    """
+
     title = "The strain test of a chain of robots against the findings of Savoie et al."
     means = "Means over trials ± standard error."
     quantities = QUANTITIES
@@ -65,6 +68,9 @@ class Chain(PaperStudy):
             WALL: ("wall force [N]", ".2f"),
         }
     )
+
+    def __init__(self, name: str = "chain") -> None:
+        self.name = name
 
     def measure(self, run: RunManifest) -> MeasuredRun:
         """Force, strain and width of the chain."""
@@ -90,6 +96,7 @@ class Chain(PaperStudy):
             "Force: of the pulled string, means over 1 ms. Strain: of the distance along x between the strings' ties. "
             f"A chain holds while it carries {CARRIES:.0%} of its peak force. A yield drop loses {LOSS:.0%} of the "
             "force or more. Trials differ in the strength of their servos, ±10 %.",
+            *told_bodies(analysis.tables["runs"], analysis.found.manifests),
         )
 
     def below_table(self, analysis: Analysis[Finding]) -> Sequence[str]:
@@ -131,6 +138,18 @@ class Chain(PaperStudy):
             manifests=analysis.found.manifests,
             footer=footer,
         )
+
+
+def told_bodies(runs: pd.DataFrame, manifests: Sequence[RunManifest]) -> tuple[str, ...]:
+    """What h is where middle links have a thickness of their own; nothing where they do not."""
+    own = {run.middle_thickness_in_plane for run in manifests} - {None}
+    if not own:
+        return ()
+    thick = ", ".join(f"{1e3 * body:g}" for body in sorted(body for body in own if body))
+    return (
+        f"Bodies are {thick} mm thick in the plane. h is the paper's {1e3 * PAPER_WIDTH:g} mm, so that walls are where the "
+        f"paper's are; outer width of the chain at the start: {told_range(1e3 * runs[START])} mm.",
+    )
 
 
 def _told_trials(means: pd.DataFrame) -> str:

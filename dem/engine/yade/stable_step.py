@@ -102,8 +102,8 @@ def planar_stable_time_step(
     """The same for smarticles that lie flat in a plane, where none lies on another.
 
     The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
-    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it;
-    and a barb with a string at its tip.
+    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it,
+    of a thicker one those of its outer row; and a barb with a string at its tip.
 
     Args:
         particle: one smarticle.
@@ -117,7 +117,8 @@ def planar_stable_time_step(
     steps = []
     for link, contacts, damping in ((0, 2 * CONTACTS_IN_A_ROW, law.normal_damping), (1, 1, law.wall_damping)):
         across = boxes.link_rotations[link][:, 1][None, :]
-        shape = _push_shape(particle, np.flatnonzero(particle.links == link), across)
+        outer = particle.local_centres[:, 1] > (particle.boxes.bulge if link == 1 else 0.0) - particle.radius / 2
+        shape = _push_shape(particle, np.flatnonzero((particle.links == link) & outer), across)
         stiffness = pins + contacts * law.normal_stiffness * shape
         steps.append(_stable_step(mass, stiffness, contacts * damping * shape + twisted))
     tip = _velocity_of(boxes, 0, boxes.vertices[0])[:2]
