@@ -100,7 +100,7 @@ def extent(state: State, diameter: float) -> float:
 
 
 def _corners(state: State) -> NDArray[np.float64]:
-    """(N, V, 3) [m]: where the axes of the spheres' rows end, but for tips; the hinges, and of thicker middle links more."""
+    """(N, V, 3) [m]: tips and hinges, and of thicker middle links the ends of the rows at their faces."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

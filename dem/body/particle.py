@@ -111,7 +111,10 @@ class Boxes:
 
     @property
     def volume(self) -> float:
-        """Solid volume t1 t2 (w + 2l) [m³], each link with its own t2; overlap at the hinges counts, as in the paper."""
+        """Solid volume t1 t2 (w + 2l) [m³]; the small overlap at the hinges is counted as in the paper.
+
+        A middle link with a thickness of its own counts with that.
+        """
         return float(self.thickness_normal * self.thickness_in_plane * self._weights.sum())
 
     @property

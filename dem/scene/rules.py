@@ -98,8 +98,8 @@ def _check_body(scene: SceneView) -> None:
     least = particle.barb_start + particle.radius
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
         msg = (
-            f"{key} leaves nothing of barbs that are {particle.boxes.barb_length:.4g} m long from the hinge, in its "
-            f"middle; use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}) or a "
+            f"{key} leaves nothing outside of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
+            f"use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}), or a "
             "thinner middle link"
         )
         raise ValueError(msg)

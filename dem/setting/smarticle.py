@@ -22,8 +22,8 @@ class Smarticle(Part):
     thickness_in_plane_m: Length = Field(0.5e-3, description="t2, thickness in the smarticle's plane [m]")
     middle_thickness_in_plane_m: Length | None = Field(
         None,
-        description="thickness of the middle link alone in the smarticle's plane [m], as of robots with a body, half of "
-        "it to either side of the line from hinge to hinge; for scenes with the key plane; default: as the barbs",
+        description="thickness of the middle link alone in the smarticle's plane [m], as of robots with a body; half "
+        "of it to either side of the line from hinge to hinge; with the key plane, on yade; default: as the barbs",
     )
     density_kg_per_m3: float = Field(
         7850.0,
@@ -64,8 +64,8 @@ class Smarticle(Part):
         middle, barbs = self.middle_thickness_in_plane_m, self.thickness_in_plane_m
         if middle is not None and middle < barbs:
             msg = (
-                f"middle_thickness_in_plane_m: {middle:g} m is less than thickness_in_plane_m = {barbs:g} m, that of the "
-                "barbs; a middle link is as thick as they are or thicker, or leave it out"
+                f"middle_thickness_in_plane_m: {middle:g} m is less than thickness_in_plane_m = {barbs:g} m, that of "
+                "the barbs; use as much at least, or leave it out"
             )
             raise ValueError(msg)
         return self

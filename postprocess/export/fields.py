@@ -127,7 +127,7 @@ FIELDS: tuple[Field, ...] = (
         name="speed_m_per_s",
         unit="m/s",
         meaning="of the smarticle's centre of mass",
-        take=lambda frame, run: COLOURINGS["speed"].values(frame, run),
+        take=COLOURINGS["speed"].values,
     ),
     Field(
         name="height_m",

@@ -41,5 +41,5 @@ BODIES = Shipped(
     pictured={"variant": "baseline", "count": 2, "h_over_H": 0.65},
     about="""\
 the same of robots with bodies 2.1 cm thick, between walls where the paper's are, which then act in its range of
-confinement. 88 runs, seed by seed, on YADE alone.""",
+confinement. 64 runs, seed by seed, on YADE alone.""",
 )

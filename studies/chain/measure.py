@@ -17,8 +17,8 @@ VARIANT, COUNT, CONFINEMENT, SPEED = "variant", "smarticles [-]", "h/H [-]", "sp
 START = "width at the start [m]"
 
 PAPER_WIDTH = 0.062
-"""h of the paper [m]. Links of one thickness are chosen such that a chain is as wide; with bodies of their own it is not
-its outer width, and stands for itself: walls are where the paper's are."""
+"""h of the paper [m]. Links of one thickness are chosen such that a chain is as wide. With bodies of their own it is no
+chain's outer width, and h/H only says where walls are: where the paper's are."""
 
 
 def chain_row(run: RunManifest) -> dict[str, object]:

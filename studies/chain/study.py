@@ -1,4 +1,4 @@
-"""The studies `chain` and `chain-bodies`: strain tests of a chain of robots between two walls against the findings of Savoie et al.
+"""The studies `chain` and `chain-bodies`: strain tests of a chain of robots between two walls, against Savoie et al.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical experiment".
 What is measured of a run is in `studies.chain.measure`, what the paper found and how it is judged in
@@ -147,8 +147,8 @@ def told_bodies(runs: pd.DataFrame, manifests: Sequence[RunManifest]) -> tuple[s
         return ()
     thick = ", ".join(f"{1e3 * body:g}" for body in sorted(body for body in own if body))
     return (
-        f"Bodies are {thick} mm thick in the plane. h is the paper's {1e3 * PAPER_WIDTH:g} mm, so that walls are where the "
-        f"paper's are; outer width of the chain at the start: {told_range(1e3 * runs[START])} mm.",
+        f"Bodies are {thick} mm thick in the plane. h is the paper's {1e3 * PAPER_WIDTH:g} mm, so that walls are where "
+        f"the paper's are; the chain is {1e3 * runs[START].mean():.1f} mm wide at the start.",
     )
 
 

@@ -1,4 +1,4 @@
-"""A middle link thicker in the plane than the barbs: boxes, spheres and the chain laid out of them, by known answers."""
+"""A middle link thicker in the plane than the barbs: boxes, spheres and a chain laid out of them, by known answers."""
 
 from __future__ import annotations
 
