@@ -55,6 +55,7 @@ SCENE: Bad = [
     ({"smarticle.middle_length_m": 0}, "smarticle.middle_length_m", "0"),
     ({"smarticle.thickness_normal_m": 0.0}, "smarticle.thickness_normal_m", "0.0"),
     ({"smarticle.thickness_in_plane_m": -1}, "smarticle.thickness_in_plane_m", "-1"),
+    ({"smarticle.middle_thickness_in_plane_m": 0.001}, "smarticle.middle_thickness_in_plane_m", "0.001 m"),
     ({"container.radius_m": -0.02}, "container.radius_m", "-0.02"),
     ({"container.height_m": 0}, "container.height_m", "0"),
     ({"smarticle.middle_length_m": math.nan}, "smarticle.middle_length_m", "nan"),
@@ -273,6 +274,7 @@ ACTUATED: Bad = [
     ),
 ]
 
+THICK = "smarticle.middle_thickness_in_plane_m"
 CHAINS: Bad = [
     ({"plane.width_m": 0.062}, "plane.width_m", "0.062 m"),
     ({"plane.width_m": 0.16}, "plane.width_m", "H = 0.16 m"),
@@ -289,6 +291,14 @@ CHAINS: Bad = [
     ({"motor.law": "halt", "motor.damping_N_m_s_per_rad": 1e-3}, "motor.damping_N_m_s_per_rad", "0.001"),
     ({"motor.strength_spread": 1.0}, "motor.strength_spread", "1.0"),
     ({"fidelity.rows": 2, "fidelity.diameter_m": 0.004}, "fidelity.rows", "2"),
+    ({THICK: 0.009}, THICK, "0.009 m"),
+    ({THICK: 0.024}, "smarticle", "0.024 m"),
+    ({THICK: -0.02}, THICK, "-0.02"),
+    ({THICK: 21}, THICK, "21"),
+    ({THICK: 0.02, "engine": "links"}, THICK, "0.02 m on engine: links"),
+    ({THICK: 0.02, "engine": "lammps"}, "engine", "plane"),
+    ({THICK: 0.02, "smarticle.aspect_ratio": 0.4}, THICK, "0.01868 m"),
+    ({THICK: 0.021, "plane.width_m": 0.079}, "plane.width_m", "0.079 m"),
 ]
 
 # Ways to say what to do instead.

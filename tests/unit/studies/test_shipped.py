@@ -74,7 +74,7 @@ def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
         assert twin.scene.seed_for("poses") == point.scene.seed_for("poses")
 
 
-@pytest.mark.parametrize("name", sorted(set(STUDIES) - {"engines"}))
+@pytest.mark.parametrize("name", sorted(set(STUDIES) - {"engines", "chain-bodies"}))
 @pytest.mark.parametrize("engine", ["yade", "links"])
 def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
     sweep = load_sweep(study_file(name))
@@ -82,6 +82,24 @@ def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
     found = expand(on_engine(sweep, engine))
     assert {point.scene.engine for point in found} == {engine}
     assert not any(point.again for point in found)
+
+
+def test_chains_with_bodies_differ_from_those_without_in_the_bodies_and_the_walls_alone() -> None:
+    bodies, plain = (expand(load_sweep(study_file(name))) for name in ("chain-bodies", "chain"))
+    assert {point.scene.smarticle.middle_thickness_in_plane_m for point in bodies} == {0.021}
+    twins = {(p.values["variant"], p.values["count"], p.scene.seed): p.scene for p in plain}
+    for point in bodies:
+        twin = twins["baseline", point.values["count"], point.scene.seed]
+        alike = {"engine": "yade", "plane": point.scene.plane, "smarticle": point.scene.smarticle}
+        assert twin.model_copy(update={**alike, "fidelity": point.scene.fidelity}) == point.scene
+        assert twin.smarticle.model_copy(update={"middle_thickness_in_plane_m": 0.021}) == point.scene.smarticle
+        assert point.scene.plane is not None
+        assert point.scene.plane.width_m == pytest.approx(0.062 / point.values["h_over_H"])
+
+
+def test_chains_with_bodies_have_one_engine() -> None:
+    with pytest.raises(InputError, match=r"middle_thickness_in_plane_m: 0\.021 m on engine: links.*use engine: yade"):
+        expand(on_engine(load_sweep(study_file("chain-bodies")), "links"))
 
 
 @pytest.mark.parametrize("quick", [False, True])
