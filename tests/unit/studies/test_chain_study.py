@@ -19,6 +19,7 @@ from postprocess.statistics.points import marked
 from studies.base.references import SAVOIE
 from studies.base.report import Report
 from studies.chain import figures as chain_figures
+from studies.chain import measure as chain_measure
 from studies.chain.measure import CONFINEMENT, COUNT, VARIANT
 from studies.chain.study import Chain
 
@@ -123,3 +124,22 @@ def test_a_study_without_a_packing_fraction_defines_none(
 def test_a_trial_given_twice_is_refused(runs: list[Path], tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"point = baseline n 2 h/H 0.52 with seed 1 is given twice"):
         Chain().analyse([runs[0], runs[0]], tmp_path / "out", **ORIGIN)
+
+
+def test_of_bodies_confinement_tells_where_walls_are(tmp_path: Path, drawn: list[Sequence[str]]) -> None:
+    places = []
+    for seed, ratio in ((1, 0.52), (1, 0.65), (2, 0.52), (2, 0.65)):
+        place = tmp_path / f"{ratio}_{seed}"
+        places.append(write_pull(place, variant="baseline", ratio=ratio, stiffness=3.0, count=2, seed=seed))
+        content = json.loads((place / "run.json").read_text())
+        # A chain that is wider at the start than the paper's, between the paper's walls.
+        content |= {"middle_thickness_in_plane_m": 0.021, "channel_width_m": 0.8 * content["channel_width_m"]}
+        (place / "run.json").write_text(json.dumps(content))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(chain_measure, "PAPER_WIDTH", 0.8 * WIDTH)
+        found = Chain("chain-bodies").analyse(places, tmp_path / "out", **ORIGIN)
+    table = pd.read_csv(found.files["points.csv"], comment="#")
+    assert table[CONFINEMENT].tolist() == [0.52, 0.65]
+    told = (tmp_path / "out" / "findings.md").read_text()
+    assert "Bodies are 21 mm thick in the plane." in told
+    assert f"the chain is {1e3 * WIDTH:.1f} mm wide at the start" in told
