@@ -79,7 +79,7 @@ def span(values: NDArray[np.float64]) -> tuple[float, float]:
 def scale(field: Field, bounds: tuple[float, float]) -> ColourScale:
     """The palette of a field for values between two bounds."""
     label = field.name if field.unit == "-" else f"{field.name} [{field.unit}]"
-    colouring = Colouring(label=label, kind=field.kind, values=lambda _: np.empty(0))
+    colouring = Colouring(label=label, kind=field.kind, values=lambda _, __: np.empty(0))
     return ColourScale.of(colouring, *bounds)
 
 
