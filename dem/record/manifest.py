@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +9,9 @@ from types import MappingProxyType
 from typing import Any, NoReturn
 
 from dem.errors import RunError
+from dem.record.document import REMEDY, Document
 from dem.record.files import cannot_read, write_json
 from dem.record.names import DONE, FAILED, MANIFEST, MANIFEST_FORMAT, OF_SWEEP
-
-_REMEDY = "give the directory of a run made by this version of `smarticles run`"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,60 +222,6 @@ def mark_failed(out: Path, *, status: str, cause: str, time: float, checkpoint: 
         return
 
 
-@dataclass(frozen=True)
-class _Document:
-    """A JSON object with its file, so that every complaint can name both."""
-
-    path: Path
-    data: Mapping[str, Any]
-
-    @classmethod
-    def read(cls, path: Path) -> _Document:
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            cannot_read("manifest", path, error, _REMEDY)
-        if not isinstance(data, dict):
-            cannot_read("manifest", path, "it holds no JSON object", _REMEDY)
-        return cls(path, data)
-
-    def _get(self, key: str) -> Any:
-        try:
-            return self.data[key]
-        except KeyError:
-            cannot_read("manifest", self.path, f"key '{key}' is missing", _REMEDY)
-
-    def _refuse(self, key: str, value: object, wanted: str) -> NoReturn:
-        cannot_read("manifest", self.path, f"'{key}' must be {wanted}: got {value!r}", _REMEDY)
-
-    def text(self, key: str) -> str:
-        value = self._get(key)
-        if not isinstance(value, str):
-            self._refuse(key, value, "text")
-        return value
-
-    def integer(self, key: str, *, least: int = 0) -> int:
-        value = self._get(key)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            self._refuse(key, value, f"a whole number, {least} or more")
-        return value
-
-    def number(self, key: str, *, positive: bool = False) -> float:
-        value = self._get(key)
-        wanted = "a finite number > 0" if positive else "a finite number >= 0"
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self._refuse(key, value, wanted)
-        if not math.isfinite(value) or value < 0 or (positive and value == 0):
-            self._refuse(key, value, wanted)
-        return float(value)
-
-    def phases(self) -> list[_Document]:
-        value = self._get("phases")
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            self._refuse("phases", value, "a list of objects")
-        return [_Document(self.path, item) for item in value]
-
-
 def read_run(directory: Path | str) -> RunManifest:
     """Reads what a run directory says about its run.
 
@@ -301,13 +244,13 @@ def read_run(directory: Path | str) -> RunManifest:
     directory = Path(directory)
     if not (directory / MANIFEST).is_file():
         _refuse_place(directory)
-    run = _Document.read(directory / MANIFEST)
+    run = Document.read(directory / MANIFEST)
     if run.data.get("format") != MANIFEST_FORMAT:
         found = run.data.get("format")
-        cannot_read("manifest", run.path, f"'format' must be {MANIFEST_FORMAT}: got {found!r}", _REMEDY)
+        cannot_read("manifest", run.path, f"'format' must be {MANIFEST_FORMAT}: got {found!r}", REMEDY)
     versions = run.data.get("versions", {})
     if not isinstance(versions, dict):
-        cannot_read("manifest", run.path, "'versions' must be an object", _REMEDY)
+        cannot_read("manifest", run.path, "'versions' must be an object", REMEDY)
     phases = tuple(
         PhaseRecord(
             index=phase.integer("index"),
@@ -318,7 +261,7 @@ def read_run(directory: Path | str) -> RunManifest:
         for phase in run.phases()
     )
     if [phase.index for phase in phases] != list(range(len(phases))):
-        cannot_read("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", _REMEDY)
+        cannot_read("manifest", run.path, "'phases' must be numbered 0, 1, 2, …", REMEDY)
     return RunManifest(
         directory=directory,
         name=run.text("name"),
@@ -359,13 +302,13 @@ def read_run(directory: Path | str) -> RunManifest:
 def _refuse_place(directory: Path) -> NoReturn:
     """Say what is there instead of a run."""
     if not directory.exists():
-        cause, remedy = "no such directory", _REMEDY
+        cause, remedy = "no such directory", REMEDY
     elif not directory.is_dir():
-        cause, remedy = "it is a file", _REMEDY
+        cause, remedy = "it is a file", REMEDY
     elif (directory / OF_SWEEP).is_file():
         cause, remedy = "it is a sweep", f"give one of its runs, {directory / 'runs' / 'NAME'}"
     else:
-        cause, remedy = f"it holds no {MANIFEST}", _REMEDY
+        cause, remedy = f"it holds no {MANIFEST}", REMEDY
     cannot_read("run directory", directory, cause, remedy)
 
 
@@ -378,7 +321,7 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
     """The fields that depend on whether and how the run ended."""
     # done.json first: a resumed run may have left an older failed.json behind.
     if (directory / DONE).exists():
-        done = _Document.read(directory / DONE)
+        done = Document.read(directory / DONE)
         return {
             "phases": _timed(phases, done),
             "status": "done",
@@ -387,7 +330,7 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
             "wall_time": done.number("wall_s"),
         }
     if (directory / FAILED).exists():
-        failed = _Document.read(directory / FAILED)
+        failed = Document.read(directory / FAILED)
         return {
             "phases": phases,
             "status": failed.text("status"),
@@ -397,7 +340,7 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
     return {"phases": phases, "status": "unfinished"}
 
 
-def _timed(planned: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseRecord, ...]:
+def _timed(planned: tuple[PhaseRecord, ...], done: Document) -> tuple[PhaseRecord, ...]:
     timed = tuple(
         PhaseRecord(
             index=phase.integer("index"),
@@ -413,5 +356,5 @@ def _timed(planned: tuple[PhaseRecord, ...], done: _Document) -> tuple[PhaseReco
     )
     if [(phase.index, phase.type) for phase in timed] != [(phase.index, phase.type) for phase in planned]:
         cause = f"its phases differ from those of run.json: {[phase.type for phase in timed]}"
-        cannot_read("manifest", done.path, cause, _REMEDY)
+        cannot_read("manifest", done.path, cause, REMEDY)
     return timed
