@@ -1,8 +1,8 @@
 """What strength costs: how much a procedure adds to that of a poured pile, and the energy that it spends on it.
 
 Each run is compared with the poured pile of its l/w and seed, which it began with. Ratios are those of means over such
-pairs, their errors by drawing pairs anew. Energies are over W_s w, the work that lifts a smarticle by its width, so that
-heavier smarticles do not count as dearer.
+pairs, their errors by drawing pairs anew. Energies are over W_s w, the work that lifts a smarticle by its width, so
+that heavier smarticles do not count as dearer.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from postprocess.statistics.points import mean_columns
 from postprocess.statistics.ranks import Interval, interval, resampled
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.procedures import PROCEDURE, STATIC, THETA
-from studies.landscape.measure import ENERGY, LIFTS, NET, PLANNED
+from studies.landscape.measure import ENERGY, LIFTS, PEAK, PLANNED
 from studies.landscape.predictors import DRAW, RESAMPLES, SCOPE
 
 PAIRS = "pairs [-]"
@@ -31,9 +31,9 @@ _POINT = [PROCEDURE, THETA, PLANNED]
 
 def gains(runs: pd.DataFrame) -> pd.DataFrame:
     """Runs that were active, with what they gained over the poured pile of the same l/w and seed."""
-    poured = runs[runs[PROCEDURE] == STATIC].groupby([ASPECT, SEED])[NET].mean().rename("poured")
-    active = runs[runs[PROCEDURE] != STATIC].join(poured, on=[ASPECT, SEED], how="inner")
-    return active.assign(**{GAIN: active[NET] - active["poured"]}).drop(columns="poured")
+    poured = runs[runs[PROCEDURE] == STATIC].groupby([ASPECT, SEED])[PEAK].mean().rename("poured")
+    active = runs[runs[PROCEDURE] != STATIC].join(poured, on=[ASPECT, SEED], how="inner").reset_index(drop=True)
+    return active.assign(**{GAIN: active[PEAK] - active["poured"]}).drop(columns="poured")
 
 
 def common_aspects(runs: pd.DataFrame) -> list[float]:
@@ -59,8 +59,8 @@ def costs(runs: pd.DataFrame, *, count: int = RESAMPLES) -> pd.DataFrame:
         count: Resamples.
 
     Returns:
-        Means of gain and energy over pairs with their errors, the gain per energy with its 95 % interval, and whether no
-        other point of the scope gains as much for less energy.
+        Means of gain and energy over pairs with their errors, the gain per energy with its 95 % interval, and whether
+        no other point of the scope gains as much for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}
@@ -113,3 +113,46 @@ def _frontier(table: pd.DataFrame) -> list[float]:
         cheaper = table[LIFTS] < row[LIFTS]
         found.append(float(row[GAIN] > 0 and not (table[cheaper][GAIN] >= row[GAIN]).any()))
     return found
+
+
+def best_points(table: pd.DataFrame) -> pd.DataFrame:
+    """Of each procedure the point of the common l/w that gains most per energy, among those that surely gain.
+
+    Args:
+        table: See `costs`.
+    """
+    known = table[(table[SCOPE] == COMMON) & (table[LOW] > 0)] if len(table) else table
+    if known.empty:
+        return known
+    return known.sort_values(YIELD, ascending=False).groupby(PROCEDURE, sort=False).head(1).reset_index(drop=True)
+
+
+def at_point(gained: pd.DataFrame, point: pd.Series) -> pd.DataFrame:
+    """Pairs of one procedure, θ and planned time, by l/w and seed."""
+    same = (gained[PROCEDURE] == point[PROCEDURE]) & np.isclose(gained[PLANNED], point[PLANNED])
+    same &= np.isclose(gained[THETA], point[THETA], equal_nan=True)
+    return gained[same].set_index([ASPECT, SEED])
+
+
+def yields_compared(runs: pd.DataFrame, one: pd.Series, other: pd.Series, *, count: int = RESAMPLES) -> Interval:
+    """Ratio of the gains per energy of two points, over the l/w and seeds that both have, drawn together.
+
+    Args:
+        runs: Rows of `measure.landscape_row`.
+        one: Row of `costs`.
+        other: Row of `costs`.
+        count: Resamples.
+    """
+    gained = gains(runs)
+    gained = gained[gained[ASPECT].isin(common_aspects(runs))]
+    both = pd.concat([at_point(gained, point)[[GAIN, LIFTS]] for point in (one, other)], axis=1, join="inner")
+    values = both.to_numpy(dtype=np.float64)
+    if len(values) < 3:
+        return Interval(value=math.nan, low=math.nan, high=math.nan)
+
+    def ratio(rows: np.ndarray) -> np.ndarray:
+        return np.array([_ratio(values[rows, :2]) / _ratio(values[rows, 2:])])
+
+    every = np.arange(len(values))
+    drawn = resampled(ratio, every, np.zeros(len(values), dtype=np.int64), count=count, seed=DRAW)
+    return interval(float(ratio(every)[0]), drawn[:, 0].tolist())

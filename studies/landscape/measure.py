@@ -1,11 +1,14 @@
 """What the study `landscape` takes from a run: the pile at rest before the pull, the energy spent on it, its strength.
 
-The hook lies amid the pile, within its wall, above another one that is fixed. What it takes to raise it has three
-parts: the weight of what comes along, what wall and floor hold back, and what goes on to the lower hook. The last is
-mostly a matter of single smarticles that hold both hooks like a bracket, and as large as these are rigid. So strength is
-the peak of the upper force less the lower one's at the same time: the weight that the hook lifts at once and what the
-wall adds to it. Of a heap without any cohesion it would be about the weight of what lies above the hook; strength less
-that is tabulated beside it, as what cohesion alone makes the hook carry.
+A hook that was poured over is raised out of the pile, within its wall, and nothing but weight and wall holds the pile
+down. What the hook takes at its peak, over the weight n W_s of all smarticles, is so the largest share of its own
+weight that the pile bears hanging: the weight that comes along at once, and what friction at the wall adds. A heap
+without any cohesion makes the hook lift about what lies above it; a pile that holds together altogether comes whole,
+and the strength cannot be much above one. Strength less the share above the hook is tabulated beside it, as what
+cohesion adds.
+
+Between the two hooks of the paper's own test a smarticle that holds both like a bracket is all that is measured in a
+third of the piles, see the study `fracture`; here the lower hook lies on the floor, where none gets hold of it.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from dem.record.frames import read_frames
 from dem.record.manifest import RunManifest
 from dem.record.series import Series, read_series
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, peak, read_pull, weight_of_one
+from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import read_phases, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
@@ -46,14 +49,13 @@ LINKING, CONTACTS = "linking number per smarticle [-]", "contacts per smarticle 
 TOUCHING, ENTANGLED = "largest cluster in contact [-]", "largest entangled cluster [-]"
 HEIGHT, ABOVE = "com height [m]", "smarticles above the hook [-]"
 ENERGY, LIFTS = "energy per smarticle [J]", "energy per smarticle over W_s w [-]"
-NET, BEYOND = "strength over n W_s [-]", "strength beyond the weight above over n W_s [-]"
-PEAK, HELD = "peak force over n W_s [-]", "lower hook force at the peak over n W_s [-]"
-WORK, HELD_FAST = "work over n W_s w [-]", "held fast [-]"
+PEAK, BEYOND = "strength over n W_s [-]", "strength beyond the weight above over n W_s [-]"
+RAISED, WORK, HELD_FAST = "hook raised at the peak [m]", "work over n W_s w [-]", "held fast [-]"
 
 STRENGTHS: Mapping[str, str] = MappingProxyType(
     {
-        NET: f"largest mean over {WINDOW:g} s of the force on the upper hook less that on the lower, over n W_s; at "
-        "least, where the pile held fast",
+        PEAK: f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where the pile "
+        "held fast",
         BEYOND: "the same less the share of the smarticles that lie above the hook, which is their weight over n W_s",
     }
 )
@@ -77,8 +79,7 @@ PREDICTORS: Mapping[str, str] = MappingProxyType(
 OTHERS: Mapping[str, str] = MappingProxyType(
     {
         LIFTS: "the energy over the work that lifts a smarticle by w",
-        PEAK: f"largest mean over {WINDOW:g} s of the force on the upper hook, over n W_s",
-        HELD: "upwards on the lower hook then, over n W_s: what goes from hook to hook",
+        RAISED: "how far the hook had been raised at the peak",
         WORK: "∫ F dz over the whole pull, over n W_s w",
         HELD_FAST: "1 where the hook was stopped by its force limit on the way, 0 where it arrived",
     }
@@ -120,7 +121,7 @@ def landscape_row(run: RunManifest) -> dict[str, object]:
         raise InputError(msg)
     before = table.loc[rest]
     energy = _spent(run, series, procedure, rest) / run.count
-    weight = weight_of_one(run)
+    weight, above = weight_of_one(run), _above(run, rest)
     row: dict[str, object] = {
         PROCEDURE: procedure,
         THETA: settings[2].number("theta_deg") if procedure == INTERNAL else math.nan,
@@ -131,20 +132,20 @@ def landscape_row(run: RunManifest) -> dict[str, object]:
         PLANNED: _planned(run),
         ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
         **{column: before[measured] for column, measured in _MEASURED.items()},
-        ABOVE: _above(run, rest),
+        ABOVE: above,
         ENERGY: energy,
         LIFTS: energy / weight / run.middle_length,
     }
     pull = read_pull(run, series, pulled.index)
     total, highest = run.count * weight, peak(pull)
-    net = peak(pull.net).force / total
+    strength = highest.force / total
     return row | {
-        NET: net,
-        BEYOND: net - _above(run, rest),
-        PEAK: highest.force / total,
-        HELD: held_at(pull, highest.time) / total,
+        PEAK: strength,
+        BEYOND: strength - above,
+        RAISED: highest.raised,
         WORK: pull.work / total / run.middle_length,
         HELD_FAST: float(held_fast(pull, settings[pulled.index])),
+        "escaped at the end [-]": before["escaped [-]"],
         "frames averaged [-]": int(before["frames averaged"]),
         "scene_sha256": run.scene_sha256,
         "run": run.directory.name,
@@ -165,7 +166,7 @@ def _prepared_by(run: RunManifest) -> str:
 
 
 def _planned(run: RunManifest) -> float:
-    """Time of the activity by the run's name [s], from which that of the run differs by the rounding to whole swings."""
+    """Time of the activity by the run's name [s]; the run's own is rounded to whole swings."""
     found = _NAMED.fullmatch(run.directory.name)
     if found is None:
         msg = f"{run.directory}: not named like a run of this study, such as internal10_2s_lw0.70_seed1"

@@ -1,8 +1,8 @@
 """Which measure of a pile goes with its strength, and is the best one surely better than the others?
 
 Rank correlations: no shape of the law is assumed. Runs of one l/w, procedure, θ and seed are one trajectory, cut off at
-several times, and make one block: errors are by drawing trajectories of each l/w anew. A measure is compared with others
-in the same draws, so that what both share does not count.
+several times, and make one block: errors are by drawing trajectories of each l/w anew. A measure is compared with
+others in the same draws, so that what both share does not count.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ def write_hooked_run(
     *,
     limit: float | None = None,
     stops: float = np.inf,
+    spent: float | None = None,
 ) -> Path:
     """A whole run whose last phase pulls the hook.
 
@@ -39,6 +40,7 @@ def write_hooked_run(
         force: Needed to raise the hook [N], of times since the pull began [s].
         limit: The force that is to stop the hook [N].
         stops: When it does so, since the pull began [s].
+        spent: By motors, or by the shaken container, steadily in the third phase [J].
     """
     write_run(directory, run)
     path = directory / "scene.yaml"
@@ -66,5 +68,9 @@ def write_hooked_run(
         "container_z_m": np.full(len(times), run.floor_z),
         "container_work_J": work,
     }
+    if spent is not None:
+        by = "container_work_J" if run.phases[2] == "shake" else "motor_work_J"
+        done = spent * np.clip((times - ends[1]) / (ends[2] - ends[1]), 0, 1)
+        columns[by] = done + columns.get(by, 0.0)
     write_series(directory, columns, seed=run.seed)
     return directory

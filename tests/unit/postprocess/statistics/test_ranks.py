@@ -1,0 +1,116 @@
+"""Rank correlations and slopes within strata, and intervals by drawing blocks: known answers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import spearmanr
+
+from postprocess.statistics.ranks import (
+    common_slopes,
+    few_blocks,
+    interval,
+    rank_correlations,
+    resampled,
+    resamples,
+)
+from postprocess.statistics.seeds import slope_within
+
+Floats = NDArray[np.float64]
+
+
+def one_stratum(count: int) -> NDArray[np.int64]:
+    return np.zeros(count, dtype=np.int64)
+
+
+def test_of_one_stratum_it_is_spearmans() -> None:
+    random = np.random.default_rng(1)
+    # With ties.
+    x, y = random.integers(0, 6, (40, 3)).astype(float), random.normal(size=40)
+    found = rank_correlations(x, y, one_stratum(40))
+    assert found == pytest.approx([spearmanr(x[:, k], y).statistic for k in range(3)])
+
+
+def test_what_lies_between_strata_does_not_count_within() -> None:
+    """Rising within each stratum, falling from one to the next."""
+    strata = np.repeat([0, 1, 2], 10)
+    within = np.tile(np.arange(10.0), 3)
+    x, y = within + 100.0 * strata, within**3 - 1e6 * strata
+    assert rank_correlations(x[:, None], y, strata) == pytest.approx([1.0])
+    assert rank_correlations(x[:, None], y, one_stratum(30))[0] < -0.7
+    assert common_slopes(x[:, None], y, strata)[0] > 0 > common_slopes(x[:, None], y, one_stratum(30))[0]
+
+
+def test_a_column_that_is_the_same_throughout_every_stratum_tells_nothing() -> None:
+    strata, y = np.repeat([0, 1], 5), np.arange(10.0)
+    x = np.column_stack([np.repeat([0.1, 0.3], 5), y])
+    assert np.isnan(rank_correlations(x, y, strata)).tolist() == [True, False]
+    assert np.isnan(common_slopes(x, y, strata)).tolist() == [True, False]
+
+
+def test_slopes_are_those_of_blocks_with_levels_of_their_own() -> None:
+    random = np.random.default_rng(2)
+    x, y, strata = random.normal(size=(30, 2)), random.normal(size=30), np.repeat([0, 1, 2], 10)
+    wanted = [slope_within(x[:, k], y, strata.tolist()).value for k in range(2)]
+    assert common_slopes(x, y, strata) == pytest.approx(wanted)
+
+
+def test_whole_blocks_are_drawn_and_every_stratum_keeps_its_number() -> None:
+    blocks, strata = np.array([0, 0, 1, 2, 2, 2, 3]), np.array([0, 0, 0, 1, 1, 1, 1])
+    sizes = np.bincount(blocks)
+    drawn = list(resamples(blocks, strata, count=50, seed=3))
+    for rows in drawn:
+        times = np.bincount(blocks[rows], minlength=4)
+        assert (times % sizes == 0).all()
+        assert (times / sizes)[:2].sum() == (times / sizes)[2:].sum() == 2
+    assert len({tuple(np.sort(rows)) for rows in drawn}) == 9
+    again = list(resamples(blocks, strata, count=50, seed=3))
+    assert all((one == other).all() for one, other in zip(drawn, again, strict=True))
+    assert not all(
+        len(one) == len(other) and (one == other).all()
+        for one, other in zip(drawn, resamples(blocks, strata, count=50, seed=4), strict=True)
+    )
+
+
+def widths(x: Floats, y: Floats, blocks: NDArray[np.int64]) -> tuple[float, float]:
+    strata = one_stratum(len(y))
+    drawn = resampled(lambda rows: rank_correlations(x[rows], y[rows], strata[rows]), blocks, strata, count=400, seed=5)
+    found = interval(0.0, drawn[:, 0].tolist())
+    return found.low, found.high
+
+
+def test_the_interval_holds_the_true_correlation_as_often_as_it_says() -> None:
+    random = np.random.default_rng(6)
+    true = 6 / math.pi * math.asin(0.6 / 2)  # Spearman's of normal variables that correlate by 0.6
+    held = 0
+    for _ in range(100):
+        x = random.normal(size=(60, 1))
+        y = 0.6 * x[:, 0] + 0.8 * random.normal(size=60)
+        low, high = widths(x, y, np.arange(60))
+        held += low < true < high
+    assert 88 <= held <= 99
+
+
+def test_copies_of_a_run_do_not_make_it_surer() -> None:
+    random = np.random.default_rng(7)
+    x = random.normal(size=(40, 1))
+    y = 0.5 * x[:, 0] + random.normal(size=40)
+    blocks = np.arange(40)
+    low, high = widths(x, y, blocks)
+    four = np.repeat(x, 4, axis=0), np.repeat(y, 4), np.repeat(blocks, 4)
+    assert widths(*four) == pytest.approx((low, high), abs=0.03)
+    naive = widths(four[0], four[1], np.arange(160))
+    assert naive[1] - naive[0] < 0.65 * (high - low)
+
+
+def test_an_interval_of_values_that_are_mostly_unknown_has_no_ends() -> None:
+    assert math.isnan(interval(1.0, [1.0, math.nan, 2.0]).low)
+    found = interval(1.5, range(101))
+    assert (found.low, found.high) == pytest.approx((2.5, 97.5))
+    assert interval(1.5, range(1, 101)).clear
+    assert not interval(1.5, range(-50, 51)).clear
+    assert few_blocks(np.array([0, 1, 1, 2, 3, 4]), np.array([0, 0, 0, 1, 1, 1]))
+    assert not few_blocks(np.arange(6), np.repeat([0, 1], 3))
