@@ -33,6 +33,7 @@ from studies.landscape.predictors import ALL, EVERY, HIGH, LOW, PART, PREDICTOR,
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 _STRENGTH = r"strength $F/(n W_\mathrm{s})$ [-]"
@@ -156,7 +157,7 @@ def _draw_energies(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> l
     columns = min(len(ratios), 4)
     figure = figures.blank_figure(_PAGE, 1.75 * math.ceil(len(ratios) / columns) + 0.5)
     grid = figure.subplots(math.ceil(len(ratios) / columns), columns, sharex=True, sharey=True, squeeze=False)
-    handles: dict[str, object] = {}
+    handles: dict[str, Artist] = {}
     for axes in grid.flat[len(ratios) :]:
         axes.set_visible(False)
     for axes, ratio in zip(grid.flat, ratios, strict=False):

@@ -15,7 +15,9 @@ import pandas as pd
 
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.ranks import (
+    Floats,
     Interval,
+    Whole,
     common_slopes,
     few_blocks,
     interval,
@@ -85,7 +87,7 @@ def _of(
     levels = strata if within else np.zeros_like(strata)
     blocks = trajectories(table).to_numpy(dtype=np.int64)
 
-    def measures(rows: np.ndarray) -> np.ndarray:
+    def measures(rows: Whole) -> Floats:
         at = x[rows], y[rows], levels[rows]
         return np.concatenate([rank_correlations(*at), common_slopes(*at)])
 
@@ -135,8 +137,9 @@ def verdict(lead: Interval) -> str:
     return "better" if lead.low > 0 else "not resolved"
 
 
-def _spread(x: np.ndarray, levels: np.ndarray) -> np.ndarray:
+def _spread(x: Floats, levels: Whole) -> Floats:
     """(m,) standard deviation of each column about the means of its levels."""
     frame = pd.DataFrame(x)
     centred = frame - frame.groupby(levels).transform("mean")
-    return centred.to_numpy().std(axis=0)
+    spread: Floats = centred.to_numpy(dtype=np.float64).std(axis=0)
+    return spread

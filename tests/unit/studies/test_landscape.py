@@ -22,7 +22,7 @@ from dem.phases.pull_hook import PullHook
 from dem.record.manifest import read_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.base.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.landscape import cost, measure, predictors
 from studies.landscape.cost import COMMON, FRONTIER, GAIN, YIELD, costs
 from studies.landscape.findings import answers
@@ -43,7 +43,7 @@ from studies.registry import study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study landscape --out landscape"}
+ORIGIN: dict[str, Any] = {"note": "the full study as shipped", "command": "smarticles study landscape --out landscape"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
 APEX, BASE = 0.5, 0.4
 RATIOS = (0.4, 0.7, 1.0)
@@ -86,7 +86,7 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     assert row[measure.WORK] == pytest.approx(0.5 * BASE, rel=1e-3)
     assert row[ENERGY] == pytest.approx(6e-3 / run.count, rel=1e-6)
     assert row[LIFTS] == pytest.approx(6e-3 / run.count / weight(made) / W, rel=1e-6)
-    assert (row[PLANNED], row[measure.ACTIVE], row[THETA], row[HELD_FAST]) == (2.0, 2.0, 10.0, 0.0)
+    assert (row[PLANNED], row[ACTIVE], row[THETA], row[HELD_FAST]) == (2.0, 2.0, 10.0, 0.0)
     assert row[PHI] == pytest.approx(0.01, rel=0.01)
 
 

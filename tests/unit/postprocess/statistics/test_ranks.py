@@ -54,7 +54,7 @@ def test_a_column_that_is_the_same_throughout_every_stratum_tells_nothing() -> N
 def test_slopes_are_those_of_blocks_with_levels_of_their_own() -> None:
     random = np.random.default_rng(2)
     x, y, strata = random.normal(size=(30, 2)), random.normal(size=30), np.repeat([0, 1, 2], 10)
-    wanted = [slope_within(x[:, k], y, strata.tolist()).value for k in range(2)]
+    wanted = [slope_within(x[:, k].tolist(), y.tolist(), strata.tolist()).value for k in range(2)]
     assert common_slopes(x, y, strata) == pytest.approx(wanted)
 
 
