@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
@@ -20,6 +21,7 @@ from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDUR
 from studies.landscape.cost import COMMON, GAIN
 from studies.landscape.measure import (
     ABOVE,
+    CALLED,
     CONTACTS,
     ENERGY,
     ENTANGLED,
@@ -104,6 +106,8 @@ def _draw_maps(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list[
     if not thetas:
         return []
     shown = points[points[PROCEDURE].isin([STATIC, INTERNAL])]
+    ratios = sorted(shown[ASPECT].unique())
+    half = min(np.diff(ratios), default=0.1) / 2
     left, right = float(swung[ENERGY].min()) / _CELL, float(swung[ENERGY].max()) * _CELL
     figure = figures.blank_figure(_PAGE, 1.35 * len(_MAPPED) + 0.5)
     grid = figure.subplots(len(_MAPPED), len(thetas), sharex=True, sharey=True, squeeze=False)
@@ -112,34 +116,52 @@ def _draw_maps(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list[
         for axes, theta in zip(panels, thetas, strict=True):
             here = swung[swung[THETA] == theta]
             for aspect, row in here.groupby(ASPECT):
-                _draw_row(axes, float(aspect), row.sort_values(ENERGY), quantity, norm)
+                _draw_row(axes, (float(aspect), half), row.sort_values(ENERGY), quantity, norm)
             for _, pile in poured[poured[ASPECT].isin(here[ASPECT])].iterrows():
-                _draw_cells(axes, [left / 4, left / 2], float(pile[ASPECT]), [float(pile[quantity])], norm)
-            axes.set_xscale("log")
+                _draw_cells(axes, [left / 4, left / 2], (float(pile[ASPECT]), half), [float(pile[quantity])], norm)
+            _spend(axes, sparse=True)
             axes.set_xlim(left / 5, right * 1.05)
             axes.grid(visible=False)
+            axes.set_yticks(ratios)
             axes.axvline(left / 1.4, color=figures.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
         bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(panels), pad=0.01, aspect=12)
         bar.set_label(label)
         panels[0].set_ylabel(r"$l/w$ [-]")
     for axes, theta in zip(grid[0], thetas, strict=True):
         axes.set_title(rf"$\theta$ = {theta:g}°", fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel(_ENERGY)
+    grid[-1][len(thetas) // 2].set_xlabel(_ENERGY)
     told = "Left of the broken line: poured, no energy spent. Each cell is a point, a mean over its seeds; l/w and θ"
     return finished(figure, path, [f"{told} beyond what the hinge reaches are empty."], footer)
 
 
-def _draw_row(axes: Axes, aspect: float, row: pd.DataFrame, quantity: str, norm: Normalize) -> None:
-    """The points of one l/w and θ as cells side by side, which meet midway between their energies."""
+def _spend(axes: Axes, *, sparse: bool = False) -> None:
+    """A logarithmic axis with numbers at powers of ten, and at thrice them unless they are to be sparse."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if sparse else (1.0, 3.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(_told_energy))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _told_energy(value: float, _: int | None) -> str:
+    """`3e-5`, or `30`."""
+    return f"{value:g}" if value > 1e-2 else f"{value:.0e}".replace("e-0", "e-")
+
+
+def _draw_row(axes: Axes, place: tuple[float, float], row: pd.DataFrame, quantity: str, norm: Normalize) -> None:
+    """The points of one l/w and θ as cells side by side, which meet midway between their energies.
+
+    `place` is l/w and half the height of a cell.
+    """
     energies = row[ENERGY].to_numpy(dtype=np.float64)
     between = np.sqrt(energies[:-1] * energies[1:])
     edges = [energies[0] / _CELL, *between, energies[-1] * _CELL]
-    _draw_cells(axes, edges, aspect, row[quantity].tolist(), norm)
+    _draw_cells(axes, edges, place, row[quantity].tolist(), norm)
 
 
-def _draw_cells(axes: Axes, edges: Sequence[float], aspect: float, values: Sequence[float], norm: Normalize) -> None:
-    axes.pcolormesh(edges, [aspect - 0.05, aspect + 0.05], np.array([values]), norm=norm, cmap="viridis")
+def _draw_cells(
+    axes: Axes, edges: Sequence[float], place: tuple[float, float], values: Sequence[float], norm: Normalize
+) -> None:
+    axes.pcolormesh(edges, [place[0] - place[1], place[0] + place[1]], np.array([values]), norm=norm, cmap="viridis")
 
 
 # -- strength ---------------------------------------------------------------------------------------------------------
@@ -171,7 +193,7 @@ def _draw_energies(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> l
             _draw_line(axes, part, {**procedure_marker(name), "linestyle": "none"}, _NAMES[name])
         for level in here.loc[here[PROCEDURE] == STATIC, PEAK]:
             axes.axhline(level, color=figures.GREY, linewidth=0.8, linestyle=(0, (4, 3)), label="poured")
-        axes.set_xscale("log")
+        _spend(axes)
         axes.set_ylim(bottom=0)
         axes.set_title(f"l/w = {ratio:g}", fontsize=8)
         handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
@@ -215,7 +237,7 @@ def _draw_measures(path: Path, runs: pd.DataFrame, footer: Sequence[str]) -> lis
                 label=_NAMES[procedure],
             )
         if name == ENERGY:
-            axes.set_xscale("log")
+            _spend(axes)
         axes.set_xlabel(_LABELS[name])
         axes.set_ylim(bottom=0)
     for axes in grid[:, 0]:
@@ -240,7 +262,7 @@ def _draw_correlations(path: Path, predictors: pd.DataFrame, footer: Sequence[st
         axes.plot(rows[RHO], places, mark, color=colour, markersize=4, label=scope)
     axes.axvline(0, color=figures.GREY, linewidth=0.6)
     axes.set_xlim(-1, 1)
-    axes.set_yticks(range(len(names)), [name.rpartition(" [")[0] for name in names])
+    axes.set_yticks(range(len(names)), [CALLED[name] for name in names])
     axes.set_xlabel("rank correlation with strength [-]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     told = "Lines: 95 % by resampling whole trajectories within each l/w. Within l/w: of ranks among runs of one l/w."
@@ -267,8 +289,8 @@ def _draw_costs(path: Path, cost: pd.DataFrame, footer: Sequence[str]) -> list[P
             errors = part[marked(GAIN, "95 %")].to_numpy()
             draw_means(axes, part[LIFTS], part[GAIN], errors, look=look, label=_NAMES[name])
     axes.axhline(0, color=figures.GREY, linewidth=0.6)
-    axes.set_xscale("log")
+    _spend(axes)
     axes.set_xlabel(r"energy per smarticle over $W_\mathrm{s} w$ [-]")
-    axes.set_ylabel(r"strength gained over the poured pile, $/(n W_\mathrm{s})$ [-]")
+    axes.set_ylabel(r"strength gained, over $n W_\mathrm{s}$ [-]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return finished(figure, path, ["Means over seeds and over the l/w at which everything was run."], footer)

@@ -15,7 +15,7 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, THETA
 from studies.base.questions import Question, YesNo
 from studies.landscape.cost import COMMON, GAIN, YIELD, at_point, best_points, common_aspects, gains, yields_compared
-from studies.landscape.measure import BEYOND, ENERGY, LIFTS, LINKING, PEAK, PLANNED
+from studies.landscape.measure import BEYOND, CALLED, ENERGY, LIFTS, LINKING, PEAK, PLANNED
 from studies.landscape.predictors import (
     ALL,
     EVERY,
@@ -65,11 +65,6 @@ def told_interval(value: float, low: float, high: float, form: str = "+.2f") -> 
     return f"{value:{form}}" + (f" ({low:{form}} to {high:{form}})" if math.isfinite(low) else " (no error)")
 
 
-def bare(column: str) -> str:
-    """A column without its unit."""
-    return column.rpartition(" [")[0]
-
-
 def _at(table: pd.DataFrame, strength: str, part: str, scope: str) -> pd.DataFrame:
     if table.empty:
         return table
@@ -89,15 +84,16 @@ def _best(predictors: pd.DataFrame, comparisons: pd.DataFrame, strength: str, sc
     first = found.iloc[0]
     rivals = against[against[VERDICT] == "not resolved"]
     surely = rivals.empty and len(against) > 0 and math.isfinite(first[LOW])
-    listed = ", ".join(f"{bare(row[PREDICTOR])} {_rho(row)}" for _, row in found.iloc[:4].iterrows())
+    listed = ", ".join(f"{CALLED[row[PREDICTOR]]} {_rho(row)}" for _, row in found.iloc[:4].iterrows())
     told_leads = ", ".join(
-        f"{bare(row[OTHER])} {told_interval(row[LEAD], row[LOW], row[HIGH])}" for _, row in against.iloc[:3].iterrows()
+        f"{CALLED[row[OTHER]]} {told_interval(row[LEAD], row[LOW], row[HIGH])}"
+        for _, row in against.iloc[:3].iterrows()
     )
-    open_ = f"; not resolved against {', '.join(bare(name) for name in rivals[OTHER])}" if len(rivals) else ""
+    open_ = f"; not resolved against {', '.join(CALLED[name] for name in rivals[OTHER])}" if len(rivals) else ""
     return Question(
         question=question,
         answer="yes" if surely else "undetermined",
-        evidence=f"{bare(first[PREDICTOR])}, first in {told_number(100 * first[FIRST], '.0f')} % of resamples; rank "
+        evidence=f"{CALLED[first[PREDICTOR]]}, first in {told_number(100 * first[FIRST], '.0f')} % of resamples; rank "
         f"correlations {listed}; in size the first less {told_leads}{open_}",
     )
 

@@ -76,6 +76,21 @@ PREDICTORS: Mapping[str, str] = MappingProxyType(
 )
 """What may tell strength, all at rest before the pull."""
 
+CALLED: Mapping[str, str] = MappingProxyType(
+    {
+        PHI: "φ",
+        CROSSINGS: "⟨N⟩",
+        LINKING: "linking number",
+        CONTACTS: "contacts",
+        TOUCHING: "largest cluster in contact",
+        ENTANGLED: "largest entangled cluster",
+        HEIGHT: "height of the centre of mass",
+        ABOVE: "share above the hook",
+        ENERGY: "energy spent",
+    }
+)
+"""What they are called in words."""
+
 OTHERS: Mapping[str, str] = MappingProxyType(
     {
         LIFTS: "the energy over the work that lifts a smarticle by w",

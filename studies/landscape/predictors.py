@@ -27,7 +27,7 @@ from postprocess.statistics.ranks import (
 from studies.base.procedures import INTERNAL, PROCEDURE, STATIC
 from studies.landscape.measure import HELD_FAST, PREDICTORS, STRENGTHS, trajectories
 
-RESAMPLES, DRAW = 2000, 17
+RESAMPLES, DRAW = 1000, 17
 STRENGTH, SCOPE, PART, PREDICTOR = "strength", "scope", "runs", "measure"
 COUNT, BLOCKS = "runs [-]", "trajectories [-]"
 RHO, LOW, HIGH = "rank correlation [-]", "from [-]", "to [-]"
@@ -63,6 +63,8 @@ def predicted(runs: pd.DataFrame, *, count: int = RESAMPLES) -> tuple[pd.DataFra
     for strength in STRENGTHS:
         for name, part in PARTS.items():
             chosen = part(runs)
+            if name != EVERY and len(chosen) == len(runs):
+                continue
             chosen = chosen[np.isfinite(chosen[[*PREDICTORS, strength]]).all(axis=1)]
             scopes = {ALL: chosen, WITHIN: chosen}
             if name == EVERY:

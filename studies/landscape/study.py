@@ -25,9 +25,10 @@ from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, to
 from studies.base.study import Analysis, Study, Tables
 from studies.landscape import figures
 from studies.landscape.cost import COMMON, FRONTIER, GAIN, HIGH, LOW, PAIRS, YIELD, common_aspects, costs
-from studies.landscape.findings import answers, bare, named_point, told_interval
+from studies.landscape.findings import SHORT, answers, named_point, told_interval
 from studies.landscape.measure import (
     ABOVE,
+    CALLED,
     ENERGY,
     HELD_FAST,
     LIFTS,
@@ -232,14 +233,14 @@ def _told_predictors(table: pd.DataFrame, strength: str, part: str, scope: str) 
     runs = "" if part == EVERY else f", runs: {part}"
     rows = [
         [
-            bare(row[PREDICTOR]),
+            CALLED[row[PREDICTOR]],
             told_interval(row[RHO], row["from [-]"], row["to [-]"]),
             told_interval(row[SLOPE], row[SLOPE_LOW], row[SLOPE_HIGH], "+.3f"),
             told_number(100 * row[FIRST], ".0f"),
         ]
         for _, row in found.iterrows()
     ]
-    title = bare(strength).replace(" over n W_s", "").capitalize()
+    title = SHORT[strength].capitalize()
     header = ["measure", "rank correlation (95 %)", "n W_s per SD of the measure (95 %)", "first in % of resamples"]
     return [
         "",
