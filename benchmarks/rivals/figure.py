@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from benchmarks.rivals.labels import Label, place
 from benchmarks.rivals.running import COST, DEPTH
 from postprocess.report import figures
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+HEIGHT = 4.4  # inch, of the panels
 LOOKS: Mapping[str, tuple[str, str]] = {
     "links": ("o", figures.BLUE),
     "YADE": ("s", figures.SKY),
@@ -33,22 +39,33 @@ def draw(path: Path, table: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     """
     activities = list(table["activity"].unique())
     with figures.style():
-        figure = figures.blank_figure(figures.COLUMN_WIDTH * len(activities), 3.0)
+        figure = figures.blank_figure(figures.COLUMN_WIDTH * len(activities), HEIGHT)
         panels = figure.subplots(1, len(activities), sharey=True, squeeze=False)[0]
         for axes, activity in zip(panels, activities, strict=True):
             rows = table[table["activity"] == activity]
             for engine, (shape, colour) in LOOKS.items():
-                own = rows[rows["engine"] == engine].sort_values(DEPTH)
+                own = rows[rows["engine"] == engine]
                 if len(own):
                     axes.plot(1e3 * own[DEPTH], own[COST], marker=shape, color=colour, label=engine, linestyle="none")
-                for row in own.to_dict("records"):
-                    axes.annotate(
-                        row["setting"], (1e3 * row[DEPTH], row[COST]), xytext=(3, 3), textcoords="offset points",
-                        fontsize=4, color=colour,
-                    )  # fmt: skip
             axes.set(xscale="log", yscale="log", title=activity, xlabel="deepest overlap [mm]")
-            axes.margins(0.15)
+            axes.margins(x=0.2, y=0.08)
         panels[0].set_ylabel("processor time per simulated time [s/s]")
-        panels[0].legend()
+        figure.legend(*_every_engine(panels), loc="outside upper center", ncols=len(LOOKS))
         figures.add_footer(figure, footer)
+        for axes, activity in zip(panels, activities, strict=True):
+            rows = table[table["activity"] == activity]
+            place(axes, [
+                Label((1e3 * row[DEPTH], row[COST]), row["setting"], LOOKS[row["engine"]][1])
+                for row in rows.to_dict("records")
+            ])  # fmt: skip
         return figures.save(figure, path)
+
+
+def _every_engine(panels: Sequence[Axes]) -> tuple[list[Any], list[str]]:
+    """Handles and names of a legend for all panels, in the order of the looks."""
+    found = {}
+    for axes in panels:
+        handles, names = axes.get_legend_handles_labels()
+        found.update(zip(names, handles, strict=True))
+    names = [name for name in LOOKS if name in found]
+    return [found[name] for name in names], names

@@ -76,7 +76,7 @@ def test_a_saved_simulation_goes_on_to_the_same_bits(build: Build, ranks: int, t
     assert np.array_equal(other.state().link_spins, went_on.link_spins)
     assert other.fixtures.floor == engine.fixtures.floor != 0
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(InputError, match=r"^checkpoint: format 'links-3', here is 'lammps-1'"):
+    with pytest.raises(InputError, match=r"^checkpoint: format 'links-3', here is 'lammps-2'"):
         other.load(replace(saved, memory={"format": "links-3"}), tmp_path)
 
 

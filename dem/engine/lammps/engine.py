@@ -33,7 +33,7 @@ from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
 
-FORMAT = "lammps-1"
+FORMAT = "lammps-2"
 SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
 HEAD = 9  # lines of a dump before its rows
 

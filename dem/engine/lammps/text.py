@@ -18,6 +18,8 @@ from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
 
+NEVER_PULLS = "limit_damping"
+"""Of a contact law: the normal force is zero where spring and dashpot together would pull, as on our other engines."""
 SKIN = 0.2  # sphere diameters that neighbours are looked for beyond contact
 LOOKED_AT = (
     "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"  # of a body
@@ -107,13 +109,13 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
     """Numbers of `pair_style gran/hooke/history` between smarticles of a mass [kg], and of `fix wall/gran/region`.
 
     kn and ks [N/m]; damping across and along the surface [1/s], which LAMMPS multiplies with the effective mass of the
-    two bodies that touch, M/2, or M at a wall; friction; 1: damping along the surface is on.
+    two bodies that touch, M/2, or M at a wall; friction; 1: damping along the surface is on; a dashpot never pulls.
     """
     between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
     springs, tangential = f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g}", law.tangential_damping
     return (
-        f"{springs} {between:.9g} {between * tangential:.9g} {law.friction:.9g} 1",
-        f"hooke/history {springs} {wall:.9g} {wall * tangential:.9g} {law.wall_friction:.9g} 1",
+        f"{springs} {between:.9g} {between * tangential:.9g} {law.friction:.9g} 1 {NEVER_PULLS}",
+        f"hooke/history {springs} {wall:.9g} {wall * tangential:.9g} {law.wall_friction:.9g} 1 {NEVER_PULLS}",
     )
 
 

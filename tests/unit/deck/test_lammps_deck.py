@@ -104,8 +104,8 @@ def test_the_deck_has_the_scene_s_law_steps_and_phases(tmp_path: Path) -> None:
     deck, law = (tmp_path / "deck" / DECK).read_text(), contact_law(scene.particle, scene.contact, 250.0)
     mass, ratio = scene.particle.boxes.mass, law.tangential_damping
     assert deck.startswith("# two lines & more: 2 smarticles of ")
-    ((_, style, *pair),) = words(deck, "pair_style")
-    assert style == "gran/hooke/history"
+    ((_, style, *pair, limited),) = words(deck, "pair_style")
+    assert (style, limited) == ("gran/hooke/history", "limit_damping")
     # LAMMPS multiplies damping with the effective mass of two bodies, or of one at a wall.
     own = [250, 250 * 0.82, law.normal_damping / (mass / 2), ratio * law.normal_damping / (mass / 2), 0.4, 1]
     assert [float(value) for value in pair] == pytest.approx(own, rel=1e-8)
@@ -114,6 +114,7 @@ def test_the_deck_has_the_scene_s_law_steps_and_phases(tmp_path: Path) -> None:
     own = [250, 250 * 0.82, law.wall_damping / mass, ratio * law.wall_damping / mass, 0.2, 1]
     for name in ("floor", "wall"):
         assert [float(value) for value in fixes[name][3:9]] == pytest.approx(own, rel=1e-8)
+        assert fixes[name][9:] == ["limit_damping", "region", name]
     dt = float(words(deck, "timestep")[0][1])
     assert dt == passive(scene, "x").time_step
     assert [int(run[1]) for run in words(deck, "run")] == [round(t / dt) for t in (0.05, 0.1, 0.2, 0.1, 0.2)]

@@ -1,0 +1,204 @@
+"""What a simulated second of shaking takes on every engine, N = 50 to 100 000: `python -m benchmarks.growth`.
+
+YADE and LAMMPS, on one rank and on two, shake the piles that `benchmarks.scaling` has poured, each in a process of its
+own, again and again: of each stretch of steps the least time counts. Links come from that benchmark's own table. What
+was not measured is extrapolated to `FAR`, wall time by a power of N and memory by a straight line through what was
+measured from `LARGE` smarticles on (or the two largest), and is marked so, in the table and in the figure. Rows that
+the table in OUT has are not measured again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks import scaling
+from benchmarks.steps import LENGTH
+from dem.engine.lammps.ranks import RANKS
+from dem.plan.steps import time_step
+from dem.scene.reading import parse_scene
+from postprocess.report.figures import BLUE, GREEN, ORANGE, add_footer, blank_figure, save, style
+
+COUNTS, FAR, LARGE = (50, 270, 1000, 5000, 20_000), (20_000, 50_000, 100_000), 1000
+ENGINE, WORKERS, COUNT, FIDELITY = "engine", "threads or ranks [-]", "N [-]", "fidelity"
+STEP, EACH, WALL = "dt [us]", "wall time per step and smarticle [us]", "wall time per simulated time [s/s]"
+MEMORY, MEASURED = scaling.MEMORY, "measured"
+LOOKS = {
+    ("links", 1): ("o", BLUE),
+    ("links", 2): ("s", BLUE),
+    ("yade", 1): ("^", ORANGE),
+    ("lammps", 1): ("D", GREEN),
+    ("lammps", 2): ("v", GREEN),
+}
+NAMES = {"links": "links", "yade": "YADE", "lammps": "LAMMPS"}
+NOUNS = {"links": "thread", "yade": "thread", "lammps": "rank"}
+
+
+def row_of(engine: str, workers: int, fidelity: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """A row of the table: of every stretch the least of all repetitions."""
+    first = found[0]
+    walls = np.min([one["wall"] for one in found], axis=0)
+    each = float(walls.sum()) / (LENGTH * len(walls))
+    return {
+        ENGINE: engine,
+        WORKERS: workers,
+        COUNT: first["count"],
+        FIDELITY: fidelity,
+        STEP: 1e6 * first["step"],
+        EACH: 1e6 * each / first["count"],
+        WALL: each / first["step"],
+        MEMORY: max(one["memory"] for one in found),
+        MEASURED: True,
+    }
+
+
+def of_links(path: Path) -> pd.DataFrame:
+    """Rows of `benchmarks.scaling`."""
+    table = pd.read_csv(path)
+    rows = []
+    for row in table[table[scaling.WALL].notna()].to_dict("records"):
+        scene = scaling.scene_of(int(row["N [-]"]))
+        scene["phases"].append({"type": "shake", "duration_s": 1.0})
+        step = time_step(parse_scene(scene, source="benchmarks"))
+        rows.append(
+            {
+                ENGINE: "links",
+                WORKERS: int(row["threads [-]"]),
+                COUNT: int(row["N [-]"]),
+                FIDELITY: "standard",
+                STEP: 1e6 * step,
+                EACH: row[scaling.WALL],
+                WALL: 1e-6 * row[scaling.WALL] * row["N [-]"] / step,
+                MEMORY: row[MEMORY],
+                MEASURED: True,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def extrapolated(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows for numbers in `FAR` beyond the largest that was measured, of each engine and number of workers."""
+    rows = []
+    for (engine, workers), own in table.groupby([ENGINE, WORKERS], sort=False):
+        ordered = own.sort_values(COUNT)
+        base = ordered[ordered[COUNT] >= LARGE] if (ordered[COUNT] >= LARGE).sum() > 1 else ordered.tail(2)
+        if len(base) < 2:
+            continue
+        power, level = np.polyfit(np.log(base[COUNT]), np.log(base[WALL]), 1)
+        slope, begin = np.polyfit(base[COUNT], base[MEMORY], 1)
+        for count in (count for count in FAR if count > ordered[COUNT].max()):
+            wall = float(np.exp(level) * count**power)
+            step = float(ordered[STEP].iloc[-1])
+            known = {ENGINE: engine, WORKERS: workers, COUNT: count, FIDELITY: ordered[FIDELITY].iloc[-1], STEP: step}
+            rows.append(
+                {**known, EACH: wall * step / count, WALL: wall, MEMORY: begin + slope * count, MEASURED: False}
+            )
+    return pd.DataFrame(rows, columns=list(table.columns))
+
+
+def measured(known: pd.DataFrame, arguments: argparse.Namespace) -> Iterator[tuple[str, int, list[dict[str, Any]]]]:
+    """Time what is asked for and not known yet."""
+    for count in arguments.counts:
+        pour = arguments.pours / str(count)
+        if not (pour / "done.json").exists():
+            print(f"N = {count}: left out, {pour} is not poured; run python -m benchmarks.scaling --counts {count}")
+            continue
+        number = max(2, min(8, 20_000 // count))
+        asked = [one for one in LOOKS if one[0] in arguments.engines]
+        if len(known):
+            has = {tuple(row) for row in known.loc[known[COUNT] == count, [ENGINE, WORKERS]].to_numpy().tolist()}
+            asked = [one for one in asked if one not in has]
+        found: dict[tuple[str, int], list[dict[str, Any]]] = {one: [] for one in asked}
+        for _ in range(arguments.repeats if count < arguments.once_from else 1):
+            for (engine, workers), told in found.items():
+                words = ["-m", "benchmarks.steps", engine, str(pour), arguments.fidelity, str(number)]
+                environment = {**os.environ, RANKS: str(workers), "OMP_NUM_THREADS": "1"}
+                said = subprocess.run(
+                    [sys.executable, *words], env=environment, stdout=subprocess.PIPE, text=True, check=True
+                ).stdout
+                told.append(json.loads(said.splitlines()[-1]))
+        for (engine, workers), told in found.items():
+            yield engine, workers, told
+
+
+def draw(table: pd.DataFrame, folder: Path, footer: Sequence[str]) -> list[Path]:
+    """Wall time of a simulated second and memory over N; what is extrapolated is open."""
+    with style():
+        figure = blank_figure(7.0, 3.2)
+        left, right = figure.subplots(1, 2)
+        for (engine, workers), (shape, colour) in LOOKS.items():
+            own = table[(table[ENGINE] == engine) & (table[WORKERS] == workers)].sort_values(COUNT)
+            if own.empty:
+                continue
+            known, far = own[own[MEASURED]], own[~own[MEASURED]]
+            last = pd.concat([known.tail(1), far])
+            noun = NOUNS[engine] + ("s" if workers > 1 else "")
+            line = "--" if workers > 1 else "-"
+            for axes, column in ((left, WALL), (right, MEMORY)):
+                axes.plot(known[COUNT], known[column], line, marker=shape, color=colour,
+                          label=f"{NAMES[engine]}, {workers} {noun}")  # fmt: skip
+                axes.plot(last[COUNT], last[column], ":", color=colour)
+                axes.plot(far[COUNT], far[column], linestyle="none", marker=shape, color=colour, fillstyle="none")
+        left.set_ylabel("wall time per simulated time [s/s]")
+        right.set_ylabel("peak memory [MiB]")
+        for axes in (left, right):
+            axes.set(xscale="log", yscale="log", xlabel="smarticles N [-]")
+        left.legend(title="filled: measured; open: extrapolated", title_fontsize=6)
+        figure.tight_layout()
+        add_footer(figure, footer)
+        return save(figure, folder / "engines", formats=("png",))
+
+
+def main() -> None:
+    """Time what is missing, and write table and figure."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.growth", description=__doc__)
+    parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, help="numbers of smarticles")
+    parser.add_argument("--engines", nargs="*", choices=("yade", "lammps"), default=("yade", "lammps"))
+    parser.add_argument("--fidelity", default="standard", help="of YADE and LAMMPS (default: %(default)s)")
+    parser.add_argument("--repeats", type=int, default=4, help="of each trajectory (default: %(default)s)")
+    parser.add_argument("--once-from", type=int, default=20_000, help="smarticles from which once must do")
+    parser.add_argument("--pours", type=Path, default=Path("out/scaling/pours"), help="of benchmarks.scaling")
+    parser.add_argument(
+        "--links", type=Path, default=Path("results/scaling/scaling.csv"), help="table of benchmarks.scaling"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/growth"), help="folder for table and figure")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    path = arguments.out / "engines.csv"
+    before = pd.read_csv(path) if path.exists() else pd.DataFrame()
+    known = before[before[MEASURED] & (before[ENGINE] != "links")] if len(before) else before
+    for engine, workers, told in measured(known, arguments):
+        row = row_of(engine, workers, arguments.fidelity, told)
+        print(f"{engine}, {workers}, N = {row[COUNT]}: {row[EACH]:.3g} us, {row[WALL]:.3g} s/s", flush=True)
+        known = pd.concat([known, pd.DataFrame([row])], ignore_index=True)
+        known.to_csv(path, index=False, float_format="%.4g")
+    table = pd.concat([of_links(arguments.links), known], ignore_index=True)
+    table = pd.concat([table, extrapolated(table)], ignore_index=True)
+    table = table.sort_values([ENGINE, WORKERS, COUNT], key=lambda it: it.map(_rank) if it.name == ENGINE else it)
+    table.to_csv(path, index=False, float_format="%.4g")
+    print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
+    draw(
+        table,
+        arguments.out,
+        [
+            f"Shaken at Γ = 2, l/w = 0.7, {arguments.fidelity}; steps alone, least times; piles of equal height.",
+            f"Open: by what was measured from N = {LARGE} on, a power of N and, of memory, a straight line.",
+        ],
+    )
+
+
+def _rank(engine: str) -> int:
+    return list(NAMES).index(engine)
+
+
+if __name__ == "__main__":
+    main()
