@@ -1,8 +1,10 @@
 """What a simulated second of shaking takes on every engine, N = 50 to 100 000: `python -m benchmarks.growth`.
 
-YADE and LAMMPS, on one rank and on two, shake the piles that `benchmarks.scaling` has poured, each in a process of its
-own, again and again: of each stretch of steps the least time counts. Links come from that benchmark's own table. What
-was not measured is extrapolated to `FAR`, wall time by a power of N and memory by a straight line through what was
+YADE and LAMMPS, on one rank and on two, shake piles that are poured as `benchmarks.scaling` does it, where they are not
+there yet, each in a process of its own, again and again; the least counts. On one core that is processor time, which is
+the wall time where nothing else runs; on two, wall time, of every stretch of steps the least, so that both cores must
+be free now and then. Links come from tables of `benchmarks.scaling`, and ranks also from one of `benchmarks.lammps`.
+What was not measured is extrapolated to `FAR`, time by a power of N and memory by a straight line through what was
 measured from `LARGE` smarticles on (or the two largest), and is marked so, in the table and in the figure. Rows that
 the table in OUT has are not measured again.
 """
@@ -22,16 +24,19 @@ import numpy as np
 import pandas as pd
 
 from benchmarks import scaling
+from benchmarks.child import run_child
 from benchmarks.steps import LENGTH
 from dem.engine.lammps.ranks import RANKS
 from dem.plan.steps import time_step
 from dem.scene.reading import parse_scene
 from postprocess.report.figures import BLUE, GREEN, ORANGE, add_footer, blank_figure, save, style
 
-COUNTS, FAR, LARGE = (50, 270, 1000, 5000, 20_000), (20_000, 50_000, 100_000), 1000
+COUNTS, FAR, LARGE = (50, 270, 1000, 5000), (20_000, 50_000, 100_000), 1000
 ENGINE, WORKERS, COUNT, FIDELITY = "engine", "threads or ranks [-]", "N [-]", "fidelity"
-STEP, EACH, WALL = "dt [us]", "wall time per step and smarticle [us]", "wall time per simulated time [s/s]"
+STEP, EACH, WALL = "dt [us]", "time per step and smarticle [us]", "time per simulated time [s/s]"
 MEMORY, MEASURED = scaling.MEMORY, "measured"
+LINKS = (Path("results/scaling/scaling.csv"), Path("results/scaling/idle_growth.csv"))
+RANKED = Path("results/lammps/ranks.csv")
 LOOKS = {
     ("links", 1): ("o", BLUE),
     ("links", 2): ("s", BLUE),
@@ -44,10 +49,14 @@ NOUNS = {"links": "thread", "yade": "thread", "lammps": "rank"}
 
 
 def row_of(engine: str, workers: int, fidelity: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """A row of the table: of every stretch the least of all repetitions."""
+    """A row of the table."""
     first = found[0]
-    walls = np.min([one["wall"] for one in found], axis=0)
-    each = float(walls.sum()) / (LENGTH * len(walls))
+    steps = LENGTH * len(first["wall"])
+    if workers == 1:
+        # Of other processes in whole ticks, too few in a stretch to be compared.
+        each = min(sum(one["processor"]) for one in found) / steps
+    else:
+        each = float(np.min([one["wall"] for one in found], axis=0).sum()) / steps
     return {
         ENGINE: engine,
         WORKERS: workers,
@@ -61,28 +70,36 @@ def row_of(engine: str, workers: int, fidelity: str, found: Sequence[dict[str, A
     }
 
 
-def of_links(path: Path) -> pd.DataFrame:
-    """Rows of `benchmarks.scaling`."""
-    table = pd.read_csv(path)
+def of_links(paths: Sequence[Path]) -> pd.DataFrame:
+    """Rows of tables of `benchmarks.scaling`; what a later one tells counts."""
+    table = pd.concat([pd.read_csv(path) for path in paths], ignore_index=True)
+    table = table.drop_duplicates(["N [-]", "threads [-]"], keep="last")
     rows = []
     for row in table[table[scaling.WALL].notna()].to_dict("records"):
-        scene = scaling.scene_of(int(row["N [-]"]))
-        scene["phases"].append({"type": "shake", "duration_s": 1.0})
-        step = time_step(parse_scene(scene, source="benchmarks"))
-        rows.append(
-            {
-                ENGINE: "links",
-                WORKERS: int(row["threads [-]"]),
-                COUNT: int(row["N [-]"]),
-                FIDELITY: "standard",
-                STEP: 1e6 * step,
-                EACH: row[scaling.WALL],
-                WALL: 1e-6 * row[scaling.WALL] * row["N [-]"] / step,
-                MEMORY: row[MEMORY],
-                MEASURED: True,
-            }
-        )
+        told = (int(row["threads [-]"]), int(row["N [-]"]), row[scaling.WALL], row[MEMORY])
+        rows.append(_told("links", *told))
     return pd.DataFrame(rows)
+
+
+def of_ranks(path: Path) -> pd.DataFrame:
+    """Rows of a table of `benchmarks.lammps ranks`, which does not tell memory."""
+    columns = {1: "one rank [us per step and smarticle]", 2: "two ranks [us]"}
+    return pd.DataFrame(
+        [
+            _told("lammps", workers, int(row["N"]), row[column], float("nan"))
+            for row in pd.read_csv(path).to_dict("records")
+            for workers, column in columns.items()
+        ]
+    )
+
+
+def _told(engine: str, workers: int, count: int, each: float, memory: float) -> dict[str, Any]:
+    """A row of time per step and smarticle [us] and memory [MiB], at standard."""
+    scene = {**scaling.scene_of(count), "engine": engine}
+    scene["phases"] = [*scene["phases"], {"type": "shake", "duration_s": 1.0}]
+    step = time_step(parse_scene(scene, source="benchmarks"))
+    known = {ENGINE: engine, WORKERS: workers, COUNT: count, FIDELITY: "standard", STEP: 1e6 * step, EACH: each}
+    return {**known, WALL: 1e-6 * each * count / step, MEMORY: memory, MEASURED: True}
 
 
 def extrapolated(table: pd.DataFrame) -> pd.DataFrame:
@@ -94,7 +111,8 @@ def extrapolated(table: pd.DataFrame) -> pd.DataFrame:
         if len(base) < 2:
             continue
         power, level = np.polyfit(np.log(base[COUNT]), np.log(base[WALL]), 1)
-        slope, begin = np.polyfit(base[COUNT], base[MEMORY], 1)
+        held = ordered[ordered[MEMORY].notna()].tail(max(2, len(base)))
+        slope, begin = np.polyfit(held[COUNT], held[MEMORY], 1) if len(held) > 1 else (np.nan, np.nan)
         for count in (count for count in FAR if count > ordered[COUNT].max()):
             wall = float(np.exp(level) * count**power)
             step = float(ordered[STEP].iloc[-1])
@@ -110,8 +128,7 @@ def measured(known: pd.DataFrame, arguments: argparse.Namespace) -> Iterator[tup
     for count in arguments.counts:
         pour = arguments.pours / str(count)
         if not (pour / "done.json").exists():
-            print(f"N = {count}: left out, {pour} is not poured; run python -m benchmarks.scaling --counts {count}")
-            continue
+            run_child(arguments.pours, str(count), scaling.scene_of(count))
         number = max(2, min(8, 20_000 // count))
         asked = [one for one in LOOKS if one[0] in arguments.engines]
         if len(known):
@@ -148,7 +165,7 @@ def draw(table: pd.DataFrame, folder: Path, footer: Sequence[str]) -> list[Path]
                           label=f"{NAMES[engine]}, {workers} {noun}")  # fmt: skip
                 axes.plot(last[COUNT], last[column], ":", color=colour)
                 axes.plot(far[COUNT], far[column], linestyle="none", marker=shape, color=colour, fillstyle="none")
-        left.set_ylabel("wall time per simulated time [s/s]")
+        left.set_ylabel("wall time per simulated time,\nnothing else running [s/s]")
         right.set_ylabel("peak memory [MiB]")
         for axes in (left, right):
             axes.set(xscale="log", yscale="log", xlabel="smarticles N [-]")
@@ -167,12 +184,12 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=4, help="of each trajectory (default: %(default)s)")
     parser.add_argument("--once-from", type=int, default=20_000, help="smarticles from which once must do")
     parser.add_argument("--pours", type=Path, default=Path("out/scaling/pours"), help="of benchmarks.scaling")
-    parser.add_argument(
-        "--links", type=Path, default=Path("results/scaling/scaling.csv"), help="table of benchmarks.scaling"
-    )
+    parser.add_argument("--links", type=Path, nargs="+", default=LINKS, help="tables of benchmarks.scaling")
+    parser.add_argument("--ranks", type=Path, default=RANKED, help="table of benchmarks.lammps ranks")
     parser.add_argument("--out", type=Path, default=Path("out/growth"), help="folder for table and figure")
     arguments = parser.parse_args()
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    for folder in (arguments.out, arguments.pours):
+        folder.mkdir(parents=True, exist_ok=True)
     path = arguments.out / "engines.csv"
     before = pd.read_csv(path) if path.exists() else pd.DataFrame()
     known = before[before[MEASURED] & (before[ENGINE] != "links")] if len(before) else before
@@ -181,7 +198,10 @@ def main() -> None:
         print(f"{engine}, {workers}, N = {row[COUNT]}: {row[EACH]:.3g} us, {row[WALL]:.3g} s/s", flush=True)
         known = pd.concat([known, pd.DataFrame([row])], ignore_index=True)
         known.to_csv(path, index=False, float_format="%.4g")
-    table = pd.concat([of_links(arguments.links), known], ignore_index=True)
+    # What these tables have was timed on an idle machine: of the same pile they count; memory they may not tell.
+    table = pd.concat([of_links(arguments.links), known, of_ranks(arguments.ranks)], ignore_index=True)
+    table[MEMORY] = table.groupby([ENGINE, WORKERS, COUNT])[MEMORY].transform("max")
+    table = table.drop_duplicates([ENGINE, WORKERS, COUNT, FIDELITY], keep="last")
     table = pd.concat([table, extrapolated(table)], ignore_index=True)
     table = table.sort_values([ENGINE, WORKERS, COUNT], key=lambda it: it.map(_rank) if it.name == ENGINE else it)
     table.to_csv(path, index=False, float_format="%.4g")
