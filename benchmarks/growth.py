@@ -130,7 +130,7 @@ def measured(known: pd.DataFrame, arguments: argparse.Namespace) -> Iterator[tup
         if not (pour / "done.json").exists():
             run_child(arguments.pours, str(count), scaling.scene_of(count))
         number = max(2, min(8, 20_000 // count))
-        asked = [one for one in LOOKS if one[0] in arguments.engines]
+        asked = [one for one in LOOKS if one[0] in arguments.engines and one[1] in arguments.workers]
         if len(known):
             has = {tuple(row) for row in known.loc[known[COUNT] == count, [ENGINE, WORKERS]].to_numpy().tolist()}
             asked = [one for one in asked if one not in has]
@@ -180,6 +180,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.growth", description=__doc__)
     parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, help="numbers of smarticles")
     parser.add_argument("--engines", nargs="*", choices=("yade", "lammps"), default=("yade", "lammps"))
+    parser.add_argument("--workers", type=int, nargs="+", default=(1, 2), help="ranks (default: 1 2)")
     parser.add_argument("--fidelity", default="standard", help="of YADE and LAMMPS (default: %(default)s)")
     parser.add_argument("--repeats", type=int, default=4, help="of each trajectory (default: %(default)s)")
     parser.add_argument("--once-from", type=int, default=20_000, help="smarticles from which once must do")

@@ -42,6 +42,7 @@ def pour_of(count: int) -> dict[str, Any]:
     return {
         **scene,
         "fidelity": FIDELITY,
+        "recording": {**scene["recording"], "frame_interval_s": 0.05},
         "phases": [{"type": "deposit", **layers}, {"type": "relax", "duration_s": 0.1}],
     }
 
@@ -154,11 +155,12 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     rows, begun = [], time.monotonic()
     pour, shaken = folder / "pour", f"shake-{arguments.ranks}"
+    held = float("nan")
     if not (pour / "done.json").exists():
-        rows += told(pour, run(folder, "pour", pour_of(arguments.count), 1))
-    rows += told(
-        folder / shaken, run(folder, shaken, shake_of(arguments.count, pour, arguments.shake), arguments.ranks)
-    )
+        held = run(folder, "pour", pour_of(arguments.count), 1)
+    rows += told(pour, held)
+    held = run(folder, shaken, shake_of(arguments.count, pour, arguments.shake), arguments.ranks)
+    rows += told(folder / shaken, held)
     table = pd.DataFrame(rows)
     table.to_csv(folder / "large_pile.csv", index=False, float_format="%.5g")
     print(table.to_string(index=False, float_format=lambda x: f"{x:.4g}"))

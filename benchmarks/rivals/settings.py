@@ -52,19 +52,19 @@ class Peer:
         title: in tables.
         module: of `benchmarks.rivals` that has its `simulate`.
         needs: package of Python, or program, that it needs.
-        program: whether that is a program.
+        package: Debian's, that has that program; empty: it is no program.
     """
 
     title: str
     module: str
     needs: str
-    program: bool = False
+    package: str = ""
 
     @property
     def missing(self) -> str | None:
         """What is missing, and the way out; None: nothing."""
-        if self.program:
-            found, way = shutil.which(self.needs) is not None, "apt-get install lammps"
+        if self.package:
+            found, way = shutil.which(self.needs) is not None, f"apt-get install {self.package}"
         else:
             found, way = importlib.util.find_spec(self.needs) is not None, "make rivals"
         return None if found else f"{self.title}: left out, {self.needs} is not installed ({way})"
@@ -73,7 +73,8 @@ class Peer:
 ENGINES: Mapping[str, Peer] = {
     "links": Peer(title="links", module="ours", needs="numba"),
     "yade": Peer(title="YADE", module="ours", needs="dem"),
-    "lammps": Peer(title="LAMMPS", module="lammps", needs="lmp", program=True),
+    "lammps": Peer(title="LAMMPS", module="lammps", needs="lmp", package="lammps"),
+    "liggghts": Peer(title="LIGGGHTS", module="liggghts", needs="liggghts", package="liggghts"),
     "mujoco": Peer(title="MuJoCo", module="mujoco_boxes", needs="mujoco"),
     "bullet": Peer(title="Bullet", module="bullet", needs="pybullet"),
     "rapier": Peer(title="Rapier", module="rapier", needs="rapier3d"),
@@ -106,6 +107,7 @@ def _ours() -> Iterator[Setting]:
         yield Setting(engine="yade", name=name, shape="spheres", scene=told, costly=name == "reference")
     told = {"engine": "yade", "fidelity": "standard"}
     yield Setting(engine="lammps", name="standard", shape="spheres", scene=told, costly=True)
+    yield Setting(engine="liggghts", name="standard", shape="spheres", scene=told, costly=True)
 
 
 def _mujoco(time_step: float, contact: float) -> Mapping[str, Any]:

@@ -300,10 +300,12 @@ def _check_room(scene: SceneView, taken: Taken) -> None:
             "container or another run"
         )
         raise InputError(msg)
-    if heights.max() > cylinder.height or heights.min() < 0:
+    lowest = float(_within_tips(vertices, scene.particle.radius)[..., 2].min())
+    if heights.max() > cylinder.height or lowest < 0:
         msg = (
             f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, which phases.0 (take-over) "
-            f"takes over, lie at {heights.min():.4g} to {heights.max():.4g} m; use a higher container or another run"
+            f"takes over, lie at {lowest:.4g} to {heights.max():.4g} m; use a higher container or another "
+            "run"
         )
         raise InputError(msg)
     for name, cross in zip(("lower", "upper"), scene.hooks.crosses if scene.hooks else (), strict=False):
@@ -314,6 +316,23 @@ def _check_room(scene: SceneView, taken: Taken) -> None:
                 "(take-over) takes over, lie in this hook; take over a run that was poured with these hooks"
             )
             raise InputError(msg)
+
+
+def _within_tips(vertices: Array, radius: float) -> Array:
+    """Vertices with both tips a radius [m] further in, where a chain or strand has its last point: what touches.
+
+    A tip may be under the floor by as much as a contact is deep.
+    """
+    moved = vertices.copy()
+    for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
+        # Without barbs the middle link ends at the tips.
+        ways = [vertices[:, end] - vertices[:, tip] for end in (hinge, far)]
+        lengths = [np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+        shares = [np.minimum(1.0, radius / np.maximum(length, 1e-300)) for length in lengths]
+        barbed = lengths[0] > 0
+        moved[:, tip] += np.where(barbed, shares[0] * ways[0], shares[1] * ways[1])
+        moved[:, hinge] = np.where(barbed, moved[:, hinge], moved[:, tip])
+    return moved
 
 
 def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:

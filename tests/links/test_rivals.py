@@ -30,6 +30,7 @@ FLOOR_FRICTION = 0.4
 CHOSEN = {  # settings that are tried: stiff ones of others, which do not sink in
     "links": "standard",
     "lammps": "standard",
+    "liggghts": "standard",
     "mujoco": "2e-4 s, CG 50, stiff",
     "bullet": "2e-4 s",
     "rapier": "2e-4 s, stiff",
@@ -115,11 +116,10 @@ def test_a_smarticle_lies_on_the_floor_and_goes_with_it(engine: str, tmp_path: P
     assert np.abs(found.frames - given.state.link_rotations).max() < 0.02
     assert found.positions[0, 0, :, :2] == pytest.approx(given.state.link_positions[0, :, :2], abs=2e-5)
     assert found.processor_s > 0
-    assert found.version.lower().startswith(("links", "lammps", "mujoco", "pybullet", "rapier"))
+    assert found.version.lower().startswith(("links", "lammps", "liggghts", "mujoco", "pybullet", "rapier"))
 
 
-# Not LAMMPS: its dashpots hold a body back that leaves, and with them so strong none is thrown.
-@pytest.mark.parametrize("engine", [engine for engine in CHOSEN if engine != "lammps"])
+@pytest.mark.parametrize("engine", CHOSEN)
 def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
     _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)
     heights = found.positions[:, 0, 1, 2]
