@@ -4,8 +4,8 @@ YADE and LAMMPS, on one rank and on two, shake piles that are poured as `benchma
 there yet, each in a process of its own, again and again; the least counts. On one core that is processor time, which is
 the wall time where nothing else runs; on two, wall time, of every stretch of steps the least, so that both cores must
 be free now and then. Links come from tables of `benchmarks.scaling`, and ranks also from one of `benchmarks.lammps`.
-What was not measured is extrapolated to `FAR`, time by a power of N and memory by a straight line through what was
-measured from `LARGE` smarticles on (or the two largest), and is marked so, in the table and in the figure. Rows that
+What was not measured is extrapolated to `FAR`: a smarticle costs what it does in the largest pile that was timed, and
+memory goes on along a straight line through what was measured from `LARGE` smarticles on; it is marked so. Rows that
 the table in OUT has are not measured again.
 """
 
@@ -107,19 +107,13 @@ def extrapolated(table: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (engine, workers), own in table.groupby([ENGINE, WORKERS], sort=False):
         ordered = own.sort_values(COUNT)
-        base = ordered[ordered[COUNT] >= LARGE] if (ordered[COUNT] >= LARGE).sum() > 1 else ordered.tail(2)
-        if len(base) < 2:
-            continue
-        power, level = np.polyfit(np.log(base[COUNT]), np.log(base[WALL]), 1)
-        held = ordered[ordered[MEMORY].notna()].tail(max(2, len(base)))
+        last, known = ordered.iloc[-1], ordered[ordered[MEMORY].notna()]
+        held = known[known[COUNT] >= LARGE] if (known[COUNT] >= LARGE).sum() > 1 else known.tail(2)
         slope, begin = np.polyfit(held[COUNT], held[MEMORY], 1) if len(held) > 1 else (np.nan, np.nan)
         for count in (count for count in FAR if count > ordered[COUNT].max()):
-            wall = float(np.exp(level) * count**power)
-            step = float(ordered[STEP].iloc[-1])
-            known = {ENGINE: engine, WORKERS: workers, COUNT: count, FIDELITY: ordered[FIDELITY].iloc[-1], STEP: step}
-            rows.append(
-                {**known, EACH: wall * step / count, WALL: wall, MEMORY: begin + slope * count, MEASURED: False}
-            )
+            same = {ENGINE: engine, WORKERS: workers, COUNT: count, FIDELITY: last[FIDELITY], STEP: last[STEP]}
+            costs = {EACH: last[EACH], WALL: last[WALL] * count / last[COUNT], MEMORY: begin + slope * count}
+            rows.append({**same, **costs, MEASURED: False})
     return pd.DataFrame(rows, columns=list(table.columns))
 
 
@@ -156,7 +150,8 @@ def draw(table: pd.DataFrame, folder: Path, footer: Sequence[str]) -> list[Path]
             own = table[(table[ENGINE] == engine) & (table[WORKERS] == workers)].sort_values(COUNT)
             if own.empty:
                 continue
-            known, far = own[own[MEASURED]], own[~own[MEASURED]]
+            sure = own[MEASURED].astype(bool)
+            known, far = own[sure], own[~sure]
             last = pd.concat([known.tail(1), far])
             noun = NOUNS[engine] + ("s" if workers > 1 else "")
             line = "--" if workers > 1 else "-"
@@ -212,7 +207,7 @@ def main() -> None:
         arguments.out,
         [
             f"Shaken at Γ = 2, l/w = 0.7, {arguments.fidelity}; steps alone, least times; piles of equal height.",
-            f"Open: by what was measured from N = {LARGE} on, a power of N and, of memory, a straight line.",
+            f"Open: a smarticle as dear as in the largest pile timed; memory by a straight line from N = {LARGE} on.",
         ],
     )
 

@@ -64,7 +64,7 @@ def draw(path: Path, table: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
 
 def _every_engine(panels: Sequence[Axes]) -> tuple[list[Any], list[str]]:
     """Handles and names of a legend for all panels, in the order of the looks."""
-    found = {}
+    found: dict[str, Any] = {}
     for axes in panels:
         handles, names = axes.get_legend_handles_labels()
         found.update(zip(names, handles, strict=True))

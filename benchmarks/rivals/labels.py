@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Annotation
 
 Array = NDArray[np.float64]
@@ -59,7 +58,7 @@ def place(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()
-    renderer = cast("FigureCanvasAgg", figure.canvas).get_renderer()
+    renderer = cast("Any", figure.canvas).get_renderer()
     point = figure.dpi / 72
     # Everything from here on in points; boxes are (x0, y0, x1, y1).
     centres = np.array([axes.transData.transform(label.at) for label in labels]).reshape(-1, 2) / point
@@ -109,7 +108,8 @@ def _overlap(boxes: Array, others: Array) -> NDArray[np.bool_]:
     """(P, Q) which boxes overlap which."""
     one, two = boxes[:, None], others[None]
     apart = (one[..., :2] >= two[..., 2:]) | (two[..., :2] >= one[..., 2:])
-    return ~apart.any(axis=-1)
+    found: NDArray[np.bool_] = ~np.any(apart, axis=-1)
+    return found
 
 
 def _gap(box: Array, point: Array) -> float:
@@ -122,13 +122,14 @@ def _between(centre: Array, box: Array) -> Array:
     share = np.linspace(0.0, 1.0, 40)[:, None]
     line: Array = (1 - share) * centre + share * (box[:2] + box[2:]) / 2
     # Another marker at the same place is met by every line.
-    return line[np.abs(line - centre).max(axis=1) > 2 * HALF]
+    beyond: Array = line[np.abs(line - centre).max(axis=1) > 2 * HALF]
+    return beyond
 
 
 def _met(boxes: Array, line: Array) -> int:
     """How many boxes a line goes through."""
     inside = (line[None] > boxes[:, None, :2]) & (line[None] < boxes[:, None, 2:])
-    return int(inside.all(axis=-1).any(axis=1).sum())
+    return int(np.any(np.all(inside, axis=-1), axis=1).sum())
 
 
 def _write(axes: Axes, label: Label, offset: Array, *, lined: bool) -> Annotation:

@@ -8,14 +8,11 @@ from dem.engine.demand import Demand
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.lammps.child import lammps_version
+from dem.engine.lammps.cost import seconds_per_second
 from dem.engine.lammps.engine import LammpsEngine
 from dem.engine.lammps.ranks import ranks
 from dem.engine.yade.stable_step import stable_time_step
 from dem.physics.contact import ContactLaw, contact_law
-
-# Processor seconds per sphere and step on one rank, N = 60, shaken; see results/lammps.
-COST_PER_SPHERE_STEP = 4.6e-7
-SHARES = {Doing.POUR: 0.5}
 
 ADDS = {
     EffectName.CONTACT: Adds(
@@ -60,8 +57,7 @@ class LammpsKind:
 
     def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
         """See the interface; on one rank."""
-        per_step = COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
-        return per_step / time_step * SHARES.get(doing, 1.0)
+        return seconds_per_second(scene, time_step, doing)
 
     def build(self, scene: Demand, time_step: float) -> LammpsEngine:
         """See the interface."""
