@@ -46,7 +46,7 @@ def test_large_piles_cost_more_each() -> None:
     for count in (300, 5000):
         data = {
             **scene_data("lammps", 1, count, "standard", *PHASES),
-            "recording": {"series_interval_s": 1.0, "frame_interval_s": 1.0, "checkpoint_interval_s": None},
+            "recording": {"series_interval_s": 0.2, "frame_interval_s": 0.2, "checkpoint_interval_s": None},
         }
         data["container"] = {"radius_m": 0.0234 * (count / 270) ** 0.5}
         made = plan(parse_scene(data, source="x"))
