@@ -19,7 +19,10 @@ from postprocess.export.export import export_run
 from postprocess.geometry.links import centres_of_mass
 
 PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")
-XVFB = [] if os.environ.get("DISPLAY") or os.environ.get("PVPYTHON") else ["xvfb-run", "--auto-servernum"]
+# A number of its own to begin with: two that look for a free display from 99 on at once take the same one.
+DISPLAY = str(100 + 10 * (os.getpid() % 400))
+WITHOUT = os.environ.get("DISPLAY") or os.environ.get("PVPYTHON")
+XVFB = [] if WITHOUT else ["xvfb-run", "--auto-servernum", "--server-num", DISPLAY]
 pytestmark = pytest.mark.skipif(
     PVPYTHON is None or (bool(XVFB) and shutil.which(XVFB[0]) is None),
     reason="no pvpython that can draw: apt-get install paraview python3-paraview xvfb, or set PVPYTHON",
