@@ -22,13 +22,12 @@ from studies.base.runs import Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.shaken import told_shaken
 from studies.base.study import Analysis, Study, Tables
 from studies.friction import compaction_figures
-from studies.friction.laws import LAWS, LOGARITHMIC, STRETCHED, fit, spread_out
-from studies.friction.measure import FRICTION, friction_run, history_of
+from studies.friction.laws import FIRST, INTERVALS, LAWS, LOGARITHMIC, STRETCHED, fit, spread_out
+from studies.friction.measure import FRICTION, friction_run, history_of, refuse_repeats, while_shaken
 
 TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 """When φ is told [s]; each a mean over the last fifth of that time."""
 
-FIRST, INTERVALS = 0.1, 40  # of a history that laws are fitted to: s, three periods of shaking; and number
 EARLY = 0.25
 """Share of the time that a law is fitted to, to see whether it tells the rest."""
 
@@ -48,8 +47,7 @@ class Compaction(Study[Question]):
 
     def refuse(self, found: Collected) -> None:
         """Other numbers of smarticles at one l/w, a point and seed twice."""
-        found.refuse_mixed_counts()
-        found.refuse_repeats("point", lambda run: f"l/w {run.manifest.aspect_ratio:g} friction {run.row[FRICTION]:g}")
+        refuse_repeats(found)
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs, φ in the course of time, and what each law makes of each run."""
@@ -156,14 +154,9 @@ def fitted(runs: Sequence[MeasuredRun]) -> pd.DataFrame:
     """One row per run and law: its parameters, what it leaves, and by how much its beginning misses its end."""
     rows = []
     for run in runs:
-        history = history_of(run)
-        shaken = (history.times > 0) & (history.times <= history.active)
-        times, values = history.times[shaken], history.values[shaken]
-        spread = spread_out(times, values, first=FIRST, count=INTERVALS)
-        early = spread_out(
-            times[times <= EARLY * times[-1]], values[times <= EARLY * times[-1]], first=FIRST, count=INTERVALS
-        )
-        last = times > 0.9 * times[-1]
+        times, values = while_shaken(run)
+        first, last = times <= EARLY * times[-1], times > 0.9 * times[-1]
+        spread, early = spread_out(times, values), spread_out(times[first], values[first])
         for law in LAWS:
             found = fit(law, *spread)
             missed = float(np.mean(fit(law, *early).at(times[last]))) - float(np.mean(values[last]))

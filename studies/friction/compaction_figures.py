@@ -12,9 +12,8 @@ from studies.base.figures import BAND, finished
 from studies.base.references import SHAKE_TIME
 from studies.base.runs import MeasuredRun
 from studies.friction.laws import LOGARITHMIC, STRETCHED, fit, spread_out
-from studies.friction.measure import FRICTION, history_of
+from studies.friction.measure import FRICTION, while_shaken
 
-FIRST, INTERVALS = 0.1, 40
 _LINES = {STRETCHED: "solid", LOGARITHMIC: (0, (4, 2))}
 _PHI, _TIME = r"packing fraction $\phi$ [-]", "time since shaking began [s]"
 
@@ -35,14 +34,7 @@ def draw(output: Path, *, runs: Sequence[MeasuredRun], footer: Sequence[str]) ->
         figure = figures.blank_figure(6.4, 2.9)
         left, right = figure.subplots(1, 2)
         for friction, colour in zip(frictions, (figures.BLUE, figures.ORANGE, figures.GREEN), strict=False):
-            piles = []
-            for run in runs:
-                if run.row[FRICTION] == friction:
-                    history = history_of(run)
-                    shaken = (history.times > 0) & (history.times <= history.active)
-                    piles.append(
-                        spread_out(history.times[shaken], history.values[shaken], first=FIRST, count=INTERVALS)
-                    )
+            piles = [spread_out(*while_shaken(run)) for run in runs if run.row[FRICTION] == friction]
             times, values = piles[0][0], np.stack([packing for _, packing in piles])
             mean = values.mean(axis=0)
             if len(values) > 1:

@@ -116,7 +116,11 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
     )
 
 
-def spread_out(times: Array, packing: Array, *, first: float, count: int) -> tuple[Array, Array]:
+FIRST, INTERVALS = 0.1, 40
+"""Of a history that laws are fitted to: where it begins, three periods of shaking [s], and in how many intervals."""
+
+
+def spread_out(times: Array, packing: Array, *, first: float = FIRST, count: int = INTERVALS) -> tuple[Array, Array]:
     """Means over intervals of time that are equally long on a logarithmic axis.
 
     Args:

@@ -13,7 +13,7 @@ from dem.record.manifest import RunManifest
 from postprocess.scene_file import read_scene
 from postprocess.statistics.columns import ASPECT
 from studies.base.figures import History
-from studies.base.runs import DEFINITION, MeasuredRun
+from studies.base.runs import DEFINITION, Collected, MeasuredRun
 from studies.base.shaken import measured_row, packing_history
 
 FRICTION = "friction [-]"
@@ -72,6 +72,23 @@ def history_of(run: MeasuredRun) -> History:
     """φ of a measured run since shaking began."""
     told = run.history
     return History(times=told[_TIME], values=told[_PHI], active=float(told[_SHAKEN][0]))
+
+
+def while_shaken(run: MeasuredRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times since shaking began [s] and φ [-] of a measured run, as long as it was shaken."""
+    history = history_of(run)
+    shaken = (history.times > 0) & (history.times <= history.active)
+    return history.times[shaken], history.values[shaken]
+
+
+def refuse_repeats(found: Collected) -> None:
+    """Refuses other numbers of smarticles at one l/w, and a point's runs with the same seed.
+
+    Raises:
+        InputError: There are such.
+    """
+    found.refuse_mixed_counts()
+    found.refuse_repeats("point", lambda run: f"l/w {run.manifest.aspect_ratio:g} friction {run.row[FRICTION]:g}")
 
 
 def _friction(run: RunManifest) -> float:

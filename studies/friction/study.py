@@ -24,7 +24,7 @@ from studies.base.shaken import WHEN, told_shaken
 from studies.base.study import Analysis, Study, Tables
 from studies.friction import figures
 from studies.friction.findings import answers, told_crossing
-from studies.friction.measure import FRICTION, TIMES, WINDOW, at_time, friction_run
+from studies.friction.measure import FRICTION, TIMES, WINDOW, at_time, friction_run, refuse_repeats
 from studies.friction.scatter import scatters
 from studies.friction.steel import AS_IT_COMES, CLEANED
 from studies.friction.tables import (
@@ -69,8 +69,7 @@ class Friction(Study[Question]):
 
     def refuse(self, found: Collected) -> None:
         """Other numbers of smarticles at one l/w, a point and seed twice."""
-        found.refuse_mixed_counts()
-        found.refuse_repeats("point", lambda run: f"l/w {run.manifest.aspect_ratio:g} friction {run.row[FRICTION]:g}")
+        refuse_repeats(found)
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs, means, the friction that each curve asks for, how near each friction comes, and growth."""
