@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
 
 _GOING_ON = ("running", "queued")
+_EVERY_S = 2.0
 _ENDED_EARLY = ("failed", "interrupted", "stopped")
 
 
@@ -35,17 +36,18 @@ run came, `checkpoint s` from where it would go on.""",
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
   smarticles status friction --watch               again and again, until nothing runs
+  smarticles status friction --watch --every 60
   smarticles status friction --json | jq .counts
 """,
     )
     status.add_argument("directory", type=Path, metavar="DIR", help="of a sweep, a study or a run")
     status.add_argument(
         "--watch",
-        nargs="?",
-        type=positive_number,
-        const=2.0,
-        metavar="S",
-        help="look again every S seconds (2) until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
+        action="store_true",
+        help="look again and again until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
+    )
+    status.add_argument(
+        "--every", type=positive_number, metavar="S", help="with --watch: seconds between looks; default: 2"
     )
     add_json(status)
 
@@ -88,15 +90,18 @@ def show_status(arguments: argparse.Namespace) -> int:
     """`smarticles status`."""
     directory: Path = arguments.directory
     if arguments.json:
-        if arguments.watch is not None:
+        if arguments.watch:
             msg = "--watch: is for a person; leave it out with --json"
             raise InputError(msg)
         print(json.dumps({"directory": str(directory), **_look(directory).to_dict()}, indent=2, ensure_ascii=False))
         return 0
-    if arguments.watch is None:
-        print(_look(directory).to_text())
-        return 0
-    return _watch(directory, arguments.watch)
+    if arguments.watch:
+        return _watch(directory, arguments.every or _EVERY_S)
+    if arguments.every is not None:
+        msg = f"--every {arguments.every:g}: is how often --watch looks; add --watch"
+        raise InputError(msg)
+    print(_look(directory).to_text())
+    return 0
 
 
 def _look(directory: Path) -> _Look:

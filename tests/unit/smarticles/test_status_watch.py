@@ -42,7 +42,7 @@ def test_it_ends_when_nothing_runs(
         lambda: (lock.__exit__(None, None, None), write_run(out / "runs" / "n6")),
     )
     monkeypatch.setattr(command, "time", clock)
-    said = smarticles("status", out, "--watch", "0.5")
+    said = smarticles("status", out, "--watch", "--every", "0.5")
     assert (said.status, said.err) == (0, "")
     assert clock.waits == [0.5] * 3
     # A look that shows nothing new is not told again.
@@ -67,5 +67,8 @@ def test_ctrl_c_is_its_way_to_end(
 
 def test_of_what_does_not_run_it_is_one_look(out: Path, smarticles: Smarticles) -> None:
     assert smarticles("status", out, "--watch").out == smarticles("status", out).out
+    assert smarticles("status", "--watch", out).out == smarticles("status", out).out
+    said = smarticles("status", out, "--every", "5")
+    assert (said.status, "add --watch" in said.err) == (2, True)
     said = smarticles("status", out, "--watch", "--json")
     assert (said.status, "leave it out with --json" in said.err) == (2, True)
