@@ -362,11 +362,12 @@ class Particle:
         direction n; the largest eigenvalue of that mobility over the spheres is the inverse of the result. It rules
         the stable time step: barb tips are several times lighter than the body.
         """
-        inverse = 1.0 / self.boxes.inertia
-        mobility = 0.0
-        for x, y, z in self.centres:
-            # A push on a sphere acts at its surface, but the normal passes through the centre.
-            cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-            tensor = np.eye(3) / self.boxes.mass + cross.T @ (inverse[:, None] * cross)
-            mobility = max(mobility, float(np.linalg.eigvalsh(tensor)[-1]))
+        inverse, (x, y, z) = 1.0 / self.boxes.inertia, self.centres.T
+        # A push on a sphere acts at its surface, but the normal passes through the centre.
+        cross = np.zeros((len(x), 3, 3))
+        cross[:, 0, 1], cross[:, 0, 2] = -z, y
+        cross[:, 1, 0], cross[:, 1, 2] = z, -x
+        cross[:, 2, 0], cross[:, 2, 1] = -y, x
+        tensors = np.eye(3) / self.boxes.mass + cross.transpose(0, 2, 1) @ (inverse[:, None] * cross)
+        mobility = float(np.linalg.eigvalsh(tensors)[:, -1].max())
         return 1.0 / mobility
