@@ -23,7 +23,9 @@ command of every run; a test holds this page against them. Errors are standard e
 *Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: by none,
 and the opposite was found by one at least. *Not resolved*: neither; what it would take is told by the scatter there is.
 *No data*: the runs are still to be made. *On YADE*: the same finding on the other engine, where it has runs of its own:
-no say in the verdict, but it shows where engines differ.
+no say in the verdict, but it shows where engines differ. *By a test of ours*: the paper's own test of strength is held
+fast by single smarticles that bridge its hooks; where it does not resolve a claim, the test that tears the pile decides
+the verdict ([strength](strength/), [strength-code](strength-code/)).
 """
 
 
@@ -55,7 +57,9 @@ def text(found: Sequence[Claim]) -> str:
 def _told(tested: Tested | None) -> str:
     if tested is None:
         return "–"
-    return "; ".join(filter(None, [f"{tested.verdict}: {tested.ours}", tested.needed]))
+    other = tested.instead
+    instead = "" if other is None else f"by a test of ours, {other.study}: {_told(other)}"
+    return "; ".join(filter(None, [f"{tested.verdict}: {tested.ours}", tested.needed, instead]))
 
 
 def _all(claim: Claim) -> tuple[Tested | None, ...]:
@@ -64,7 +68,7 @@ def _all(claim: Claim) -> tuple[Tested | None, ...]:
 
 
 def _rests(claim: Claim) -> str:
-    tested = [one for one in _all(claim) if one is not None]
+    tested = [one for by in _all(claim) if by is not None for one in (by, by.instead) if one is not None]
     told = [f"[{one.study}]({one.study}/): {one.basis}" for one in tested]
     return "; ".join(told) or "–"
 
@@ -83,6 +87,8 @@ def table(found: Sequence[Claim]) -> pd.DataFrame:
         for name, tested in zip(("text", "code", "text on YADE", "code on YADE"), _all(claim), strict=True):
             for key in ("study", "verdict", "ours", "criterion", "basis"):
                 row[f"by the {name}: {key}"] = "" if tested is None else getattr(tested, key)
+            if tested is not None and tested.instead is not None:
+                row[f"by the {name}: by a test of ours"] = _told(tested.instead)
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -52,6 +52,7 @@ class Tested:
         criterion: What its verdict asks for.
         basis: Smarticles, seeds and engine that it rests on.
         needed: What it would take, where the verdict is not resolved and that is told; else empty.
+        instead: What a test of ours says where the paper's own cannot tell; None where there is none.
     """
 
     study: str
@@ -60,6 +61,13 @@ class Tested:
     criterion: str
     basis: str
     needed: str = ""
+    instead: Tested | None = None
+
+    @property
+    def settled(self) -> Verdict:
+        """The verdict by the paper's own test, or that of ours where the paper's does not resolve it."""
+        unsettled = self.verdict in ("not resolved", "no data")
+        return self.instead.verdict if unsettled and self.instead is not None else self.verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +97,7 @@ class Claim:
     @property
     def verdict(self) -> Verdict:
         """Of both together: partly where one finds it and the other does not; not where one finds the opposite."""
-        tested = [one.verdict for one in (self.text, self.code) if one is not None]
+        tested = [one.settled for one in (self.text, self.code) if one is not None]
         told = {verdict for verdict in tested if verdict != "no data"}
         if not tested:
             return "not testable"
@@ -118,8 +126,8 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
                 number=len(found) + 1,
                 part=part,
                 says=entry["says"],
-                text=tables.tested(entry.get("text")),
-                code=tables.tested(entry.get("code")),
+                text=tables.tested(entry.get("text"), entry.get("text_instead")),
+                code=tables.tested(entry.get("code"), entry.get("code_instead")),
                 yade=tables.on_yade(entry.get("text")),
                 code_on_yade=tables.on_yade(entry.get("code")),
                 why=entry.get("untested") or entry.get("why", ""),
@@ -142,8 +150,8 @@ class _Tables:
         self._found: dict[str, dict[str, Sequence[str]]] = {}
         self._bases: dict[str, str] = {}
 
-    def tested(self, named: Sequence[str] | None) -> Tested | None:
-        """What a study says, named with its finding; None of none."""
+    def tested(self, named: Sequence[str] | None, instead: Sequence[str] | None = None) -> Tested | None:
+        """What a study says, named with its finding, and what another one does instead; None of none."""
         if named is None:
             return None
         study, finding = named
@@ -160,6 +168,7 @@ class _Tables:
             criterion=criterion,
             basis=self._bases[study],
             needed=needed[0] if needed else "",
+            instead=self.tested(instead),
         )
 
     def on_yade(self, named: Sequence[str] | None) -> Tested | None:

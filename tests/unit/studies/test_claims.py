@@ -23,8 +23,8 @@ def written(folder: Path, verdicts: dict[tuple[str, str], str]) -> Path:
     named = defaultdict(list)
     for part in yaml.safe_load(CLAIMS.read_text(encoding="utf-8")):
         for entry in part["claims"]:
-            for key in ("text", "code"):
-                if key in entry:
+            for key in ("text", "code", "text_instead", "code_instead"):
+                if key in entry and entry[key][1] not in named[entry[key][0]]:
                     named[entry[key][0]].append(entry[key][1])
     for study, findings in named.items():
         (folder / study).mkdir(parents=True)
@@ -76,6 +76,30 @@ def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: s
     claim = one_of(claims(results), "shape change entangles most")
     assert claim.verdict == verdict
     assert f"**{verdict}**" in text((claim,))
+
+
+STRONGEST = "Shape change has the highest peak force of the three procedures"
+
+
+@pytest.mark.parametrize(
+    ("by_theirs", "by_ours", "verdict"),
+    [
+        ("not resolved", "found", "reproduced"),
+        ("not resolved", "not found", "not"),
+        ("no data", "found", "reproduced"),
+        ("not resolved", "not resolved", "not resolved"),
+        ("not found", "found", "not"),
+    ],
+)
+def test_a_test_of_ours_decides_where_theirs_cannot_tell(
+    tmp_path: Path, by_theirs: str, by_ours: str, verdict: str
+) -> None:
+    theirs = {(study, f"{STRONGEST}, l/w = 0.7"): by_theirs for study in ("fracture", "fracture-code")}
+    ours = {(study, STRONGEST): by_ours for study in ("strength", "strength-code")}
+    claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
+    assert claim.verdict == verdict
+    assert "; by a test of ours, strength-code: " in text((claim,))
+    assert "[strength](strength/)" in text((claim,)).splitlines()[-1]
 
 
 def test_what_a_verdict_would_take_is_told(tmp_path: Path) -> None:
