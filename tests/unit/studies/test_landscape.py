@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -93,6 +94,13 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
 def test_energy_of_shaking_is_without_the_work_of_the_hook(tmp_path: Path) -> None:
     row = landscape_row(read_run(write(tmp_path, EXTERNAL, spent=3e-3)))
     assert row[ENERGY] == pytest.approx(3e-3 / 12, rel=1e-6)
+
+
+def test_what_motors_did_before_the_activity_is_not_spent_on_it(tmp_path: Path) -> None:
+    directory = write(tmp_path, INTERNAL, spent=6e-3)
+    with h5py.File(directory / "series.h5", "r+") as series:
+        series["motor_work_J"][:] += np.where(series["phase"][:] >= 1, 5e-4, 0.0)
+    assert landscape_row(read_run(directory))[ENERGY] == pytest.approx(6e-3 / 12, rel=1e-6)
 
 
 def test_a_poured_pile_has_spent_nothing(tmp_path: Path) -> None:
@@ -250,6 +258,22 @@ def test_runs_of_one_trajectory_are_one_block() -> None:
     assert runs.groupby(numbers)[[ASPECT, SEED]].nunique().max().max() == 1
 
 
+def test_a_trajectory_told_ten_times_tells_no_more() -> None:
+    def by_trajectory(t: pd.DataFrame, random: np.random.Generator) -> Any:
+        numbers = measure.trajectories(t)
+        for column in PREDICTORS:
+            t[column] = numbers.map(dict(enumerate(random.normal(size=len(t)))))
+        return t[CROSSINGS] + numbers.map(dict(enumerate(random.normal(size=len(t)))))
+
+    runs = table(by_trajectory)
+    once, _ = told(runs, WITHIN)
+    often, _ = told(pd.concat([runs] * 10, ignore_index=True), WITHIN)
+    blocks = 2 * len(RATIOS) * (1 + len(THETAS))
+    assert set(once[predictors.BLOCKS]) == set(often[predictors.BLOCKS]) == {blocks}
+    widths = [one.set_index(PREDICTOR)["to [-]"] - one.set_index(PREDICTOR)["from [-]"] for one in (once, often)]
+    assert widths[1].to_numpy() == pytest.approx(widths[0].to_numpy(), rel=0.1)
+
+
 # -- what it costs ----------------------------------------------------------------------------------------------------
 
 SPENT = {SHAPE: 50.0, EXTERNAL: 40.0}
@@ -305,6 +329,20 @@ def test_the_cheapest_procedure_is_told_where_it_surely_is() -> None:
     assert sure.evidence.index("internal θ = 10° for 0.5 s") < sure.evidence.index("shape-change for 3 s")
     assert "no sure gain: external" in sure.evidence
     assert asked(bought(scatter=0.6)).answer == "undetermined"
+
+
+def test_gain_per_energy_is_that_of_the_means() -> None:
+    # The mean of the ratios would be 0.6: a pair that spent little would count as much as one that spent much.
+    pairs = pd.DataFrame({cost.GAIN: [1.0, 1.0, 1.0], LIFTS: [1.0, 2.5, 2.5]})
+    assert cost.gain_per_energy(pairs, count=FEW).value == pytest.approx(0.5)
+
+
+def test_of_a_procedure_the_point_that_surely_gains_is_its_best() -> None:
+    row = {SCOPE: COMMON, PROCEDURE: INTERNAL, cost.HIGH: 1.0}
+    found = pd.DataFrame(
+        [{**row, PLANNED: 1.0, YIELD: 0.2, cost.LOW: 0.1}, {**row, PLANNED: 2.0, YIELD: 0.5, cost.LOW: -0.1}]
+    )
+    assert cost.best_points(found)[PLANNED].tolist() == [1.0]
 
 
 def test_only_aspect_ratios_that_have_everything_are_averaged_over() -> None:
