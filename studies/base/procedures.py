@@ -9,6 +9,8 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from dem.errors import InputError
+from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.points import mean_columns, ordered, seeds_of
@@ -36,6 +38,27 @@ NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
     }
 )
 """What tells a point from others, for a person to read; see `points.told_means`."""
+
+
+def prepared_by(run: RunManifest, *then: str) -> str:
+    """The procedure of a run: a pour, a rest, one activity with a rest of its own or none, and then some phases.
+
+    Args:
+        run: A run.
+        then: Types of the phases that follow.
+
+    Raises:
+        InputError: The phases are others.
+    """
+    types = [phase.type for phase in run.phases]
+    active = [kind for kind in types if kind in PROCEDURES]
+    if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
+        msg = (
+            f"{run.directory}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
+            f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
+        )
+        raise InputError(msg)
+    return PROCEDURES[active[0]] if active else STATIC
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frames import read_frames
-from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.manifest import RunManifest
 from dem.record.series import Series, read_series
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import (
@@ -33,7 +33,7 @@ from postprocess.measures.pull import (
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, PROCEDURES, STATIC, THETA
+from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, STATIC, THETA, prepared_by
 from studies.base.runs import DEFINITION, duration
 
 PEAK, PEAK_TIME, PEAK_RAISED = "peak force over n W_s [-]", "time of the peak [s]", "hook raised at the peak [m]"
@@ -71,24 +71,6 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 """What is averaged over seeds: columns of the table of runs."""
 
 
-def pull_phase(run: RunManifest) -> PhaseRecord:
-    """The pull of a run: its last phase, after a pour, a rest and at most one activity with a rest of its own.
-
-    Raises:
-        InputError: The phases are others.
-    """
-    types = [phase.type for phase in run.phases]
-    active = [kind for kind in types if kind in PROCEDURES]
-    prepared = ["deposit", "relax"] + ([active[0], "relax"] if active else [])
-    if types != [*prepared, PULL]:
-        msg = (
-            f"{run.directory}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
-            f"({', '.join(PROCEDURES)}) with a rest or none, and {PULL}"
-        )
-        raise InputError(msg)
-    return run.phases[-1]
-
-
 def fracture_row(run: RunManifest) -> dict[str, object]:
     """One run's row of the table of runs.
 
@@ -98,10 +80,8 @@ def fracture_row(run: RunManifest) -> dict[str, object]:
     Raises:
         InputError: It is not a pull after one activity or none, or cannot be read.
     """
-    pulled = pull_phase(run)
+    procedure, pulled = prepared_by(run, PULL), run.phases[-1]
     rest = pulled.index - 1
-    active = run.phases[2] if rest > 1 else None
-    procedure = STATIC if active is None else PROCEDURES[active.type]
     settings = read_phases(run.directory)
     asked = settings[pulled.index]
     if asked.type != PULL:
@@ -120,7 +100,7 @@ def fracture_row(run: RunManifest) -> dict[str, object]:
         SEED: run.seed,
         "smarticles [-]": run.count,
         "fidelity": run.fidelity,
-        ACTIVE: duration(active) if active else 0.0,
+        ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
         PHI: before[PHI],
         CROSSINGS: before["crossings mean [-]"],
         ABOVE: _above(run, series, rest) / run.count,
@@ -177,5 +157,5 @@ def force_history(run: RunManifest, *, net: bool = False) -> tuple[NDArray[np.fl
     Raises:
         InputError: There is no series of it.
     """
-    pull = read_pull(run, read_series(run.directory), pull_phase(run).index)
+    pull = read_pull(run, read_series(run.directory), run.phases[-1].index)
     return pull.times, (pull.net if net else pull).force / run.count / weight_of_one(run)

@@ -37,10 +37,10 @@ from studies.base.procedures import (
     INTERNAL,
     PHI,
     PROCEDURE,
-    PROCEDURES,
     SHAPE,
     STATIC,
     THETA,
+    prepared_by,
 )
 from studies.base.runs import DEFINITION, duration
 
@@ -125,7 +125,7 @@ def landscape_row(run: RunManifest) -> dict[str, object]:
     Raises:
         InputError: It is not a pull after one activity or none, or cannot be read.
     """
-    procedure = _prepared_by(run)
+    procedure = prepared_by(run, PULL)
     pulled = run.phases[-1]
     rest = pulled.index - 1
     settings = read_phases(run.directory)
@@ -165,19 +165,6 @@ def landscape_row(run: RunManifest) -> dict[str, object]:
         "scene_sha256": run.scene_sha256,
         "run": run.directory.name,
     }
-
-
-def _prepared_by(run: RunManifest) -> str:
-    """The procedure of a run: a pour, a rest, one activity with a rest of its own or none, and the pull."""
-    types = [phase.type for phase in run.phases]
-    active = [kind for kind in types if kind in PROCEDURES]
-    if types != ["deposit", "relax", *([active[0], "relax"] if active else []), PULL]:
-        msg = (
-            f"{run.directory}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
-            f"({', '.join(PROCEDURES)}) with a rest or none, and {PULL}"
-        )
-        raise InputError(msg)
-    return PROCEDURES[active[0]] if active else STATIC
 
 
 def _planned(run: RunManifest) -> float:

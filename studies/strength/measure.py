@@ -20,7 +20,7 @@ from postprocess.measures.pull import PULL, WINDOW, HookPull, held_at, held_fast
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import read_phases, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PROCEDURE, PROCEDURES, STATIC, THETA
+from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PROCEDURE, STATIC, THETA, prepared_by
 from studies.base.runs import DEFINITION, duration
 
 REMOVAL = "remove-container"
@@ -54,24 +54,6 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 """What is averaged over seeds: columns of the table of runs."""
 
 
-def prepared_by(run: RunManifest) -> str:
-    """The procedure of a run: a pour, a rest, one activity with a rest of its own or none, no wall, and the pull.
-
-    Raises:
-        InputError: The phases are others.
-    """
-    types = [phase.type for phase in run.phases]
-    active = [kind for kind in types if kind in PROCEDURES]
-    prepared = ["deposit", "relax"] + ([active[0], "relax"] if active else [])
-    if types != [*prepared, REMOVAL, PULL]:
-        msg = (
-            f"{run.directory}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
-            f"({', '.join(PROCEDURES)}) with a rest or none, {REMOVAL} and {PULL}"
-        )
-        raise InputError(msg)
-    return PROCEDURES[active[0]] if active else STATIC
-
-
 def strength_row(run: RunManifest) -> dict[str, object]:
     """One run's row of the table of runs.
 
@@ -81,7 +63,7 @@ def strength_row(run: RunManifest) -> dict[str, object]:
     Raises:
         InputError: It is not a pull without a wall after one activity or none, or cannot be read.
     """
-    procedure = prepared_by(run)
+    procedure = prepared_by(run, REMOVAL, PULL)
     pulled = run.phases[-1]
     rest, free = pulled.index - 2, pulled.index - 1
     settings = read_phases(run.directory)
