@@ -131,14 +131,15 @@ def _more(base: pd.DataFrame) -> Finding:
     parts, verdicts = [], []
     for name, quantity, sign in (("force", PEAK, 1), ("strain at fracture", FRACTURE, -1)):
         table = base.pivot_table(index=[CONFINEMENT, SEED], columns=COUNT, values=quantity).reindex(columns=COUNTS)
-        effect = mean_over_seeds((table[6] - table[2]).dropna().tolist())
+        effect = _by_trial((table[6] - table[2]).dropna().rename(quantity).reset_index(), quantity)
         parts.append(f"{name} {told(effect, 3)}")
         verdicts.append(judge(effect if sign > 0 else negative(effect)))
     return Finding(
         paper="As n increases, force increases but elongation decreases",
         ours=f"n = 6 less n = 2: {'; '.join(parts)}",
         verdict=all_of(verdicts),
-        criterion="peak force of n = 6 above, strain at fracture below that of n = 2, paired by h/H and seed",
+        criterion="peak force of n = 6 above, strain at fracture below that of n = 2, paired by h/H and seed, "
+        "means over h/H of each seed",
     )
 
 

@@ -113,6 +113,20 @@ def test_findings_are_judged_by_their_effects() -> None:
     assert verdicts(same)[4:6] == ["not found", "not found"]
 
 
+def test_walls_that_nothing_touches_make_no_more_trials_of_one() -> None:
+    # Three trials whose differences scatter as much as they are large, each told at sixteen h/H.
+    rng = np.random.default_rng(2)
+    once = runs(0.0)
+    once = once[(once[VARIANT] == "baseline") & (once[CONFINEMENT] == 0.52)]
+    once = once.assign(**{PEAK: 1 + once[COUNT] * 0.01 + 0.02 * rng.normal(size=len(once))})
+    often = pd.concat([once.assign(**{CONFINEMENT: ratio}) for ratio in np.linspace(0.52, 0.65, 16)], ignore_index=True)
+    *_, told_once = findings(once)
+    *_, told_often = findings(often)
+    assert told_once.ours == told_often.ours
+    assert "(n = 3)" in told_often.ours
+    assert told_once.verdict == told_often.verdict == "not resolved"
+
+
 def test_variants_are_compared_trial_by_trial() -> None:
     table = sensitivity(runs(1.0))
     change = table.set_index(["variant", "quantity"]).loc[("other", PEAK)]
