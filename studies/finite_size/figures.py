@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +55,7 @@ def _draw_scaling(path: Path, runs: pd.DataFrame, points: pd.DataFrame, footer: 
         return []
     figure = figures.blank_figure(_PAGE, 2.7)
     panels = figure.subplots(1, 3)
-    shown = (
+    shown: tuple[tuple[str, Callable[[str], str]], ...] = (
         (r"packing fraction $\phi$ [-]", phi),
         (r"$\phi$ of the inside, by voxels [-]", lambda stage: phi(stage, _VOXEL)),
         (CROSSINGS_LABEL, crossings),
@@ -69,8 +69,8 @@ def _draw_scaling(path: Path, runs: pd.DataFrame, points: pd.DataFrame, footer: 
         axes.set_ylabel(label)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     told = (
-        rf"l/w = {PAPER_ASPECT:g}; lines: fits of q_∞ + a N^(-1/3), bands: 95 % of them; 0 is a pile without end; dotted: the "
-        f"paper's {PAPER_COUNT} smarticles."
+        f"l/w = {PAPER_ASPECT:g}; lines: fits of q_∞ + a N^(-1/3), bands: 95 % of them; 0 is a pile without end; "
+        f"dotted: the paper's {PAPER_COUNT} smarticles."
     )
     return finished(figure, path, [told], footer, pooled=True)
 

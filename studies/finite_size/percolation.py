@@ -34,7 +34,7 @@ AT_THRESHOLD = -0.155
 LARGEST = 0.2
 """l/w up to which piles are taken as near the threshold."""
 
-_PLACES, _WIDTHS = 601, 40
+_PLACES, _WIDTHS = 401, 30
 
 
 def axes(stage: str) -> Mapping[str, str]:
@@ -136,8 +136,8 @@ def profiles_of(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]
     part = part[np.isfinite(part[column])]
     if part.empty:
         return {}
-    values = (part[name].to_numpy(dtype=np.float64) for name in (column, spans(stage)))
-    return profiles(*values, part[COUNT].to_numpy(dtype=np.int64))
+    x, spanned = (part[name].to_numpy(dtype=np.float64) for name in (column, spans(stage)))
+    return profiles(x, spanned, part[COUNT].to_numpy(dtype=np.int64))
 
 
 def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
@@ -166,8 +166,8 @@ def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
 def growth(runs: pd.DataFrame, stage: str, aspect: float) -> Slope:
     """Power of N with which the largest cluster's share falls or rises at one l/w."""
     part = runs[runs[ASPECT] == aspect]
-    logs = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
-    return slope_within(*logs, [0] * len(part))
+    size, cluster = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
+    return slope_within(size, cluster, [0] * len(part))
 
 
 def growths(runs: pd.DataFrame) -> pd.DataFrame:

@@ -101,17 +101,21 @@ class Scaling:
 
     def at(self, count: float) -> float:
         """The quantity of so many smarticles."""
-        return self.bulk + self.slope * float(count) ** -POWER
+        return self.bulk + self.slope * _inverse_root(count)
 
     def bias(self, count: float) -> Slope:
         """The quantity of so many smarticles less that of a pile without end."""
-        share = float(count) ** -POWER
+        share = _inverse_root(count)
         half = self.error(0, share)
         return Slope(value=self.slope * share, standard_error=half / self._quantile, half_width=half, count=self.runs)
 
     @property
     def _quantile(self) -> float:
         return float(stdtrit(max(self.scatter.freedom, 1), (1 + CONFIDENCE) / 2))
+
+
+def _inverse_root(count: float) -> float:
+    return math.exp(-POWER * math.log(count))
 
 
 def scatter_of(counts: Floats, values: Floats) -> Scatter:

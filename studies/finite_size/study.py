@@ -137,6 +137,7 @@ class FiniteSize(Study[Question]):
             ]
             for _, row in tables["laws"].iterrows()
         ]
+        header, rows = self.table(analysis)
         return [
             "# Finite size: 100 to 10 000 smarticles",
             "",
@@ -149,7 +150,7 @@ class FiniteSize(Study[Question]):
             "",
             "Means over seeds ± 95 %; how many of the piles are spanned.",
             "",
-            *table_lines(*self.table(analysis)),
+            *table_lines(header, rows),
             "",
             "## Laws",
             "",
@@ -176,7 +177,7 @@ class FiniteSize(Study[Question]):
         tables = analysis.tables
         return figures.draw(output, runs=tables["runs"], points=tables["points"], footer=footer)
 
-    def table(self, analysis: Analysis[Question]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
+    def table(self, analysis: Analysis[Question]) -> tuple[list[str], list[list[str]]]:
         """Every point."""
         header = ["l/w", "N", "seeds", *(name for name, _ in _SHOWN.values()), *_SPANS.values()]
         rows = []
