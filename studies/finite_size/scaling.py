@@ -94,8 +94,6 @@ class Scaling:
 
     def error(self, bulk: float, slope: float) -> float:
         """Half-width of the 95 % interval of bulk · q_∞ + slope · a; NaN without scatter."""
-        if not self.scatter.freedom:
-            return math.nan
         share = np.array([bulk, slope])
         return self._quantile * math.sqrt(float(share @ self.covariance @ share))
 

@@ -20,6 +20,7 @@ from dem.errors import InputError
 from dem.phases.deposit import Deposit
 from dem.phases.shake import Shake
 from dem.record.manifest import read_run
+from postprocess.measures.table import summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.questions import Question
 from studies.finite_size import measure, percolation, scaling
@@ -92,9 +93,12 @@ def test_another_law_is_refused(power: float) -> None:
     assert law.excess > 3
     assert not law.powers[1] < 1 / 3 < law.powers[2]
     assert law.powers[1] <= power <= law.powers[2]
-    # What is refused is told with larger errors.
-    plain = math.sqrt(law.covariance[0, 0] / law.excess)
-    assert law.error(1, 0) > 2 * plain
+    # What is refused is told with larger errors than the same scatter about the law itself has.
+    values = piles(0.15, -0.12 * 5 ** (3 * power - 1), power=power)
+    means = pd.Series(values).groupby(COUNTS).transform("mean").to_numpy()
+    along = scaling.scaling(COUNTS, values - means + 0.15 - 0.12 * COUNTS ** (-1 / 3))
+    assert law.scatter.variance == pytest.approx(along.scatter.variance)
+    assert law.error(1, 0) == pytest.approx(math.sqrt(law.excess) * along.error(1, 0))
 
 
 def test_scatter_knows_nothing_of_the_law() -> None:
@@ -288,6 +292,19 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     assert (row[COUNT], row[ASPECT], row["escaped at the end [-]"]) == (12, 0.7, 0)
     assert row[spans(AFTER)] == min(float(str(row[spans(AFTER, what)])) for what in ("height", "width"))
     assert 1 / 12 <= float(str(row[share(AFTER)])) <= 1
+
+
+def test_measures_are_those_of_the_table_of_all_measures(tmp_path: Path) -> None:
+    directory = write(tmp_path, count=60)
+    row: dict[str, Any] = size_row(read_run(directory))
+    every = summarise_run(directory, last=1, definitions=["voxel"], phases={1, 3}).set_index("phase")
+    for stage, phase in ((BEFORE, 1), (AFTER, 3)):
+        there = every.loc[phase]
+        assert row[crossings(stage)] == there["crossings mean [-]"] > 0
+        assert row[share(stage)] == there["crossing graph largest share [-]"] > 1 / 60
+        assert row[spans(stage, "height")] == there["crossing graph spans height [-]"]
+        assert row[spans(stage, "width")] == there["crossing graph spans width [-]"]
+        assert row[phi(stage, "voxel")] == there["phi voxel [-]"]
 
 
 def test_runs_of_other_studies_are_none_of_this_one(tmp_path: Path) -> None:
