@@ -7,8 +7,8 @@
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
 # A test is one thread: threads that find no free core spin, and bits depend on their number.
-# As many processes as cores, a file of tests in one of them, those that run YADE first: they take longest.
-PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 25
+# One process more than cores, since some tests wait (Slurm, browsers); a file of tests in one of them, those that run YADE first: they take longest.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc) + 1) --dist loadfile --no-loadscope-reorder --durations 25
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -27,7 +27,7 @@ demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 mi
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-PAPER := procedures procedures-code procedures-code-yade factors melting melting-code casting casting-code fracture fracture-code strength strength-code collapse chain chain-bodies friction compaction
+PAPER := procedures procedures-code procedures-code-yade factors melting melting-code casting casting-code fracture fracture-code strength strength-code collapse chain chain-bodies friction compaction landscape finite-size
 
 paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (days; goes on where it was stopped)
 	for study in $(PAPER); do $(BIN)/smarticles study $$study --out out/paper/$$study || exit 1; done
