@@ -41,6 +41,7 @@ CELLS = [
     ("melting-code", "static_lw0.70_links_seed1"),
     ("casting", "static_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1"),
+    ("strength-code", "static_h13_lw0.70_links_seed1"),
     ("chain", "baseline_n2_hH0.520_seed1"),
 ]
 OTHERS = [
@@ -50,6 +51,7 @@ OTHERS = [
     ("engines", "internal_links_seed7", "shape-change_links_seed5"),
     ("melting-code", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
+    ("strength-code", "static_h13_lw0.70_links_seed1", "shape-change_h13_lw0.70_links_seed2"),
     ("chain", "baseline_n2_hH0.520_seed1", "friction-0.4_n2_hH0.750_seed1"),
 ]
 
