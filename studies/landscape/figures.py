@@ -293,4 +293,5 @@ def _draw_costs(path: Path, cost: pd.DataFrame, footer: Sequence[str]) -> list[P
     axes.set_xlabel(r"energy per smarticle over $W_\mathrm{s} w$ [-]")
     axes.set_ylabel(r"strength gained, over $n W_\mathrm{s}$ [-]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-    return finished(figure, path, ["Means over seeds and over the l/w at which everything was run."], footer)
+    told = "Means over pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."
+    return finished(figure, path, [told], footer)
