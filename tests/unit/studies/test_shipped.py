@@ -6,6 +6,8 @@ import csv
 import subprocess
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -23,13 +25,27 @@ from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.base.shipped import differences
 from studies.registry import STUDIES, study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep_file import load_sweep, on_engine
+from templates.sweep.sweep_file import Sweep, load_sweep, on_engine
 
 FOLDER = Path(studies.__file__).parent
 
 
+@cache
+def points_of(name: str, *, quick: bool = False) -> list[Point]:
+    """Of a study, expanded once for all tests of this file."""
+    return expand(load_sweep(study_file(name, quick=quick)))
+
+
+def of_one_seed(sweep: Sweep) -> Sweep:
+    """The same with the first of its seeds alone, and nothing again: what is so of one is so of all."""
+    repeats = sweep.content.repeats
+    assert repeats is not None
+    first = repeats.model_copy(update={"seeds": repeats.seeds[:1]})
+    return replace(sweep, content=sweep.content.model_copy(update={"repeats": first, "again": None}))
+
+
 def points(*, quick: bool) -> list[Point]:
-    return expand(load_sweep(study_file("gravish", quick=quick)))
+    return points_of("gravish", quick=quick)
 
 
 def test_the_full_study_is_the_papers() -> None:
@@ -60,7 +76,7 @@ AGAIN = {"gravish": 9, "procedures": 6, "fracture": 8, "strength": 8, "melting":
 
 @pytest.mark.parametrize("name", sorted(AGAIN))
 def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
-    found = expand(load_sweep(study_file(name)))
+    found = points_of(name)
     again = [point for point in found if point.again]
     assert again == found[-len(again) :]
     assert len(again) == AGAIN[name]
@@ -79,13 +95,13 @@ def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
 def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
     sweep = load_sweep(study_file(name))
     assert isinstance(sweep.content.constants["engine"], str)
-    found = expand(on_engine(sweep, engine))
+    found = expand(on_engine(of_one_seed(sweep), engine))
     assert {point.scene.engine for point in found} == {engine}
     assert not any(point.again for point in found)
 
 
 def test_chains_with_bodies_differ_from_those_without_in_the_bodies_and_the_walls_alone() -> None:
-    bodies, plain = (expand(load_sweep(study_file(name))) for name in ("chain-bodies", "chain"))
+    bodies, plain = (points_of(name) for name in ("chain-bodies", "chain"))
     assert {point.scene.smarticle.middle_thickness_in_plane_m for point in bodies} == {0.021}
     twins = {(p.values["variant"], p.values["count"], p.scene.seed): p.scene for p in plain}
     for point in bodies:
@@ -106,7 +122,7 @@ def test_chains_with_bodies_have_one_engine() -> None:
 @pytest.mark.parametrize("name", CODES)
 def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str, quick: bool) -> None:
     """Point by point, in the same order: what else differs in the scene is what the protocol says."""
-    text, code = (expand(load_sweep(study_file(one, quick=quick))) for one in (name, f"{name}-code"))
+    text, code = (points_of(one, quick=quick) for one in (name, f"{name}-code"))
     assert len(text) == len(code) > 0
     for one, other in zip(text, code, strict=True):
         assert one.name == other.name
@@ -126,7 +142,7 @@ def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str, qui
 
 def test_the_study_of_engines_pairs_every_run() -> None:
     for quick in (False, True):
-        found = expand(load_sweep(study_file("engines", quick=quick)))
+        found = points_of("engines", quick=quick)
         assert len(found) == (20 if quick else 120)
         for point in found:
             assert point.scene.name == f"{point.values['case']}/{point.values['variant']}"
@@ -192,7 +208,7 @@ def test_a_study_without_a_quick_variant_says_so() -> None:
     ],
 )
 def test_variants_differ_from_the_draft_in_their_choice_alone(study: str, choices: dict[str, int]) -> None:
-    found = expand(load_sweep(study_file(study)))
+    found = points_of(study)
     assert found[0].name == "draft_seed1"
     # The file writes the draft out: the two must stay the same.
     assert found[0].scene.fidelity == Fidelity(base="draft", **FIDELITIES["draft"])
@@ -218,7 +234,7 @@ RATIOS, RATIOS_OF_AMPLITUDES = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1), (0.4, 0
 
 
 def procedures(*, quick: bool) -> list[Point]:
-    return expand(load_sweep(study_file("procedures", quick=quick)))
+    return points_of("procedures", quick=quick)
 
 
 def test_the_procedures_are_those_of_the_paper() -> None:
@@ -291,11 +307,11 @@ def test_the_quick_procedures_say_how_they_differ() -> None:
 
 
 def test_the_code_and_the_factors_go_by_the_same_points() -> None:
-    by_text, by_code = procedures(quick=False), expand(load_sweep(study_file("procedures-code")))
+    by_text, by_code = procedures(quick=False), points_of("procedures-code")
     assert [point.name for point in by_code] == [point.name for point in by_text]
     assert {point.scene.protocol for point in by_code} == {"code"}
     assert {point.scene.motor.law for point in by_code} == {"ease"}
-    factors = expand(load_sweep(study_file("factors")))
+    factors = points_of("factors")
     rules = {(p.scene.motor.law, p.scene.contact.friction_wall, p.scene.container.radius_m) for p in factors}
     assert rules == set(product(("halt", "ease"), (0.4, 0.2), (0.0234, 0.0224)))
     assert len(factors) == len(rules) * 2 * 8
@@ -311,7 +327,7 @@ def test_every_sweep_file_is_that_of_a_study_in_the_registry() -> None:
 def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
     shipped = STUDIES[name]
     assert shipped.load(quick=True).name == name
-    variables = expand(load_sweep(shipped.sweep_file()))[0].values
+    variables = expand(of_one_seed(load_sweep(shipped.sweep_file())))[0].values
     assert set(shipped.pictured) <= set(variables)
 
 
