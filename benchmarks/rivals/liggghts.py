@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -160,12 +161,18 @@ def _smarticle(told: PassiveScene, k: int, centre: Array, turn: Array, density: 
 
 
 def _primes(first: int) -> Sequence[int]:
-    """Three primes above 10 000, as LIGGGHTS asks seeds to be, others for each number."""
+    """Three of the primes that seeds are, others for each number."""
+    return _seeds()[first : first + 3]
+
+
+@cache
+def _seeds() -> Sequence[int]:
+    """Primes above 10 000, as LIGGGHTS asks seeds to be."""
     sieve = np.ones(200_000, dtype=bool)
     for k in range(2, 448):
         sieve[k * k :: k] = False
     found = np.flatnonzero(sieve)
-    return [int(prime) for prime in found[found > 10_000][first : first + 3]]
+    return [int(prime) for prime in found[found > 10_000]]
 
 
 def _numbers(values: Sequence[float] | Array) -> str:

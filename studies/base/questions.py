@@ -8,6 +8,8 @@ from typing import Literal
 
 import pandas as pd
 
+from postprocess.report.markdown import table_lines
+
 YesNo = Literal["yes", "no", "undetermined"]
 
 
@@ -29,6 +31,12 @@ class Question:
     def told(self) -> str:
         """Question, answer and evidence for the terminal."""
         return f"{self.question} {self.answer.upper()}\n    {self.evidence}"
+
+
+def questions_lines(judged: Sequence[Question]) -> Sequence[str]:
+    """A table of Markdown, one row per question."""
+    rows = [(one.question, f"**{one.answer}**", one.evidence) for one in judged]
+    return table_lines(["question", "answer", "evidence"], rows)
 
 
 def questions_table(judged: Sequence[Question]) -> pd.DataFrame:

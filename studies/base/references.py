@@ -63,6 +63,11 @@ SAVOIE = Reference(
 )
 
 
+NOTHING = Reference(
+    statement="none; nobody has published these numbers", facts=MappingProxyType({"what": "our own runs alone"})
+)
+"""Of a study that there is nothing to compare with."""
+
 _SYMBOLS: Mapping[str, str] = MappingProxyType({"phi_0": "φ_0", "phi_f": "φ_f"})
 
 

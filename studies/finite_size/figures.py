@@ -1,4 +1,4 @@
-"""The figures of the study `finite-size`: φ and ⟨N⟩ against N^(-1/3), and the entanglement graph against l/w."""
+"""The figures of the study `finite-size`: φ and ⟨N⟩ against N^(-1/3), the entanglement graph against l/w and ⟨N⟩."""
 
 from __future__ import annotations
 
@@ -95,8 +95,8 @@ def _draw_law(axes: Axes, runs: pd.DataFrame, here: pd.DataFrame, column: str, s
 
 
 def _draw_percolation(path: Path, runs: pd.DataFrame, points: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
-    """Share of the piles that are spanned and of smarticles in the largest cluster, against l/w, each size a line."""
-    rows = near(points)
+    """Share of the piles that are spanned against l/w, and of smarticles in the largest cluster against ⟨N⟩."""
+    rows, each = near(points), near(runs)
     if rows.empty:
         return []
     figure = figures.blank_figure(_PAGE, 4.6)
@@ -108,7 +108,7 @@ def _draw_percolation(path: Path, runs: pd.DataFrame, points: pd.DataFrame, foot
             part = rows[rows[COUNT] == size].sort_values(ASPECT)
             look = {**marker(mark, colour, colour), "linewidth": 0.9}
             draw_means(upper, part[ASPECT], part[spans(stage)], None, look=look, label=f"N = {size}")
-            single = near(runs)[near(runs)[COUNT] == size]
+            single = each[each[COUNT] == size]
             lower.plot(
                 single[crossings(stage)], single[share(stage)], mark, color=colour, markersize=3, label=f"N = {size}"
             )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
 from postprocess.statistics.columns import ASPECT
-from postprocess.statistics.findings import judge
+from postprocess.statistics.findings import judge, negative
 from postprocess.statistics.seeds import CONFIDENCE, Slope, slope_within
 from studies.finite_size.measure import COUNT, STAGES, crossings, share, spans
 
@@ -183,7 +183,7 @@ def growths(runs: pd.DataFrame) -> pd.DataFrame:
                     RUNS: slope.count,
                     POWER: slope.value,
                     POWER_BAR: slope.half_width,
-                    VERDICT: str(judge(Slope(**{**vars(slope), "value": -slope.value}))),
+                    VERDICT: str(judge(negative(slope))),
                 }
             )
     return pd.DataFrame(rows)

@@ -147,7 +147,6 @@ def scaling(counts: Floats, values: Floats) -> Scaling:
     """
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
-    inverse = _inverse(counts, scatter, POWER)
     sizes = len(np.unique(counts))
     excess = refused = math.nan
     powers = (math.nan, math.nan, math.nan)
@@ -159,7 +158,7 @@ def scaling(counts: Floats, values: Floats) -> Scaling:
     return Scaling(
         bulk=bulk,
         slope=slope,
-        covariance=inverse * scatter.variance * larger,
+        covariance=_inverse(counts, scatter) * scatter.variance * larger,
         scatter=scatter,
         excess=excess,
         refused=refused,
@@ -181,8 +180,9 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
     return float(found[0]), float(found[1]), float(weights @ (means - matrix @ found) ** 2)
 
 
-def _inverse(counts: Floats, scatter: Scatter, power: float) -> Floats:
-    matrix = np.stack([np.ones(len(counts)), counts**-power], axis=1)
+def _inverse(counts: Floats, scatter: Scatter) -> Floats:
+    """(2, 2) of the law's normal equations."""
+    matrix = np.stack([np.ones(len(counts)), counts**-POWER], axis=1)
     inverse = np.linalg.inv(matrix.T @ (matrix * scatter.weights(counts)[:, None]))
     return np.asarray(inverse, dtype=np.float64)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 import pandas as pd
 
@@ -17,8 +16,8 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
-from studies.base.questions import Question, questions_table
-from studies.base.references import Reference
+from studies.base.questions import Question, questions_lines, questions_table
+from studies.base.references import NOTHING, Reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.study import Analysis, Study, Tables
 from studies.finite_size import figures
@@ -38,10 +37,6 @@ from studies.finite_size.scaling import (
     SLOPE,
     SLOPE_BAR,
     scalings,
-)
-
-NOTHING = Reference(
-    statement="none; nobody has published these numbers", facts=MappingProxyType({"what": "our own runs alone"})
 )
 
 _SHOWN = {
@@ -141,10 +136,7 @@ class FiniteSize(Study[Question]):
         return [
             "# Finite size: 100 to 10 000 smarticles",
             "",
-            *table_lines(
-                ["question", "answer", "evidence"],
-                [(one.question, f"**{one.answer}**", one.evidence) for one in analysis.judged],
-            ),
+            *questions_lines(analysis.judged),
             "",
             "## Points",
             "",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 import pandas as pd
 
@@ -19,8 +18,8 @@ from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
 from studies.base.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
-from studies.base.questions import Question, questions_table
-from studies.base.references import Reference
+from studies.base.questions import Question, questions_lines, questions_table
+from studies.base.references import NOTHING, Reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.study import Analysis, Study, Tables
 from studies.landscape import figures
@@ -59,10 +58,6 @@ from studies.landscape.predictors import (
     SWUNG,
     WITHIN,
     predicted,
-)
-
-NOTHING = Reference(
-    statement="none; nobody has published these numbers", facts=MappingProxyType({"what": "our own runs alone"})
 )
 
 _SHOWN = {PHI: ("φ", ".4f"), CROSSINGS: ("⟨N⟩", ".2f"), LINKING: ("linking", ".3f"), ABOVE: ("above the hook", ".2f")}
@@ -144,10 +139,7 @@ class Landscape(Study[Question]):
         lines = [
             "# Packing, entanglement, linking and strength over l/w, θ and the energy spent",
             "",
-            *table_lines(
-                ["question", "answer", "evidence"],
-                [(one.question, f"**{one.answer}**", one.evidence) for one in analysis.judged],
-            ),
+            *questions_lines(analysis.judged),
             "",
             "Strength is the peak force of a hook that is lifted out of the pile, over the weight of all smarticles:",
             "the largest share of its own weight that a pile bears hanging, with what friction at the wall adds. A",

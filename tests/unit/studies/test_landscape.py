@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import of_one_seed
 from synthetic import SyntheticRun
 from synthetic.hooked import UPPER, weight, write_hooked_run
 from synthetic.shapes import W
@@ -362,8 +362,7 @@ def shipped() -> list[Point]:
     repeats = sweep.content.repeats
     assert repeats is not None
     assert list(repeats.seeds) == [1, 2, 3]
-    first = repeats.model_copy(update={"seeds": (1,)})
-    return expand(replace(sweep, content=sweep.content.model_copy(update={"repeats": first})))
+    return expand(of_one_seed(sweep))
 
 
 def test_over_two_hundred_points_of_the_papers_counts(shipped: list[Point]) -> None:

@@ -6,13 +6,13 @@ import csv
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sweeps import of_one_seed
 
 import studies
 from dem.errors import InputError
@@ -25,7 +25,7 @@ from dem.setting.fidelity import FIDELITIES, Fidelity
 from studies.base.shipped import differences
 from studies.registry import STUDIES, study_file
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep_file import Sweep, load_sweep, on_engine
+from templates.sweep.sweep_file import load_sweep, on_engine
 
 FOLDER = Path(studies.__file__).parent
 
@@ -34,14 +34,6 @@ FOLDER = Path(studies.__file__).parent
 def points_of(name: str, *, quick: bool = False) -> list[Point]:
     """Of a study, expanded once for all tests of this file."""
     return expand(load_sweep(study_file(name, quick=quick)))
-
-
-def of_one_seed(sweep: Sweep) -> Sweep:
-    """The same with the first of its seeds alone, and nothing again: what is so of one is so of all."""
-    repeats = sweep.content.repeats
-    assert repeats is not None
-    first = repeats.model_copy(update={"seeds": repeats.seeds[:1]})
-    return replace(sweep, content=sweep.content.model_copy(update={"repeats": first, "again": None}))
 
 
 def points(*, quick: bool) -> list[Point]:
