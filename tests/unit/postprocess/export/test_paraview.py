@@ -19,12 +19,9 @@ from postprocess.export.export import export_run
 from postprocess.geometry.links import centres_of_mass
 
 PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")
-# A number of its own to begin with: two that look for a free display from 99 on at once take the same one.
-DISPLAY = str(100 + 10 * (os.getpid() % 400))
-WITHOUT = os.environ.get("DISPLAY") or os.environ.get("PVPYTHON")
-XVFB = [] if WITHOUT else ["xvfb-run", "--auto-servernum", "--server-num", DISPLAY]
+DRAWS = bool(os.environ.get("DISPLAY") or os.environ.get("PVPYTHON"))
 pytestmark = pytest.mark.skipif(
-    PVPYTHON is None or (bool(XVFB) and shutil.which(XVFB[0]) is None),
+    PVPYTHON is None or not (DRAWS or shutil.which("Xvfb")),
     reason="no pvpython that can draw: apt-get install paraview python3-paraview xvfb, or set PVPYTHON",
 )
 
@@ -60,12 +57,40 @@ json.dump(told, open(answer, "w"))
 """
 
 
-def shown(folder, tmp_path, *words):
+@pytest.fixture(scope="module")
+def pvpython():
+    """Runs pvpython on a display; one server for all tests.
+
+    A server that `xvfb-run` begins for each test on the number that the last one is just giving up loses its
+    socket to it.
+    """
+    if DRAWS:
+        yield on_display(None)
+        return
+    reading, writing = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"]
+    with subprocess.Popen(command, pass_fds=[writing], stderr=subprocess.DEVNULL) as server, os.fdopen(reading) as told:
+        os.close(writing)
+        # The server picks a free number, and tells it once it listens.
+        yield on_display(":" + told.readline().strip())
+        server.terminate()
+
+
+def on_display(name):
+    environment = os.environ if name is None else {**os.environ, "DISPLAY": name}
+
+    def run(*words):
+        command = [PVPYTHON, *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+
+    return run
+
+
+def shown(pvpython, folder, tmp_path, *words):
     """What ParaView tells of an exported folder once the script has run."""
     (tmp_path / "ask.py").write_text(ASK)
     answer = tmp_path / "answer.json"
-    command = [*XVFB, PVPYTHON, tmp_path / "ask.py", folder / "show_in_paraview.py", folder, answer, *words]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, check=False)
+    done = pvpython(tmp_path / "ask.py", folder / "show_in_paraview.py", folder, answer, *words)
     assert done.returncode == 0, done.stderr + done.stdout
     return json.loads(answer.read_text())
 
@@ -74,11 +99,11 @@ def pixels(path):
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
-def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path):
+def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path, pvpython):
     run = write_run(tmp_path / "run", SyntheticRun(count=40, frames_per_phase=1, packing=(0.05, 0.06, 0.1, 0.1)))
     folder = export_run(run, to="vtp", every_frame=True, wanted=["crossings"], unwanted=["local_packing_fraction"])
     film = tmp_path / "film"
-    told = shown(folder, tmp_path, "--film", film)
+    told = shown(pvpython, folder, tmp_path, "--film", film)
     assert told["coloured"] == ["CELLS", "crossings"]
     assert told["times"] == pytest.approx(read_frames(run).times.tolist())
     # The half towards the camera, at negative y, is cut away.
@@ -91,7 +116,7 @@ def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path):
     assert all((one != other).any() for one, other in itertools.pairwise(pictures))
 
 
-def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tmp_path):
+def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tmp_path, pvpython):
     made = SyntheticRun(count=12, frames_per_phase=1, phases=("relax", "remove-container"), packing=(0.05, 0.05))
     run = write_run(tmp_path / "run", made)
     (run / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in made.phases]}))
@@ -103,7 +128,7 @@ def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tm
     folder = export_run(
         run, to="vtp", every_frame=True, wanted=["forces", "crossings"], unwanted=["local_packing_fraction"]
     )
-    told = shown(folder, tmp_path, "--film", tmp_path / "film")
+    told = shown(pvpython, folder, tmp_path, "--film", tmp_path / "film")
     assert [count > 0 for count in told["points"]["wall, cut open"]] == [True, False]
     assert [count > 0 for count in told["points"]["forces"]] == [False, True]
     # The lines themselves, not a shape about them whose size could be wrong.
@@ -118,22 +143,21 @@ def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tm
     assert red[1] - red[0] > 100
 
 
-def test_a_chain_in_a_plane(tmp_path):
+def test_a_chain_in_a_plane(tmp_path, pvpython):
     made = SyntheticRun(count=2, frames_per_phase=1)
     write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width=0.08)
     folder = export_run(tmp_path / "run", to="vtp")
-    told = shown(folder, tmp_path, "--picture", tmp_path / "plane.png")
+    told = shown(pvpython, folder, tmp_path, "--picture", tmp_path / "plane.png")
     assert told["coloured"] == ["CELLS", "smarticle_id"]
     assert told["shown"] == ["smarticles", "time", "wall"]
     assert (np.ptp(pixels(tmp_path / "plane.png"), axis=2) > 40).sum() > 500
 
 
-def test_a_folder_without_an_export_is_one_line(tmp_path):
+def test_a_folder_without_an_export_is_one_line(tmp_path, pvpython):
     run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1))
     script = export_run(run, to="vtp") / "show_in_paraview.py"
     alone = shutil.copy(script, tmp_path)
     (tmp_path / "elsewhere").mkdir()
-    command = [*XVFB, PVPYTHON, str(alone), str(tmp_path / "elsewhere")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+    done = pvpython(alone, tmp_path / "elsewhere")
     assert done.returncode != 0
     assert "give the folder that `smarticles export --to vtp` wrote" in done.stderr + done.stdout
