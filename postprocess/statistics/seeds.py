@@ -11,7 +11,8 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+from numpy.typing import NDArray
+from scipy.special import fdtrc, stdtrit
 
 CONFIDENCE = 0.95
 
@@ -207,6 +208,79 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
     rest = up - value * across
     error = math.sqrt(float(rest @ rest) / freedom / spread)
     return Slope(value=value, standard_error=error, half_width=_quantile(freedom) * error, count=count)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parabola:
+    """A parabola through points.
+
+    Attributes:
+        slope: At the place that was asked for; NaN where x has fewer than three values.
+        bend: Half the second derivative, the same everywhere; below 0 where the parabola has a maximum.
+        top: Where its slope is 0; NaN without a bend.
+        fits: Probability of means at equal x that are off it by as much or more, if it were the truth (F test of the
+            lack of fit); NaN where x has no more than three values, or no value twice.
+    """
+
+    slope: Slope
+    bend: Slope
+    top: float
+    fits: float
+
+
+def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
+    """Least-squares parabola through points, told by its slope at one place and by its bend.
+
+    On which side of a place a flat top lies is told by the slope there, whose error does not grow without bound as
+    that of the top itself does when the bend is small.
+
+    Args:
+        x: One per point.
+        y: One per point; points with NaN are left out.
+        at: Where the slope is wanted, in the unit of x.
+
+    Returns:
+        Slope and bend with the scatter of the points about the parabola as their error, n − 3 degrees of freedom,
+        and whether it describes them.
+
+    Example:
+        >>> parabola([0, 1, 2, 3], [0, 3, 4, 3], at=1.0).slope.value
+        2.0
+    """
+    across, up = np.asarray(x, dtype=np.float64) - at, np.asarray(y, dtype=np.float64)
+    known = np.isfinite(across) & np.isfinite(up)
+    across, up = across[known], up[known]
+    count, freedom = len(up), len(up) - 3
+    if len(set(across.tolist())) < 3:
+        none = Slope(value=math.nan, standard_error=math.nan, half_width=math.nan, count=count)
+        return Parabola(slope=none, bend=none, top=math.nan, fits=math.nan)
+    powers = np.stack([np.ones(count), across, across**2], axis=1)
+    inverse = np.linalg.pinv(powers)
+    coefficients = inverse @ up
+    rest = up - powers @ coefficients
+    variance = float(rest @ rest) / freedom if freedom > 0 else math.nan
+    errors = np.sqrt(variance * np.sum(inverse**2, axis=1))
+    _, slope, bend = (
+        Slope(
+            value=float(value),
+            standard_error=float(error),
+            half_width=_quantile(freedom) * float(error) if freedom > 0 else math.nan,
+            count=count,
+        )
+        for value, error in zip(coefficients, errors, strict=True)
+    )
+    top = at - slope.value / (2 * bend.value) if bend.value else math.nan
+    return Parabola(slope=slope, bend=bend, top=top, fits=_fits(across, rest))
+
+
+def _fits(x: NDArray[np.float64], rest: NDArray[np.float64]) -> float:
+    _, place, members = np.unique(x, return_inverse=True, return_counts=True)
+    means = np.bincount(place, rest) / members
+    off, repeats = len(members) - 3, len(rest) - len(members)
+    pure = float(np.sum((rest - means[place]) ** 2))
+    if off < 1 or repeats < 1 or pure == 0:
+        return math.nan
+    return float(fdtrc(off, repeats, float(members @ means**2) / off / (pure / repeats)))
 
 
 def _quantile(freedom: float) -> float:

@@ -86,22 +86,22 @@ def means(runs: pd.DataFrame, keys: Sequence[str], quantities: Sequence[str]) ->
 
     Args:
         runs: One row per run.
-        keys: Columns that make a point.
+        keys: Columns that make a point; NaN is a value of its own.
         quantities: Columns that are averaged.
 
     Returns:
         The table; `… SE` is the standard error, `… 95 %` the half-width of the confidence interval.
     """
     rows = []
-    for values, group in runs.groupby(list(keys), sort=True):
+    for values, group in runs.groupby(list(keys), sort=True, dropna=False):
         places = dict(zip(keys, values if isinstance(values, tuple) else (values,), strict=True))
         rows.append({**places, **seeds_of(group), **averaged(group, quantities)})
-    return in_order(pd.DataFrame(rows), [key for key in keys if key != PROCEDURE])
+    return in_order(pd.DataFrame(rows), keys)
 
 
 def in_order(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
-    """Rows by keys, then by procedure as in `ORDER`."""
-    return ordered(table, [*keys, PROCEDURE], named=PROCEDURE, order=ORDER)
+    """Rows by keys, of which the procedure is one, in the order of `ORDER`."""
+    return ordered(table, keys, named=PROCEDURE, order=ORDER)
 
 
 def of(runs: pd.DataFrame, name: str) -> pd.DataFrame:

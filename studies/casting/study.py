@@ -81,7 +81,7 @@ class Casting(PaperStudy):
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
-        runs = in_order(found.table(), [SEED])
+        runs = in_order(found.table(), [SEED, PROCEDURE])
         return tables_of(runs, [PROCEDURE], QUANTITIES, lambda part: means(part, [PROCEDURE], list(QUANTITIES)))
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:

@@ -89,7 +89,7 @@ class Melting(PaperStudy):
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs, points, and every measure of every run against time."""
-        runs = in_order(found.table(), [LIFT, ASPECT, SEED])
+        runs = in_order(found.table(), [LIFT, ASPECT, SEED, PROCEDURE])
         times = [pd.DataFrame({"run": run.name, **run.history}) for run in found.runs]
         tables = tables_of(runs, _KEYS, QUANTITIES, lambda part: means(part, _KEYS, list(QUANTITIES)))
         return {**tables, "times": pd.concat(times, ignore_index=True)}

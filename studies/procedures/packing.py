@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
 import pandas as pd
 
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, judge, negative, told
-from postprocess.statistics.seeds import mean_over_seeds, slope_within
+from postprocess.statistics.seeds import mean_over_seeds, parabola
 from studies.base.activity import HALF, HEIGHT, LOWEST, PHI_ACTIVE, STRAIGHT
 from studies.base.procedures import (
     AMPLITUDE,
@@ -51,17 +50,12 @@ def _shaken_falls(table: pd.DataFrame) -> Finding:
 
 def _shaken_bends(table: pd.DataFrame) -> Finding:
     part = of_procedure(table, EXTERNAL).dropna(subset=[PHI_ACTIVE])
-    across, phi = part[ASPECT].to_numpy(dtype=float), part[PHI_ACTIVE].to_numpy(dtype=float)
-    straight = len(set(across)) > 2
-    rest = phi - np.polynomial.Polynomial.fit(across, phi, 1)(across) if straight else np.full(len(phi), np.nan)
-    bend = slope_within(
-        list((across - across.mean()) ** 2) if straight else across.tolist(), list(rest), ["all"] * len(rest)
-    )
+    bend = parabola(part[ASPECT], part[PHI_ACTIVE], at=1.0).bend
     return Finding(
         paper="External oscillation: φ changes with l/w faster than linearly",
-        ours=f"φ_f off a straight line against the square of the distance from the mean l/w {told(bend, 3)}",
+        ours=f"bend of φ_f against l/w, of the parabola through all runs, {told(bend, 3)}",
         verdict=judge(bend),
-        criterion="φ_f against l/w is convex: slope > 0, that is a fall that is steeper at small l/w",
+        criterion="φ_f against l/w is convex: bend > 0, that is a fall that is steeper at small l/w",
     )
 
 

@@ -26,8 +26,19 @@ from studies.base.figures import (
     legend_above,
     procedure_marker,
 )
-from studies.base.procedures import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.base.procedures import (
+    AMPLITUDE,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PROCEDURE,
+    SHAPE,
+    STATIC,
+    THETA,
+    of_procedure,
+)
 from studies.base.release import ORDER
+from studies.strength.findings import compared
 from studies.strength.measure import CARRIED, HELD_FAST, PEAK, PEAK_RAISED, UPPER, WORK
 
 if TYPE_CHECKING:
@@ -72,8 +83,8 @@ def draw(
     """
     by_name = {run.directory.name: run for run in manifests}
     with figures.style():
-        written = _draw_forces(output / "force_raised", runs, by_name, footer)
-        written += _draw_means(output / "strength", points, footer)
+        written = _draw_forces(output / "force_raised", compared(runs), by_name, footer)
+        written += _draw_means(output / "strength", compared(points), footer)
         written += _draw_crossings(output / "peak_crossings", points, runs, footer)
     return written
 
@@ -135,10 +146,10 @@ def _draw_means(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list
 
 
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
-    """Peak force against ⟨N⟩: every run, an arrow where it held fast, and the means of each height."""
+    """Peak force against ⟨N⟩: every run, an arrow where it held fast, and the means of each height and θ."""
     figure, axes = figures.new_figure(height=2.8)
     for procedure in ORDER:
-        one, mean = runs[runs[PROCEDURE] == procedure], points[points[PROCEDURE] == procedure]
+        one, mean = runs[runs[PROCEDURE] == procedure], of_procedure(points, procedure)
         if one.empty:
             continue
         colour = COLOURS[procedure]
@@ -155,9 +166,14 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
             look={"markersize": 4.2, **procedure_marker(procedure), "linestyle": "none"},
             label=_LABELS[procedure],
         )
+    others = points[(points[PROCEDURE] == INTERNAL) & (points[THETA] != AMPLITUDE)]
+    for _, point in others.iterrows():
+        look = {"color": COLOURS[INTERNAL], "fontsize": 6, "ha": "center", "va": "center", "fontweight": "bold"}
+        axes.text(point[CROSSINGS], point[PEAK], f"{point[THETA]:g}°", **look)
     axes.set_xlabel(CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK)
     axes.set_ylim(bottom=0)
     legend_above(axes)
-    told = "Small: single runs, with an arrow: held fast, a lower bound; large: means over seeds of each height."
+    told = "Small: single runs, with an arrow: held fast, a lower bound; large: means over seeds of each height"
+    told += "." if others.empty else ", and where a number of degrees stands, of another θ."
     return finished(figure, path, [told], footer)

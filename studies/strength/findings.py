@@ -17,7 +17,7 @@ from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import mean_difference, told_less
 from postprocess.statistics.seeds import SeedMean, slope_within
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA, of_procedure
 from studies.strength.measure import ABOVE, CARRIED, HELD_FAST, PEAK, PEAK_RAISED, THROUGH, UPPER, WORK
 
 THREE = (EXTERNAL, INTERNAL, SHAPE)
@@ -38,15 +38,20 @@ def findings(runs: pd.DataFrame) -> tuple[Finding, ...]:
         _harder_but_more_brittle,
         _tougher,
     )
-    return (*(one(table) for one in judges), _goes_with_crossings(runs))
+    return (*(one(table) for one in judges), _goes_with_crossings(compared(runs)), _over_amplitude(runs))
 
 
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
     """One row per procedure, l/w and seed: means over the heights of the hook, where there are runs at all of them."""
-    keys, every = [PROCEDURE, ASPECT, SEED], runs[UPPER].nunique()
-    grouped = runs.groupby(keys)
+    table, keys, every = compared(runs), [PROCEDURE, ASPECT, SEED], runs[UPPER].nunique()
+    grouped = table.groupby(keys)
     means = grouped[list(COMPARED)].mean()
     return means[grouped[UPPER].nunique() == every].reset_index()
+
+
+def compared(runs: pd.DataFrame) -> pd.DataFrame:
+    """Runs of procedures that are compared: of the internal oscillation those of one θ."""
+    return pd.concat([of_procedure(runs, name) for name in runs[PROCEDURE].unique()]) if len(runs) else runs
 
 
 def of(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
@@ -171,13 +176,34 @@ def _tougher(table: pd.DataFrame) -> Finding:
 
 def _goes_with_crossings(runs: pd.DataFrame) -> Finding:
     blocks = [f"{upper} {aspect} {seed}" for upper, aspect, seed in runs[[UPPER, ASPECT, SEED]].to_numpy()]
-    slope = slope_within(runs[CROSSINGS], runs[PEAK], blocks)
-    verdict = judge(slope)
-    if verdict in ("found", "not found") and runs[HELD_FAST].any():
-        verdict = "not resolved"
+    ours, verdict = _against_crossings(runs, blocks)
     return Finding(
         paper="Tensile strength and number of entanglements are connected",
-        ours=f"peak against ⟨N⟩ {told(slope, 3, ' per link')}",
+        ours=ours,
         verdict=verdict,
         criterion="slope of the peak force against ⟨N⟩ > 0 over all procedures, within runs of one height and seed",
     )
+
+
+def _over_amplitude(runs: pd.DataFrame) -> Finding:
+    internal = runs[runs[PROCEDURE] == INTERNAL]
+    several = internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1
+    part = internal[several]
+    thetas = " ".join(f"{theta:g}" for theta in sorted(part[THETA].unique()))
+    ours, verdict = _against_crossings(part, [f"{upper} {seed}" for upper, seed in part[[UPPER, SEED]].to_numpy()])
+    strength, links = (slope_within(part[THETA], part[quantity], part[SEED]) for quantity in (PEAK, CROSSINGS))
+    beside = f"against θ: peak {told(strength, 3, ' per degree')}, ⟨N⟩ {told(links, 3, ' per degree')}"
+    return Finding(
+        paper="Internal oscillation: over θ, the peak force goes with ⟨N⟩",
+        ours=f"{ours}, θ = {thetas}°; beside the criterion: {beside}" if thetas else "no data",
+        verdict=verdict,
+        criterion="slope of the peak force against ⟨N⟩ > 0 over θ, within runs of one height and seed",
+    )
+
+
+def _against_crossings(part: pd.DataFrame, blocks: Sequence[str]) -> tuple[str, Verdict]:
+    slope = slope_within(part[CROSSINGS], part[PEAK], blocks)
+    verdict = judge(slope)
+    if verdict in ("found", "not found") and part[HELD_FAST].any():
+        verdict = "not resolved"
+    return f"peak against ⟨N⟩ {told(slope, 3, ' per link')}", verdict

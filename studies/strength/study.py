@@ -8,6 +8,7 @@ beyond what it lifts goes through the pile.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +22,7 @@ from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
 from studies.base.engines import judging, tables_of, told_by_engine, told_engines
 from studies.base.paper import PaperStudy
-from studies.base.procedures import ACTIVE, CROSSINGS, PROCEDURE, STATIC
+from studies.base.procedures import ACTIVE, CROSSINGS, PROCEDURE, STATIC, THETA
 from studies.base.release import in_order, means
 from studies.base.runs import Collected, MeasuredRun, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
@@ -45,7 +46,7 @@ from studies.strength.measure import (
     strength_row,
 )
 
-_KEYS = [ASPECT, UPPER, PROCEDURE]
+_KEYS = [ASPECT, UPPER, PROCEDURE, THETA]
 _LENGTHS = (PEAK_RAISED, BREAK, TOP)
 
 
@@ -67,6 +68,7 @@ class Strength(PaperStudy):
     named = MappingProxyType(
         {
             "procedure": lambda point: str(point[PROCEDURE]),
+            "θ [°]": lambda point: "–" if math.isnan(point[THETA]) else f"{point[THETA]:g}",
             "l/w": lambda point: f"{point[ASPECT]:g}",
             "hook [mm]": lambda point: f"{1e3 * point[UPPER]:g}",
             "seeds": lambda point: str(point[SEEDS]),
@@ -99,7 +101,10 @@ class Strength(PaperStudy):
     def refuse(self, found: Collected) -> None:
         """A point and seed twice, other numbers of smarticles, other durations of an activity."""
         found.refuse_repeats(
-            "point", lambda run: f"{run.row[PROCEDURE]} l/w {run.row[ASPECT]:g}, hook at {run.row[UPPER]:g} m"
+            "point",
+            lambda run: (
+                f"{run.row[PROCEDURE]} θ {run.row[THETA]:g}° l/w {run.row[ASPECT]:g}, hook at {run.row[UPPER]:g} m"
+            ),
         )
         found.refuse_mixed_counts()
         found.refuse_mixture(
@@ -110,7 +115,7 @@ class Strength(PaperStudy):
 
     def tabulate(self, found: Collected) -> Tables:
         """Runs and points."""
-        runs = in_order(found.table(), [ASPECT, UPPER, SEED])
+        runs = in_order(found.table(), [ASPECT, UPPER, SEED, PROCEDURE, THETA])
         return tables_of(runs, _KEYS, QUANTITIES, lambda part: means(part, _KEYS, list(QUANTITIES)))
 
     def judge(self, tables: Tables) -> tuple[Finding, ...]:

@@ -264,6 +264,21 @@ def test_a_peak_beyond_one_is_seen_where_it_was_run():
     assert row_of(higher, "⟨N⟩ of external").verdict == "not found"
 
 
+@pytest.mark.parametrize(
+    ("top", "verdict"), [(1.0, "found"), (0.76, "not found"), (1.3, "not found"), (0.85, "not resolved")]
+)
+def test_a_flat_top_is_placed_by_all_runs(top, verdict):
+    """No mean is clearly above that at l/w = 1.0; where the parabola through all of them is highest is clear."""
+    table = as_in_the_paper(range(8))
+    where = table[PROCEDURE] == EXTERNAL
+    beyond = table[where & (table[ASPECT] == 1.0)].assign(**{ASPECT: 1.1})
+    table = pd.concat([table, beyond], ignore_index=True)
+    own = table[PROCEDURE] == EXTERNAL
+    scatter = 0.1 * np.random.default_rng(4).standard_normal(own.sum())
+    table.loc[own, CROSSINGS] = 6.2 - 5 * (table.loc[own, ASPECT] - top) ** 2 + scatter
+    assert row_of(table, "⟨N⟩ of external").verdict == verdict
+
+
 def test_one_seed_can_resolve_what_holds_at_every_aspect_ratio():
     table = as_in_the_paper((1,))
     table = table[table[ASPECT].isin([0.4, 0.7, 1.0]) & ~table[THETA].isin([5, 15, 20])]

@@ -16,7 +16,7 @@ from synthetic.shapes import W
 from dem.record.manifest import read_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.base.procedures import AMPLITUDE, CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA
 from studies.registry import study_file
 from studies.strength import measure
 from studies.strength.findings import findings
@@ -113,6 +113,7 @@ def as_in_the_paper() -> pd.DataFrame:
         {
             PROCEDURE: name,
             ASPECT: 0.7,
+            THETA: AMPLITUDE if name == INTERNAL else math.nan,
             SEED: seed,
             measure.UPPER: upper,
             PEAK: peak * (1 + 0.02 * random.normal()),
@@ -140,11 +141,11 @@ def verdicts(table: pd.DataFrame) -> list[str]:
 
 def test_findings_of_the_paper_are_found_and_their_opposite_is_not() -> None:
     table = as_in_the_paper()
-    assert verdicts(table) == ["found"] * 6
+    assert verdicts(table) == ["found"] * 6 + ["no data"]
     # Two heights of one seed are one sample, not two.
     assert "n = 3" in findings(table)[0].ours
     table[PEAK], table[WORK], table[PEAK_RAISED] = 2 - table[PEAK], 2 - table[WORK], 1e-2 - table[PEAK_RAISED]
-    assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found"]
+    assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found", "no data"]
 
 
 def test_what_a_held_pile_leaves_unknown_is_not_judged() -> None:
@@ -163,6 +164,45 @@ def test_a_seed_counts_where_it_has_all_heights() -> None:
     table = as_in_the_paper()
     part = table[~((table[SEED] == 3) & (table[measure.UPPER] == 0.016))]
     assert "n = 2" in findings(part)[0].ours
+
+
+def over_theta(rise: float) -> pd.DataFrame:
+    """As in the paper, and the lower hook in piles of other θ whose ⟨N⟩ grows with θ and whose peak does as told."""
+    table, random = as_in_the_paper(), np.random.default_rng(1)
+    lower = table[(table[PROCEDURE] == INTERNAL) & (table[measure.UPPER] == 0.013)]
+    others = [
+        lower.assign(
+            **{
+                THETA: theta,
+                CROSSINGS: lower[CROSSINGS] + 0.05 * (theta - AMPLITUDE),
+                PEAK: lower[PEAK] + rise * (theta - AMPLITUDE) + 0.02 * random.standard_normal(len(lower)),
+            }
+        )
+        for theta in (5.0, 20.0, 30.0)
+    ]
+    return pd.concat([table, *others], ignore_index=True)
+
+
+def test_other_amplitudes_are_compared_among_themselves_alone() -> None:
+    for rise, verdict in ((0.01, "found"), (0.0, "not resolved"), (-0.01, "not found")):
+        table = over_theta(rise)
+        before, after = findings(as_in_the_paper()), findings(table)
+        assert [one.ours for one in before[:-1]] == [one.ours for one in after[:-1]]
+        assert after[-1].verdict == verdict
+        # Four θ of three seeds; the upper hook has one θ alone.
+        assert "(n = 12)" in after[-1].ours
+        assert "θ = 5 10 20 30°" in after[-1].ours
+    table = over_theta(0.01)
+    table.loc[table.index[-1], HELD_FAST] = 1.0
+    assert findings(table)[-1].verdict == "not resolved"
+
+
+def test_other_amplitudes_have_points_of_their_own(tmp_path: Path) -> None:
+    runs = [write(tmp_path / f"{name}{seed}", name, seed=seed) for name in (STATIC, INTERNAL) for seed in (1, 2, 3)]
+    for run in runs[4:]:
+        (run / "scene.yaml").write_text((run / "scene.yaml").read_text().replace("theta_deg: 10.0", "theta_deg: 30.0"))
+    report = Strength().analyse(runs, tmp_path / "out", **ORIGIN)
+    assert [row[:2] for row in report.rows] == [["static", "–"], ["internal", "10"], ["internal", "30"]]
 
 
 # -- what is shipped --------------------------------------------------------------------------------------------------

@@ -4,9 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import linregress, ttest_ind
+from scipy.special import fdtr
+from scipy.stats import f_oneway, linregress, ttest_ind
 
-from postprocess.statistics.seeds import Difference, Scatter, difference, mean_over_seeds, pooled_scatter, slope_within
+from postprocess.statistics.seeds import (
+    Difference,
+    Scatter,
+    difference,
+    mean_over_seeds,
+    parabola,
+    pooled_scatter,
+    slope_within,
+)
 
 
 def test_half_width_is_student_t():
@@ -140,6 +149,45 @@ def test_slope_without_a_point_to_spare_has_no_error():
     assert found.value == pytest.approx(2.0)
     assert math.isnan(found.standard_error)
     assert math.isnan(found.half_width)
+
+
+def test_parabola_is_that_of_numpy():
+    random = np.random.default_rng(2)
+    x = np.repeat([0.4, 0.6, 0.7, 0.9, 1.1], 3)
+    y = 3 * x - 2 * x**2 + 0.1 * random.standard_normal(15)
+    found = parabola([*x, math.nan], [*y, 5.0], at=0.85)
+    (bend, slope, _), spread = np.polyfit(x - 0.85, y, 2, cov=True)
+    assert (found.slope.value, found.bend.value) == (pytest.approx(slope), pytest.approx(bend))
+    assert found.slope.standard_error == pytest.approx(math.sqrt(spread[1, 1]))
+    assert found.bend.standard_error == pytest.approx(math.sqrt(spread[0, 0]))
+    assert found.slope.half_width == pytest.approx(2.178813 * found.slope.standard_error)  # t(0.975; 12), printed
+    assert found.slope.count == 15
+    assert found.top == pytest.approx(np.polynomial.Polynomial.fit(x, y, 2).deriv().roots()[0])
+
+
+def test_parabola_says_where_it_does_not_describe_the_means():
+    """As often as it says where it is the truth, and nearly always where there is a corner."""
+    random = np.random.default_rng(3)
+    x = np.repeat(np.linspace(0.4, 1.1, 8), 4)
+    noise = 0.1 * random.standard_normal((1000, 32))
+    bent = [parabola(x, x * (2 - x) + one, at=1.0).fits for one in noise]
+    corner = [parabola(x, np.minimum(2 * x, 2.0 - 6 * (x - 1.0)) + one, at=1.0).fits for one in noise]
+    assert np.mean(np.array(bent) < 0.05) == pytest.approx(0.05, abs=0.02)
+    assert np.mean(np.array(corner) < 0.05) > 0.95
+    # Where the parabola is flat it leaves as much as one-way analysis of variance does, with two degrees fewer.
+    y = np.tile([1.0, -1.0, 2.0, -2.0], 8) + np.repeat([1.0, -3.0, 2.0, 0.0, 0.0, 2.0, -3.0, 1.0], 4)
+    level = y - (parabola(x, y, at=0.75).bend.value * (x - 0.75) ** 2)
+    assert parabola(x, level, at=0.75).bend.value == pytest.approx(0, abs=1e-9)
+    ratio = f_oneway(*level.reshape(8, 4)).statistic * 7 / 5
+    assert parabola(x, level, at=0.75).fits == pytest.approx(1 - fdtr(5, 24, ratio))
+
+
+def test_a_parabola_asks_for_three_places():
+    none = parabola([1.0, 1.0, 2.0], [1.0, 2.0, 3.0], at=1.0)
+    assert all(math.isnan(value) for value in (none.slope.value, none.bend.half_width, none.top, none.fits))
+    exact = parabola([0.0, 1.0, 2.0], [0.0, 1.0, 4.0], at=1.0)
+    assert (exact.slope.value, exact.bend.value, exact.top) == pytest.approx((2.0, 1.0, 0.0), abs=1e-9)
+    assert math.isnan(exact.slope.half_width)
 
 
 def test_equal_values_differ_by_nothing():
