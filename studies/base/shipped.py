@@ -62,13 +62,17 @@ def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
 
     Returns:
         Lines such as `9 runs instead of 24`, `l_over_w: only 0.4, 0.7 of 0.4, 0.5, 0.7` (what is
-        left out) and `shake_s: 1.5 instead of 5.0` (what differs in the runs that both have).
+        left out), `shake_s: 1.5 instead of 5.0` (what differs in the runs that both have), and `draws: 3` or
+        `draws: not there` of a variable that only one of them knows.
     """
     lines = [] if len(quick) == len(full) else [f"{len(quick)} runs instead of {len(full)}"]
     twins = {point.name: point for point in full}
     both = [(point, twins[point.name]) for point in quick if point.name in twins]
     told: list[str] = []
-    for name in full[0].values:
+    for name in dict.fromkeys([*full[0].values, *quick[0].values]):
+        if not (name in full[0].values and name in quick[0].values):
+            lines.append(f"{name}: {_distinct(quick, name) or 'not there'}")
+            continue
         some, every = _distinct(quick, name), _distinct(full, name)
         changed = [pair for pair in both if pair[0].values[name] != pair[1].values[name]]
         if changed:
@@ -84,7 +88,7 @@ def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
 def _distinct(points: Sequence[Point], name: str) -> str:
     values: list[Value] = []
     for point in points:
-        if point.values[name] not in values:
+        if name in point.values and point.values[name] not in values:
             values.append(point.values[name])
     if all(isinstance(value, int | float) for value in values):
         values.sort()

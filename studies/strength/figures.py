@@ -168,8 +168,8 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
         )
     others = points[(points[PROCEDURE] == INTERNAL) & (points[THETA] != AMPLITUDE)]
     for _, point in others.iterrows():
-        look = {"color": COLOURS[INTERNAL], "fontsize": 6, "ha": "center", "va": "center", "fontweight": "bold"}
-        axes.text(point[CROSSINGS], point[PEAK], f"{point[THETA]:g}°", **look)
+        place, name = (point[CROSSINGS], point[PEAK]), f"{point[THETA]:g}°"
+        axes.annotate(name, place, color=COLOURS[INTERNAL], fontsize=6, fontweight="bold", ha="center", va="center")
     axes.set_xlabel(CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK)
     axes.set_ylim(bottom=0)

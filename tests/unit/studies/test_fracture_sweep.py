@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,15 @@ def test_the_quick_variant_covers_procedures_and_amplitudes(full: list[Point]) -
     assert {point.scene.count for point in quick} == {135}
     # Which of the paper's numbers is halved follows from l/w.
     assert not any(line.startswith(("n:", "per_layer:")) for line in lines)
+
+
+def test_a_variable_that_one_of_the_two_lacks_is_told(full: list[Point]) -> None:
+    def without(points: list[Point], name: str) -> list[Point]:
+        return [
+            replace(point, values={key: value for key, value in point.values.items() if key != name})
+            for point in points
+        ]
+
+    quick = expand(load_sweep(study_file("fracture", quick=True)))
+    assert "limit: not there" in differences(without(quick, "limit"), full)
+    assert "limit: 1.5" in differences(quick, without(full, "limit"))
