@@ -7,7 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import QhullError, Voronoi
+from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from dem.errors import InputError
 from postprocess.errors import UndefinedMeasureError
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from postprocess.geometry.region import Region
+
+
+TOGETHER = 60_000
+"""Most points whose cells are found at once: they take 15 kB each while they are."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +101,7 @@ def local_packing(
     band = 2 * float(bounding_spheres(vertices)[1].max())
     images = _mirrored(points, container, lid, band)
     try:
-        cells = _cell_volumes(np.concatenate([points, images]))[: len(points)]
+        cells = _cell_volumes(np.concatenate([points, images]), len(points), reach=band / 4)
     except QhullError:
         msg = f"{len(vertices)} smarticles, flat or alone, do not part the container into cells: the pile is too thin"
         raise UndefinedMeasureError(msg) from None
@@ -139,8 +143,62 @@ def _mirrored(points: NDArray[np.float64], container: Region, lid: float, band: 
     return np.concatenate([floor, top, wall])
 
 
-def _cell_volumes(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Volume (n,) of the Voronoi cell of each point, infinite for open ones.
+def _cell_volumes(
+    points: NDArray[np.float64], count: int, *, reach: float, together: int = TOGETHER
+) -> NDArray[np.float64]:
+    """Volume (count,) of the Voronoi cells of the first points, infinite for open ones.
+
+    Cells are found slab by slab along x, among all points within a reach of the slab. A point's cell among them is its
+    cell among all points where the spheres around its corners through the point, in which there must be no other, do
+    not go beyond. The few others are found again among all points within twice the reach of one of them, where those
+    spheres lie if the reach is twice the distance of the farthest corner; and so on.
+
+    Args:
+        points: (n, 3) [m].
+        count: How many of them have their cells told; the others bound cells.
+        reach: The first one [m].
+        together: Most points of a slab.
+    """
+    if count <= together:
+        return _cells(points).volumes[:count]
+    volumes, tree, across = np.empty(count), cKDTree(points), points[:, 0]
+    for slab in np.array_split(np.argsort(across[:count], kind="stable"), -(-count // together)):
+        low, high = across[slab[0]] - reach, across[slab[-1]] + reach
+        near, wanted, now = np.flatnonzero((across >= low) & (across <= high)), slab, reach
+        cells = _cells(points[near])
+        sure = (cells.lowest > low) & (cells.highest < high)
+        while True:
+            places = np.searchsorted(near, wanted)
+            known = sure[places]
+            volumes[wanted[known]] = cells.volumes[places[known]]
+            wanted, now = wanted[~known], 2 * now
+            if not len(wanted):
+                break
+            near = np.unique(np.concatenate(tree.query_ball_point(points[wanted], now)).astype(np.int64))
+            cells = _cells(points[near])
+            sure = (2 * cells.farthest < now) | (len(near) == len(points))
+    return volumes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Cells:
+    """Voronoi cells of points; what is told of corners is infinite for open ones.
+
+    Attributes:
+        volumes: (n,) [m³].
+        farthest: (n,) [m], distance of the farthest corner.
+        lowest: (n,) [m], least x of the spheres around the corners through the point.
+        highest: (n,) [m], greatest.
+    """
+
+    volumes: NDArray[np.float64]
+    farthest: NDArray[np.float64]
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
+
+
+def _cells(points: NDArray[np.float64]) -> _Cells:
+    """Voronoi cells of all points.
 
     A cell is the sum of the pyramids from its point over its faces, whose height is half the
     distance to the neighbour.
@@ -165,4 +223,18 @@ def _cell_volumes(points: NDArray[np.float64]) -> NDArray[np.float64]:
     pyramids = np.where(open_faces, np.inf, area * height / 3)
     volumes = np.zeros(len(points))
     np.add.at(volumes, pairs.ravel(), np.repeat(pyramids, 2))
-    return volumes
+    distance = np.linalg.norm(diagram.vertices[corners] - np.repeat(points[pairs[:, 0]], sizes, axis=0), axis=1)
+    place = diagram.vertices[corners, 0]
+
+    def greatest(of_corners: NDArray[np.float64]) -> NDArray[np.float64]:
+        of_faces = np.where(open_faces, np.inf, np.maximum.reduceat(of_corners, starts))
+        found = np.full(len(points), -np.inf)
+        np.maximum.at(found, pairs.ravel(), np.repeat(of_faces, 2))
+        return found
+
+    return _Cells(
+        volumes=volumes,
+        farthest=greatest(distance),
+        lowest=-greatest(distance - place),
+        highest=greatest(distance + place),
+    )
