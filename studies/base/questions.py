@@ -1,4 +1,4 @@
-"""Questions that a study answers by its runs, each with the numbers behind the answer."""
+"""Studies of questions that runs answer, each with the numbers behind the answer."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 import pandas as pd
 
 from postprocess.report.markdown import table_lines
+from studies.base.study import Analysis, Study, Tables
 
 YesNo = Literal["yes", "no", "undetermined"]
 
@@ -42,3 +43,21 @@ def questions_lines(judged: Sequence[Question]) -> Sequence[str]:
 def questions_table(judged: Sequence[Question]) -> pd.DataFrame:
     """One row per question."""
     return pd.DataFrame([asdict(one) for one in judged])
+
+
+class QuestionStudy(Study[Question]):
+    """A study that answers questions: it writes `answers.csv`, and tells each with its answer below the table.
+
+    Attributes:
+        about_numbers: What the numbers of the table for the terminal are; empty if its header says so.
+    """
+
+    about_numbers = ""
+
+    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
+        """`answers.csv`."""
+        return {"answers": questions_table(judged)}
+
+    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
+        """What the numbers are, and questions with their answers."""
+        return [*([self.about_numbers, ""] if self.about_numbers else []), *(one.told for one in analysis.judged)]

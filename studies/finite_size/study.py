@@ -16,10 +16,10 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
-from studies.base.questions import Question, questions_lines, questions_table
+from studies.base.questions import Question, QuestionStudy, questions_lines
 from studies.base.references import NOTHING, Reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
-from studies.base.study import Analysis, Study, Tables
+from studies.base.study import Analysis, Tables
 from studies.finite_size import figures
 from studies.finite_size.findings import PAPER_ASPECT, PAPER_COUNT, answers
 from studies.finite_size.measure import AFTER, BEFORE, COUNT, QUANTITIES, RADIUS, crossings, phi, share, size_row, spans
@@ -50,10 +50,11 @@ _SHOWN = {
 _SPANS = {spans(BEFORE): "spanned 0", spans(AFTER): "spanned f"}
 
 
-class FiniteSize(Study[Question]):
+class FiniteSize(QuestionStudy):
     """Runs of a pour, a rest, a shake and a rest, of piles of one shape and many sizes."""
 
     name = "finite-size"
+    about_numbers = "0: poured, f: shaken, both at rest; ± 95 %."
     text_name = "finite-size.md"
     told_by_tables = True
 
@@ -94,10 +95,6 @@ class FiniteSize(Study[Question]):
     def judge(self, tables: Tables) -> tuple[Question, ...]:
         """Answers to the study's questions."""
         return answers(tables["runs"], tables["thresholds"], tables["growth"])
-
-    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`answers.csv`."""
-        return {"answers": questions_table(judged)}
 
     def reference_of(self, tables: Tables) -> Reference:
         """Nothing."""
@@ -179,7 +176,3 @@ class FiniteSize(Study[Question]):
             spanned = [f"{round(seeds * row[name])}/{seeds}" for name in _SPANS]
             rows.append([f"{row[ASPECT]:g}", str(row[COUNT]), str(seeds), *cells, *spanned])
         return header, rows
-
-    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
-        """Questions with their answers."""
-        return ["0: poured, f: shaken, both at rest; ± 95 %.", "", *(one.told for one in analysis.judged)]

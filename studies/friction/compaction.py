@@ -16,11 +16,11 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.questions import Question, YesNo, questions_table
+from studies.base.questions import Question, QuestionStudy, YesNo, questions_lines
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference
 from studies.base.runs import Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.shaken import told_shaken
-from studies.base.study import Analysis, Study, Tables
+from studies.base.study import Analysis, Tables
 from studies.friction import compaction_figures
 from studies.friction.laws import FIRST, INTERVALS, LAWS, LOGARITHMIC, STRETCHED, fit, spread_out
 from studies.friction.measure import FRICTION, friction_run, history_of, refuse_repeats, while_shaken
@@ -35,7 +35,7 @@ LAW, RESIDUAL, MISSED = "law", "residual [-]", "missed at the end [-]"
 BEGIN, END, TAU, POWER = "phi_b [-]", "phi_inf [-]", "tau [s]", "beta or B [-]"
 
 
-class Compaction(Study[Question]):
+class Compaction(QuestionStudy):
     """Runs that were poured and shaken for long, at few coefficients of friction."""
 
     name = "compaction"
@@ -58,10 +58,6 @@ class Compaction(Study[Question]):
         """Whether φ still grows, which law it follows, and what Gravish's 20 s see of it."""
         return answers(tables["times"], tables["laws"])
 
-    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`answers.csv`."""
-        return {"answers": questions_table(judged)}
-
     def reference_of(self, tables: Tables) -> Reference:
         """Gravish's packing fractions."""
         return GRAVISH
@@ -78,12 +74,11 @@ class Compaction(Study[Question]):
 
     def text(self, analysis: Analysis[Question]) -> Sequence[str]:
         """Answers, φ in the course of time, and laws."""
-        judged = [(one.question, one.answer, one.evidence) for one in analysis.judged]
         header, rows = self.table(analysis)
         return [
             "# Piles that are shaken for long",
             "",
-            *table_lines(["question", "answer", "evidence"], judged),
+            *questions_lines(analysis.judged),
             "",
             "## φ in the course of time",
             "",
@@ -125,10 +120,6 @@ class Compaction(Study[Question]):
             told = [told_number(mean.value, ".4f", mean.half_width) for mean in means]
             rows.append([f"{friction:g}", str(len(group)), *told])
         return header, rows
-
-    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
-        """Questions with their answers."""
-        return [one.told for one in analysis.judged]
 
 
 def at(time: float) -> str:

@@ -17,11 +17,11 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
 from postprocess.statistics.seeds import Scatter
-from studies.base.questions import Question, questions_table
+from studies.base.questions import Question, QuestionStudy, questions_lines
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.shaken import WHEN, told_shaken
-from studies.base.study import Analysis, Study, Tables
+from studies.base.study import Analysis, Tables
 from studies.friction import figures
 from studies.friction.findings import answers, told_crossing
 from studies.friction.measure import FRICTION, TIMES, WINDOW, at_time, friction_run, refuse_repeats
@@ -50,7 +50,7 @@ from studies.friction.tables import (
 )
 
 
-class Friction(Study[Question]):
+class Friction(QuestionStudy):
     """Runs that were poured and shaken, at several coefficients of friction.
 
     Args:
@@ -96,10 +96,6 @@ class Friction(Study[Question]):
         """Answers to the study's questions."""
         return answers(*(tables[name] for name in ("crossings", "verdicts", "nearest", "growth")))
 
-    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`answers.csv`."""
-        return {"answers": questions_table(judged)}
-
     def reference_of(self, tables: Tables) -> Reference:
         """Gravish's packing fractions."""
         return GRAVISH
@@ -123,11 +119,10 @@ class Friction(Study[Question]):
     def text(self, analysis: Analysis[Question]) -> Sequence[str]:
         """Answers, the friction that each curve asks for, verdicts, φ at every point, its growth, and steel."""
         tables = analysis.tables
-        judged = [(one.question, one.answer, one.evidence) for one in analysis.judged]
         return [
             "# Friction that packs smarticles as Gravish et al. 2012 found",
             "",
-            *table_lines(["question", "answer", "evidence"], judged),
+            *questions_lines(analysis.judged),
             "",
             "## The friction at which φ is Gravish's",
             "",
@@ -192,10 +187,6 @@ class Friction(Study[Question]):
         """The friction that each curve asks for."""
         header = ["φ", "l/w", "Gravish", "friction (95 %)"]
         return header, [_crossing(row) for row in _rows(analysis.tables["crossings"])]
-
-    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
-        """Questions with their answers."""
-        return [one.told for one in analysis.judged]
 
 
 def _rows(table: pd.DataFrame) -> list[pd.Series]:

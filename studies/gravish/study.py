@@ -29,11 +29,11 @@ from studies.base.engines import (
     of_engine,
     told_engines,
 )
-from studies.base.questions import Question, questions_table
+from studies.base.questions import Question, QuestionStudy, questions_table
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
-from studies.base.study import Analysis, Study, Tables
+from studies.base.study import Analysis, Tables
 from studies.gravish import figures
 from studies.gravish.findings import (
     answers,
@@ -49,7 +49,7 @@ COMPARED = (
 """What is compared between engines: columns of the table of runs."""
 
 
-class Gravish(Study[Question]):
+class Gravish(QuestionStudy):
     """Runs that were poured and shaken.
 
     Args:
@@ -205,10 +205,6 @@ class Gravish(Study[Question]):
             for row in deviations.to_dict("records")
         ]
         return [*_engine_header(deviations), "φ", "l/w", "seeds", "here", "± 95 %", "Gravish", "deviation %"], rows
-
-    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
-        """Questions with their answers."""
-        return [one.told for one in analysis.judged]
 
 
 def _engine_header(table: pd.DataFrame) -> list[str]:

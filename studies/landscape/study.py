@@ -18,10 +18,10 @@ from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
 from studies.base.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
-from studies.base.questions import Question, questions_lines, questions_table
+from studies.base.questions import Question, QuestionStudy, questions_lines
 from studies.base.references import NOTHING, Reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
-from studies.base.study import Analysis, Study, Tables
+from studies.base.study import Analysis, Tables
 from studies.landscape import figures
 from studies.landscape.cost import COMMON, FRONTIER, GAIN, HIGH, LOW, PAIRS, YIELD, common_aspects, costs
 from studies.landscape.findings import SHORT, answers, named_point, told_interval
@@ -63,7 +63,7 @@ from studies.landscape.predictors import (
 _SHOWN = {PHI: ("φ", ".4f"), CROSSINGS: ("⟨N⟩", ".2f"), LINKING: ("linking", ".3f"), ABOVE: ("above the hook", ".2f")}
 
 
-class Landscape(Study[Question]):
+class Landscape(QuestionStudy):
     """Runs of a pour, one activity or none, and a hook that is lifted out.
 
     Args:
@@ -71,6 +71,9 @@ class Landscape(Study[Question]):
     """
 
     name = "landscape"
+    about_numbers = (
+        "Poured, after a shape change, and after the oscillation that made it strongest; strength over n W_s."
+    )
     text_name = "landscape.md"
     told_by_tables = True
 
@@ -106,10 +109,6 @@ class Landscape(Study[Question]):
     def judge(self, tables: Tables) -> tuple[Question, ...]:
         """Answers to the study's questions."""
         return answers(*(tables[name] for name in ("runs", "predictors", "comparisons", "cost")))
-
-    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`answers.csv`."""
-        return {"answers": questions_table(judged)}
 
     def reference_of(self, tables: Tables) -> Reference:
         """Nothing."""
@@ -190,14 +189,6 @@ class Landscape(Study[Question]):
             chosen.append(part[part[PROCEDURE] == INTERNAL].nlargest(1, PEAK))
             rows += [_point(row) for few in chosen for _, row in few.iterrows()]
         return header, rows
-
-    def told(self, analysis: Analysis[Question]) -> Sequence[str]:
-        """Questions with their answers."""
-        return [
-            "Poured, after a shape change, and after the oscillation that made it strongest; strength over n W_s.",
-            "",
-            *(one.told for one in analysis.judged),
-        ]
 
 
 def _averaged() -> list[str]:
