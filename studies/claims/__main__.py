@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from studies.claims.verdicts import Claim, Tested, claims
+from studies.claims.verdicts import Claim, Engines, Tested, claims
 
 HEAD = """\
 # The paper's claims, one by one
@@ -36,6 +36,8 @@ def text(found: Sequence[Claim]) -> str:
         HEAD,
         f"{len(found)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common()) + ".",
         "",
+        engines(found),
+        "",
     ]
     part = ""
     for claim in found:
@@ -49,9 +51,27 @@ def text(found: Sequence[Claim]) -> str:
                 "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
             ]
         ours = (_told(tested) for tested in _all(claim))
-        cells = (str(claim.number), claim.says, f"**{claim.verdict}**", *ours, _rests(claim), claim.why)
+        verdict = f"**{claim.verdict}**" + (" (engines differ)" if "opposite" in claim.engines.values() else "")
+        cells = (str(claim.number), claim.says, verdict, *ours, _rests(claim), claim.why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def engines(found: Sequence[Claim]) -> str:
+    """What both engines say of the claims that both were asked, and which they are where they do not agree."""
+    asked = [(claim.number, protocol, how) for claim in found for protocol, how in claim.engines.items()]
+
+    def which(how: Engines) -> str:
+        numbers = [f"{number} by the {protocol}" for number, protocol, one in asked if one == how]
+        return ", ".join(numbers) or "none"
+
+    alike = sum(how == "alike" for _, _, how in asked)
+    return (
+        f"Both engines were asked {len(asked)} findings of {len({number for number, _, _ in asked})} claims: {alike} "
+        f"verdicts are the same. Opposite: {which('opposite')}. Links alone resolves, by more runs: "
+        f"{which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
+        "All others rest on one engine, as told."
+    )
 
 
 def _told(tested: Tested | None) -> str:

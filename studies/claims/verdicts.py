@@ -23,6 +23,9 @@ CLAIMS = Path(__file__).with_name("claims.yaml")
 
 Verdict = Literal["reproduced", "partly", "not", "not resolved", "not testable", "no data"]
 
+Engines = Literal["alike", "opposite", "links alone tells", "YADE alone tells"]
+"""Verdicts of both engines on one finding: the same, one found and the other refused, or one not resolved."""
+
 _FOUND: Mapping[str, Verdict] = {
     "found": "reproduced",
     "not found": "not",
@@ -106,6 +109,24 @@ class Claim:
         if len(told) == 1:
             return told.pop()
         return "partly" if "reproduced" in told else "not"
+
+    @property
+    def engines(self) -> Mapping[str, Engines]:
+        """How the engines agree, by protocol, where the same finding was asked of both."""
+        pairs = {"text": (self.text, self.yade), "code": (self.code, self.code_on_yade)}
+        return {
+            name: _agreement(links.verdict, yade.verdict)
+            for name, (links, yade) in pairs.items()
+            if links is not None and yade is not None and "no data" not in (links.verdict, yade.verdict)
+        }
+
+
+def _agreement(links: Verdict, yade: Verdict) -> Engines:
+    if links == yade:
+        return "alike"
+    if links == "not resolved":
+        return "YADE alone tells"
+    return "links alone tells" if yade == "not resolved" else "opposite"
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from collections import defaultdict
 from pathlib import Path
 
@@ -100,6 +101,28 @@ def test_a_test_of_ours_decides_where_theirs_cannot_tell(
     assert claim.verdict == verdict
     assert "; by a test of ours, strength-code: " in text((claim,))
     assert "[strength](strength/)" in text((claim,)).splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("links", "yade", "told", "differ"),
+    [
+        ("found", "found", "1 claims: 1 verdicts are the same. Opposite: none", False),
+        ("found", "not found", "0 verdicts are the same. Opposite: 37 by the text. Links", True),
+        ("not found", "not resolved", "by more runs: 37 by the text. YADE alone: none", False),
+        ("not resolved", "not found", "by more runs: none. YADE alone: 37 by the text.", False),
+        ("not resolved", "not resolved", "1 verdicts are the same", False),
+        ("found", "no data", "asked 0 findings of 0 claims", False),
+    ],
+)
+def test_where_engines_do_not_agree_is_told(tmp_path: Path, links: str, yade: str, told: str, differ: bool) -> None:
+    results = written(tmp_path, {("procedures", HIGHEST): links})
+    shutil.copytree(results / "procedures", results / "procedures-yade")
+    findings = results / "procedures-yade" / "findings.csv"
+    findings.write_text(f"finding in the paper,ours,verdict,criterion\n{HIGHEST},ours,{yade},criterion\n")
+    claim = one_of(claims(results), "shape change entangles most")
+    page = text((claim,))
+    assert told in page
+    assert ("(engines differ)" in page) == differ
 
 
 def test_what_a_verdict_would_take_is_told(tmp_path: Path) -> None:
