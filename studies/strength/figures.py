@@ -167,13 +167,18 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
             label=_LABELS[procedure],
         )
     others = points[(points[PROCEDURE] == INTERNAL) & (points[THETA] != AMPLITUDE)]
-    for _, point in others.iterrows():
-        place, name = (point[CROSSINGS], point[PEAK]), f"{point[THETA]:g}°"
-        axes.annotate(name, place, color=COLOURS[INTERNAL], fontsize=6, fontweight="bold", ha="center", va="center")
+    axes.plot(
+        others[CROSSINGS], others[PEAK], SHAPES[INTERNAL], color=COLOURS[INTERNAL], markerfacecolor="white", zorder=6
+    )
+    for k, (_, point) in enumerate(others.sort_values(CROSSINGS).iterrows()):
+        # Above runs nearby, by turns at two heights, with a line down to its mean.
+        place, above = (point[CROSSINGS], point[PEAK]), (point[CROSSINGS], (0.36 + 0.07 * (k % 2)) * axes.dataLim.y1)
+        line = {"arrowstyle": "-", "color": COLOURS[INTERNAL], "linewidth": 0.6, "shrinkA": 0, "shrinkB": 2}
+        axes.annotate(f"{point[THETA]:g}°", place, above, color=COLOURS[INTERNAL], ha="center", arrowprops=line)
     axes.set_xlabel(CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK)
     axes.set_ylim(bottom=0)
     legend_above(axes)
     told = "Small: single runs, with an arrow: held fast, a lower bound; large: means over seeds of each height"
-    told += "." if others.empty else ", and where a number of degrees stands, of another θ."
+    told += "." if others.empty else ", open: of the internal oscillation at another θ."
     return finished(figure, path, [told], footer)
