@@ -23,7 +23,7 @@ from benchmarks.child import run_child
 from benchmarks.chrono import figure
 from benchmarks.chrono.cases import ACTIVITIES, FRAMES, SERIES, Case, planned, pour, scene_data, scene_of
 from benchmarks.chrono.checks import known_answers
-from benchmarks.chrono.records import write_run
+from benchmarks.chrono.records import constraints, write_run
 from benchmarks.chrono.running import simulate
 from benchmarks.chrono.table import markdown, measured, summary
 from benchmarks.chrono.task import PAPER, words
@@ -68,7 +68,7 @@ def run(case: Case, folder: Path, driver: Path) -> None:
         version=VERSION,
         command=command,
     )
-    facts = {"deepest_m": float(records.deepest[records.phase > 0].max()), "contacts": float(records.contacts.mean())}
+    facts = constraints(records, scene, every=round(FRAMES / SERIES))
     (out / "chrono.json").write_text(json.dumps(facts), encoding="utf-8")
 
 

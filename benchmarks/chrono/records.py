@@ -104,6 +104,34 @@ def read_records(path: Path, count: int) -> Records:
     )
 
 
+def tilts(state: State) -> Array:
+    """(N, 2) angles by which hinges let barbs out of the plane of their smarticle [rad]; 0 of a hinge that holds."""
+    normals = state.link_rotations[..., 2]
+    cosines = np.einsum("nki,ni->nk", normals[:, [0, 2]], normals[:, 1])
+    angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
+    return angles
+
+
+def constraints(records: Records, scene: Scene, every: int) -> dict[str, float]:
+    """How well the solver held hinges, motors and contacts during the activity.
+
+    Args:
+        records: the whole of it.
+        scene: take-over, rest, activity, rest.
+        every: looks from one that is taken to the next.
+    """
+    looks = np.flatnonzero(records.phase == ACTIVITY)[::every]
+    tilted = np.array([tilts(records.state(int(look), scene.particle.boxes)) for look in looks])
+    torque = np.abs(records.barbs[looks, ..., 1]) / float(scene.torque_limit)
+    return {
+        "mean_tilt_rad": float(tilted.mean()),
+        "largest_tilt_rad": float(tilted.max()),
+        "over_limit_share": float((torque >= 1).mean()),
+        "greatest_torque_over_limit": float(torque.max()),
+        "deepest_m": float(records.deepest[records.phase > 0].max()),
+    }
+
+
 def write_run(
     records: Records, scene: Scene, out: Path, *, frame_every: int, time_step: float, version: str, command: str
 ) -> None:

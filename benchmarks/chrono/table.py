@@ -17,7 +17,15 @@ from studies.base.procedures import CROSSINGS, PHI, STATIC
 
 HIGHEST = "highest com height over h0 [-]"
 STATIC_PHI, STATIC_CROSSINGS = f"{STATIC} {PHI}", f"{STATIC} {CROSSINGS}"
-COST, DEEPEST = "wall time per simulated time [s/s]", "deepest overlap by the engine [m]"
+COST = "wall time per simulated time [s/s]"
+HELD = {
+    "mean_tilt_rad": "mean tilt of barbs at their hinges [rad]",
+    "largest_tilt_rad": "largest tilt of a barb at its hinge [rad]",
+    "over_limit_share": "motors at the limit or above [-]",
+    "greatest_torque_over_limit": "greatest torque over the limit [-]",
+    "deepest_m": "deepest overlap by the engine [m]",
+}
+"""How well Chrono's solver held what it should, see `benchmarks.chrono.records.constraints`; columns of runs."""
 KEYS = ("activity", "rules", "engine")
 QUANTITIES = {
     HEIGHT: ("h/h0 at rest", ".3f", 1.0),
@@ -54,7 +62,7 @@ def measured(case: Case, directory: Path) -> dict[str, Any]:
         HIGHEST: float(height.max()),
         **{name: row[name] for name in kept},
         COST: (run.wall_time or math.nan) / (run.end_time or math.nan),
-        DEEPEST: told.get("deepest_m", math.nan),
+        **{column: told.get(name, math.nan) for name, column in HELD.items()},
         "commit": run.versions["git"],
         "run": case.name,
     }

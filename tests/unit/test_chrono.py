@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from benchmarks.chrono import __main__ as bench
 from benchmarks.chrono import checks, figure
 from benchmarks.chrono.cases import INTERNAL, SHAPE, Case, common, planned, scene_data, scene_of
-from benchmarks.chrono.records import BARB, HEAD, LINK, Records, read_records, write_run
+from benchmarks.chrono.records import BARB, HEAD, LINK, Records, constraints, read_records, tilts, write_run
 from benchmarks.chrono.running import simulate
 from benchmarks.chrono.table import HIGHEST, QUANTITIES, markdown, measured, summary
 from benchmarks.chrono.task import PAPER, barb_inertia, of_smarticle, poses, sizes, words, written
@@ -188,6 +189,24 @@ def test_a_run_is_measured_by_the_measures_of_the_studies(pile: Path) -> None:
     assert (run.engine, run.status, run.versions["chrono"]) == ("chrono", "done", "test")
     assert [round(phase.end or 0, 6) for phase in run.phases] == pytest.approx(np.cumsum(SPAN).tolist())
     assert row["wall time per simulated time [s/s]"] == pytest.approx(100)
+
+
+def test_hinges_that_let_barbs_out_of_the_plane_are_told(found: Records) -> None:
+    scene, boxes = ready(), ready().particle.boxes
+    assert tilts(found.state(0, boxes)).max() < 1e-6
+    assert constraints(found, scene, 10)["largest_tilt_rad"] < 1e-6
+    turn = Rotation.from_rotvec([0.0, 0.3, 0.0])  # about the barbs, which point along y
+    last = int(np.flatnonzero(found.phase == 2)[0])
+    for barb in (0, 2):
+        links = found.links[last, 1, barb]
+        links[3:7] = (turn * Rotation.from_quat(links[[4, 5, 6, 3]])).as_quat()[[3, 0, 1, 2]]
+    assert tilts(found.state(last, boxes))[1] == pytest.approx([0.3, 0.3])
+    told = constraints(found, scene, 10)
+    looks = len(np.flatnonzero(found.phase == 2)[::10])
+    assert told["largest_tilt_rad"] == pytest.approx(0.3)
+    assert told["mean_tilt_rad"] == pytest.approx(0.3 / COUNT / looks, rel=1e-6)
+    assert told["greatest_torque_over_limit"] == pytest.approx(2e-6 / scene.torque_limit)
+    assert (told["over_limit_share"], told["deepest_m"]) == (0.0, 1e-6)
 
 
 def test_what_tells_most_comes_first() -> None:
