@@ -26,7 +26,7 @@ from benchmarks.chrono.checks import known_answers
 from benchmarks.chrono.records import constraints, write_run
 from benchmarks.chrono.running import simulate
 from benchmarks.chrono.table import markdown, measured, summary
-from benchmarks.chrono.task import PAPER, words
+from benchmarks.chrono.task import SETTINGS, words
 from dem.errors import InputError, RunError
 from dem.record.names import DONE
 
@@ -57,14 +57,14 @@ def run(case: Case, folder: Path, driver: Path) -> None:
         run_child(folder, case.name, scene_data(case, pile))
         return
     scene = scene_of(case, pile)
-    records = simulate(driver, folder, case.name, words(scene), case.count)
+    records = simulate(driver, folder, case.name, words(scene, SETTINGS[case.engine]), case.count)
     command = f"python -m benchmarks.chrono {' '.join(sys.argv[1:])}"
     write_run(
         records,
         scene,
         out,
         frame_every=round(FRAMES / SERIES),
-        time_step=PAPER.time_step,
+        time_step=SETTINGS[case.engine].time_step,
         version=VERSION,
         command=command,
     )
@@ -94,6 +94,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=None, help="folder (default: a new one); goes on if it exists")
     parser.add_argument("--count", type=int, default=100, help="smarticles (default: %(default)s)")
     parser.add_argument("--seeds", type=int, nargs="*", default=[1, 2, 3], help="piles for Chrono")
+    parser.add_argument("--warm-seeds", type=int, nargs="*", default=[], help="piles for Chrono with a warm solver")
     parser.add_argument("--links-seeds", type=int, nargs="*", default=[1, 2, 3], help="piles for links")
     parser.add_argument("--activities", nargs="+", choices=ACTIVITIES, default=list(ACTIVITIES))
     parser.add_argument("--check", action="store_true", help="known answers of the driver, and no pile")
@@ -103,6 +104,7 @@ def main() -> int:
     cases = [
         *planned("links", arguments.links_seeds, arguments.activities, arguments.count),
         *planned("chrono", arguments.seeds, arguments.activities, arguments.count),
+        *planned("chrono-warm", arguments.warm_seeds, arguments.activities, arguments.count),
     ]
     try:
         if arguments.check:

@@ -12,7 +12,7 @@ from benchmarks.child import run_child
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 
-Engine = Literal["chrono", "links"]
+Engine = Literal["chrono", "chrono-warm", "links"]
 
 RULES = ("code", "text")
 SHAPE, INTERNAL = "shape", "internal10"
@@ -41,7 +41,7 @@ class Case:
     """One simulation.
 
     Args:
-        engine: that computes it.
+        engine: that computes it; chrono-warm: Chrono whose solver begins where it ended in the step before.
         rules: protocol: motors' law, friction, and radius of the wall.
         activity: a key of `ACTIVITIES`.
         seed: of the pile.

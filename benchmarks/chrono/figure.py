@@ -34,7 +34,7 @@ def draw(path: Path, folder: Path, cases: Sequence[Case]) -> list[Path]:
     Returns:
         The files written.
     """
-    shown = [case for case in cases if case.activity in FIRST]
+    shown = [case for case in cases if case.activity in FIRST and case.engine in STYLES]
     with figures.style():
         figure = figures.blank_figure(2 * figures.COLUMN_WIDTH, HEIGHT)
         panels = figure.subplots(1, len(FIRST), sharey=True)

@@ -77,7 +77,7 @@ def summary(runs: pd.DataFrame) -> pd.DataFrame:
             mean = mean_over_seeds(group[name])
             row |= {name: mean.value, f"{name} SE": mean.standard_error if mean.count > 1 else math.nan}
         rows.append(row)
-    places = {name: place for place, name in enumerate([*ACTIVITIES, *RULES, "chrono", "links"])}
+    places = {name: place for place, name in enumerate([*ACTIVITIES, *RULES, "chrono", "chrono-warm", "links"])}
     table = pd.DataFrame(rows)
     return table.sort_values(list(KEYS), key=lambda column: column.map(places), ignore_index=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,8 @@ class Settings:
 
 
 PAPER = Settings()
+SETTINGS: Mapping[str, Settings] = MappingProxyType({"chrono": PAPER, "chrono-warm": Settings(warm_start=True)})
+"""By what `benchmarks.chrono.cases` calls an engine: the paper's, and the same with a solver that comes further."""
 
 
 def steps_of(seconds: float, settings: Settings) -> int:

@@ -20,7 +20,7 @@ from benchmarks.chrono.cases import INTERNAL, SHAPE, Case, common, planned, scen
 from benchmarks.chrono.records import BARB, HEAD, LINK, Records, constraints, read_records, tilts, write_run
 from benchmarks.chrono.running import simulate
 from benchmarks.chrono.table import HIGHEST, QUANTITIES, markdown, measured, summary
-from benchmarks.chrono.task import PAPER, barb_inertia, of_smarticle, poses, sizes, words, written
+from benchmarks.chrono.task import PAPER, SETTINGS, barb_inertia, of_smarticle, poses, sizes, words, written
 from dem.body.state import State
 from dem.errors import InputError, RunError
 from dem.record.manifest import read_run
@@ -103,6 +103,8 @@ def test_the_driver_is_told_the_paper_s_settings_and_both_rules(pile: Path) -> N
     assert [code[f"{name}_steps"][0] for name in ("slow", "settle", "rest")] == [500, 1500, 2500]
     assert code["steps"] == [1500 + 2500 + 15000 + 2500]
     assert code["look_steps"] == [25]
+    warm = words(scene_of(case(engine="chrono-warm"), pile), SETTINGS["chrono-warm"])
+    assert {name for name in warm if warm[name] != code[name]} == {"warm_start"}
 
 
 def test_links_have_the_smarticle_s_mass_and_the_full_boxes(pile: Path) -> None:
