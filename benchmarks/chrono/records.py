@@ -81,14 +81,17 @@ def read_records(path: Path, count: int) -> Records:
         count: smarticles.
 
     Raises:
-        InputError: There is no whole row, or rows are of another number of smarticles.
+        InputError: Rows are of another number of smarticles, or not at even times, as where two processes wrote them.
     """
     width = HEAD + count * (LINKS * LINK + BARBS * BARB + 1)
     values = np.fromfile(path, dtype=np.float64)
     rows = values[: len(values) // width * width].reshape(-1, width)
     steps = np.diff(rows[:, 0])
-    if not len(rows) or not np.isfinite(rows).all() or (steps <= 0).any() or np.ptp(steps, axis=0) > 1e-9:
-        msg = f"{path}: {len(values)} numbers are no rows of {width}, those of {count} smarticles; run it again"
+    if len(rows) < 2 or not np.isfinite(rows).all() or not np.allclose(steps, steps[0], rtol=1e-6) or steps[0] <= 0:
+        msg = (
+            f"{path}: {len(values)} numbers are no rows of {width}, those of {count} smarticles at even times; remove "
+            "it, and run it again"
+        )
         raise InputError(msg)
     links_end = HEAD + count * LINKS * LINK
     barbs_end = links_end + count * BARBS * BARB

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.chrono.records import Records, read_records
@@ -22,9 +24,30 @@ def simulate(driver: Path, folder: Path, name: str, told: Words, count: int) -> 
         count: smarticles.
 
     Raises:
-        InputError: There is no such program.
+        InputError: There is no such program, or another process is at it.
         RunError: It failed.
     """
+    with alone_at(folder / f"{name}.lock"):
+        return _simulate(driver, folder, name, told, count)
+
+
+@contextmanager
+def alone_at(lock: Path) -> Iterator[None]:
+    """Two processes that write the same records spoil them; the kernel lets go of a lock whose process ends.
+
+    Raises:
+        InputError: Another process holds it.
+    """
+    with lock.open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            msg = f"{lock.with_suffix('')}: another process simulates it; wait for it, or use another --out"
+            raise InputError(msg) from None
+        yield
+
+
+def _simulate(driver: Path, folder: Path, name: str, told: Words, count: int) -> Records:
     task, out, log = (folder / f"{name}.{suffix}" for suffix in ("txt", "bin", "log"))
     text = written(told)
     if not (out.exists() and task.exists() and task.read_text(encoding="utf-8") == text):

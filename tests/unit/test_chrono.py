@@ -18,7 +18,7 @@ from benchmarks.chrono import __main__ as bench
 from benchmarks.chrono import checks, figure
 from benchmarks.chrono.cases import INTERNAL, SHAPE, Case, common, planned, scene_data, scene_of
 from benchmarks.chrono.records import BARB, HEAD, LINK, Records, constraints, read_records, tilts, write_run
-from benchmarks.chrono.running import simulate
+from benchmarks.chrono.running import alone_at, simulate
 from benchmarks.chrono.table import HIGHEST, QUANTITIES, markdown, measured, summary
 from benchmarks.chrono.task import PAPER, SETTINGS, barb_inertia, of_smarticle, poses, sizes, words, written
 from dem.body.state import State
@@ -173,6 +173,10 @@ def test_records_are_read_in_the_driver_s_order_and_an_unfinished_row_is_left_ou
     assert found.barbs[-1, 2, 1].tolist() == pytest.approx([math.pi / 2, -2e-6, 2e-6, 0])
     with pytest.raises(InputError, match="those of 4 smarticles"):
         read_records(path, COUNT + 1)
+    table[50] = 0.0  # as where two processes wrote
+    table.tofile(path)
+    with pytest.raises(InputError, match="at even times; remove it"):
+        read_records(path, COUNT)
 
 
 def test_a_run_is_measured_by_the_measures_of_the_studies(pile: Path) -> None:
@@ -232,6 +236,14 @@ def test_what_was_simulated_is_not_simulated_again_unless_the_task_is_another(tm
     for told in ({"a": [1.0]}, {"a": [1.0]}, {"a": [2.0]}):
         simulate(driver, tmp_path, "some", told, COUNT)
     assert (tmp_path / "calls").read_text(encoding="utf-8").split() == ["ran", "ran"]
+
+
+def test_two_processes_do_not_write_the_same_records(tmp_path: Path) -> None:
+    with (
+        alone_at(tmp_path / "some.lock"),
+        pytest.raises(InputError, match="some: another process simulates it; wait"),
+    ):
+        simulate(tmp_path / "driver", tmp_path, "some", {"a": [1.0]}, COUNT)
 
 
 def test_a_driver_that_is_not_there_or_fails_is_told(tmp_path: Path) -> None:
