@@ -51,7 +51,7 @@ def text(found: Sequence[Claim]) -> str:
                 "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
             ]
         ours = (_told(tested) for tested in _all(claim))
-        verdict = f"**{claim.verdict}**" + (" (engines differ)" if "opposite" in claim.engines.values() else "")
+        verdict = f"**{claim.verdict}**" + (" (otherwise on YADE)" if "opposite" in claim.engines.values() else "")
         cells = (str(claim.number), claim.says, verdict, *ours, _rests(claim), claim.why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
@@ -68,8 +68,8 @@ def engines(found: Sequence[Claim]) -> str:
     alike = sum(how == "alike" for _, _, how in asked)
     return (
         f"Both engines were asked {len(asked)} findings of {len({number for number, _, _ in asked})} claims: {alike} "
-        f"verdicts are the same. Opposite: {which('opposite')}. Links alone resolves, by more runs: "
-        f"{which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
+        f"verdicts are the same. Opposite, for the reason told there: {which('opposite')}. Links alone resolves, by more "
+        f"runs: {which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
         "All others rest on one engine, as told."
     )
 
