@@ -68,8 +68,8 @@ def engines(found: Sequence[Claim]) -> str:
     alike = sum(how == "alike" for _, _, how in asked)
     return (
         f"Both engines were asked {len(asked)} findings of {len({number for number, _, _ in asked})} claims: {alike} "
-        f"verdicts are the same. Opposite, for the reason told there: {which('opposite')}. Links alone resolves, by more "
-        f"runs: {which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
+        f"verdicts are the same. Opposite, for the reason told there: {which('opposite')}. Links alone resolves, by "
+        f"more runs: {which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
         "All others rest on one engine, as told."
     )
 
