@@ -244,7 +244,7 @@ def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
         and whether it describes them.
 
     Example:
-        >>> parabola([0, 1, 2, 3], [0, 3, 4, 3], at=1.0).slope.value
+        >>> round(parabola([0, 1, 2, 3], [0, 3, 4, 3], at=1.0).slope.value, 9)
         2.0
     """
     across, up = np.asarray(x, dtype=np.float64) - at, np.asarray(y, dtype=np.float64)
