@@ -159,7 +159,11 @@ def test_debug_may_stand_before_and_after_the_command(words: list[str], smarticl
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_signals_stop_in_an_orderly_way(number: signal.Signals) -> None:
+def test_signals_stop_in_an_orderly_way(number: signal.Signals, request: pytest.FixtureRequest) -> None:
+    # Under nohup hanging up is ignored, and stays so.
+    if signal.getsignal(number) is signal.SIG_IGN:
+        request.addfinalizer(lambda: signal.signal(number, signal.SIG_IGN))
+        signal.signal(number, signal.SIG_DFL)
     before = signal.getsignal(number)
 
     def action() -> int:
