@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from benchmarks.child import run_child
+from dem.record.names import DONE
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 
@@ -93,7 +94,7 @@ def common(rules: str, seed: int, count: int) -> dict[str, Any]:
 def pour(folder: Path, rules: str, seed: int, count: int) -> Path:
     """A pile at rest by the friction and wall of a protocol, as a run directory; kept where it is there already."""
     name = f"pile-{rules}-{count}-{seed}"
-    if not (folder / name / "done.json").exists():
+    if not (folder / name / DONE).exists():
         phases = [{"type": "deposit", "per_layer": PER_LAYER}, {"type": "relax", "duration_s": 0.3}]
         fidelity = {"base": "standard", "diameter_m": POUR_DIAMETER}
         run_child(folder, name, {**common(rules, seed, count), "fidelity": fidelity, "phases": phases})

@@ -11,6 +11,8 @@ import pandas as pd
 
 from benchmarks.chrono.cases import ACTIVITIES, RULES, Case
 from dem.record.manifest import read_run
+from postprocess.report.markdown import table_lines
+from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.activity import ENERGY, HEIGHT, LOWEST, PHI_ACTIVE, SAMPLED, STRAIGHT, height_history, procedure_row
 from studies.base.procedures import CROSSINGS, PHI, STATIC
@@ -85,20 +87,10 @@ def summary(runs: pd.DataFrame) -> pd.DataFrame:
 def markdown(points: pd.DataFrame) -> str:
     """The table of `summary`, mean ± standard error; a single seed has none, and says so by its n."""
     heads = ["activity", "rules", "engine", "n", *(head for head, _, _ in QUANTITIES.values())]
-    lines = [_line(heads), _line(["---"] * len(heads))]
+    rows = []
     for row in points.to_dict("records"):
         cells = [str(row[key]) for key in KEYS] + [str(row["seeds"])]
         for name, (_, form, factor) in QUANTITIES.items():
-            cells.append(_cell(factor * row[name], factor * row[f"{name} SE"], form))
-        lines.append(_line(cells))
-    return "\n".join(lines) + "\n"
-
-
-def _cell(value: float, error: float, form: str) -> str:
-    if math.isnan(value):
-        return "–"
-    return f"{value:{form}}" if math.isnan(error) else f"{value:{form}} ± {error:{form}}"
-
-
-def _line(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+            cells.append(told_number(factor * row[name], form, factor * row[f"{name} SE"]))
+        rows.append(cells)
+    return "\n".join(table_lines(heads, rows)) + "\n"

@@ -110,10 +110,11 @@ def refuse_unlike(found: Collected) -> None:
         lambda run: f"{run.row[PROCEDURE]} for {run.row[ACTIVE]:.3g} s",
         within=lambda run: str(run.row[PROCEDURE]),
     )
-    found.refuse_repeats("point", _named_point)
+    found.refuse_repeats("point", named_point)
 
 
-def _named_point(run: MeasuredRun) -> str:
+def named_point(run: MeasuredRun) -> str:
+    """`internal θ 10° l/w 0.7`: a run's procedure, with θ where barbs oscillate, and aspect ratio."""
     row = run.row
     theta = f" θ {row[THETA]:g}°" if row[PROCEDURE] == INTERNAL else ""
     return f"{row[PROCEDURE]}{theta} l/w {row[ASPECT]:g}"

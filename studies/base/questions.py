@@ -46,17 +46,19 @@ def questions_table(judged: Sequence[Question]) -> pd.DataFrame:
 
 
 class QuestionStudy(Study[Question]):
-    """A study that answers questions: it writes `answers.csv`, and tells each with its answer below the table.
+    """A study that answers questions: it writes them as a table, and tells each with its answer below that of points.
 
     Attributes:
+        answers_name: Of the table of questions, without suffix.
         about_numbers: What the numbers of the table for the terminal are; empty if its header says so.
     """
 
+    answers_name = "answers"
     about_numbers = ""
 
     def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`answers.csv`."""
-        return {"answers": questions_table(judged)}
+        """One row per question."""
+        return {self.answers_name: questions_table(judged)}
 
     def told(self, analysis: Analysis[Question]) -> Sequence[str]:
         """What the numbers are, and questions with their answers."""

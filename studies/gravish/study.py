@@ -29,7 +29,7 @@ from studies.base.engines import (
     of_engine,
     told_engines,
 )
-from studies.base.questions import Question, QuestionStudy, questions_table
+from studies.base.questions import Question, QuestionStudy
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
@@ -62,6 +62,7 @@ class Gravish(QuestionStudy):
 
     name = "gravish"
     text_name = "deviations.md"
+    answers_name = "verdicts"
     one_engine = False
 
     def __init__(self, definitions: Sequence[str] = tuple(DEFINITIONS)) -> None:
@@ -106,10 +107,6 @@ class Gravish(QuestionStudy):
     def judge(self, tables: Tables) -> tuple[Question, ...]:
         """Answers to the study's questions, by the engine that judges."""
         return answers(*(judging(tables[name]) for name in ("runs", "summary", "deviations", "steps")))
-
-    def judged_tables(self, judged: tuple[Question, ...]) -> Tables:
-        """`verdicts.csv`."""
-        return {"verdicts": questions_table(judged)}
 
     def reference_of(self, tables: Tables) -> Reference:
         """Gravish's packing fractions."""

@@ -175,8 +175,7 @@ def _tougher(table: pd.DataFrame) -> Finding:
 
 
 def _goes_with_crossings(runs: pd.DataFrame) -> Finding:
-    blocks = [f"{upper} {aspect} {seed}" for upper, aspect, seed in runs[[UPPER, ASPECT, SEED]].to_numpy()]
-    ours, verdict = _against_crossings(runs, blocks)
+    ours, verdict = _against_crossings(runs)
     return Finding(
         paper="Tensile strength and number of entanglements are connected",
         ours=ours,
@@ -190,8 +189,8 @@ def _over_amplitude(runs: pd.DataFrame) -> Finding:
     several = internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1
     part = internal[several]
     thetas = " ".join(f"{theta:g}" for theta in sorted(part[THETA].unique()))
-    ours, verdict = _against_crossings(part, [f"{upper} {seed}" for upper, seed in part[[UPPER, SEED]].to_numpy()])
-    strength, links = (slope_within(part[THETA], part[quantity], part[SEED]) for quantity in (PEAK, CROSSINGS))
+    ours, verdict = _against_crossings(part)
+    strength, links = (slope_within(part[THETA], part[quantity], _blocks(part)) for quantity in (PEAK, CROSSINGS))
     beside = f"against θ: peak {told(strength, 3, ' per degree')}, ⟨N⟩ {told(links, 3, ' per degree')}"
     return Finding(
         paper="Internal oscillation: over θ, the peak force goes with ⟨N⟩",
@@ -201,8 +200,13 @@ def _over_amplitude(runs: pd.DataFrame) -> Finding:
     )
 
 
-def _against_crossings(part: pd.DataFrame, blocks: Sequence[str]) -> tuple[str, Verdict]:
-    slope = slope_within(part[CROSSINGS], part[PEAK], blocks)
+def _blocks(part: pd.DataFrame) -> list[str]:
+    """Height, l/w and seed of each run: what begins with one pile."""
+    return [f"{upper} {aspect} {seed}" for upper, aspect, seed in part[[UPPER, ASPECT, SEED]].to_numpy()]
+
+
+def _against_crossings(part: pd.DataFrame) -> tuple[str, Verdict]:
+    slope = slope_within(part[CROSSINGS], part[PEAK], _blocks(part))
     verdict = judge(slope)
     if verdict in ("found", "not found") and part[HELD_FAST].any():
         verdict = "not resolved"

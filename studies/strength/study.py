@@ -22,7 +22,7 @@ from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
 from studies.base.engines import judging, tables_of, told_by_engine, told_engines
 from studies.base.paper import PaperStudy
-from studies.base.procedures import ACTIVE, CROSSINGS, PROCEDURE, STATIC, THETA
+from studies.base.procedures import ACTIVE, CROSSINGS, PROCEDURE, STATIC, THETA, named_point
 from studies.base.release import in_order, means
 from studies.base.runs import Collected, MeasuredRun, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
@@ -100,12 +100,7 @@ class Strength(PaperStudy):
 
     def refuse(self, found: Collected) -> None:
         """A point and seed twice, other numbers of smarticles, other durations of an activity."""
-        found.refuse_repeats(
-            "point",
-            lambda run: (
-                f"{run.row[PROCEDURE]} θ {run.row[THETA]:g}° l/w {run.row[ASPECT]:g}, hook at {run.row[UPPER]:g} m"
-            ),
-        )
+        found.refuse_repeats("point", lambda run: f"{named_point(run)}, hook at {run.row[UPPER]:g} m")
         found.refuse_mixed_counts()
         found.refuse_mixture(
             "duration",
