@@ -56,8 +56,8 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
     points: list[Point] = []
     assigned = list(_assignments(sweep))
     again = _again(sweep, assigned)
-    if count + len(again) > max_points:
-        raise _too_many(sweep, count + len(again), max_points)
+    if len(assigned) + len(again) > max_points:
+        raise _too_many(sweep, len(assigned) + len(again), max_points)
     for index, values in enumerate([*assigned, *again]):
         name = _run_name(sweep, values)
         data = render_yaml(sweep.template_text, values, str(sweep.template))
@@ -83,7 +83,7 @@ def _too_many(sweep: Sweep, count: int, max_points: int) -> InputError:
 
 
 def _count(sweep: Sweep) -> int:
-    """How many points there will be, without making them."""
+    """How many points there will be, without making them; those with more seeds and those once more apart."""
     points, repeats = sweep.content.points, sweep.content.repeats
     lengths = [
         len(sweep.table) or 1,
@@ -119,10 +119,15 @@ def _repeated(sweep: Sweep, assigned: Sequence[dict[str, Value]]) -> Iterator[di
     repeats = sweep.content.repeats
     if repeats is None:
         yield from assigned
-    elif repeats.seed_by_seed:
+        return
+    more = repeats.more
+    chosen = _chosen(sweep, assigned, "repeats.more", more.only) if more else []
+    if repeats.seed_by_seed:
         yield from ({**values, SEED: seed} for seed in repeats.seeds for values in assigned)
     else:
         yield from ({**values, SEED: seed} for values in assigned for seed in repeats.seeds)
+    if more:
+        yield from ({**values, SEED: seed} for seed in more.seeds for values in chosen)
 
 
 def _joined(sources: Iterable[Sequence[Mapping[str, Value]]]) -> Iterator[dict[str, Value]]:
@@ -149,9 +154,27 @@ def _again(sweep: Sweep, points: Sequence[Mapping[str, Value]]) -> list[dict[str
     again = sweep.content.again
     if again is None:
         return []
+    chosen = _chosen(sweep, points, "again", again.only)
+    return [_derived(sweep, {**point, **again.constants}) for point in chosen]
+
+
+def _chosen(
+    sweep: Sweep, points: Sequence[Mapping[str, Value]], key: str, only: Mapping[str, Sequence[Value]]
+) -> list[Mapping[str, Value]]:
+    """The points whose variables hold one of the values wanted.
+
+    Args:
+        sweep: the sweep.
+        points: values of all variables, point by point.
+        key: part of the sweep file that chooses.
+        only: values wanted, by variable.
+
+    Raises:
+        InputError: a variable is unknown, or no point has one of its values, or all of them.
+    """
     chosen = list(points)
-    for name, wanted in again.only.items():
-        where = f"{sweep.path}: again.only.{name}"
+    for name, wanted in only.items():
+        where = f"{sweep.path}: {key}.only.{name}"
         if name not in points[0]:
             msg = f"{where}: no such variable; {nearest(name, sorted(points[0]))}"
             raise InputError(msg)
@@ -162,9 +185,9 @@ def _again(sweep: Sweep, points: Sequence[Mapping[str, Value]]) -> list[dict[str
                 raise InputError(msg)
         chosen = [point for point in chosen if point[name] in wanted]
     if not chosen:
-        msg = f"{sweep.path}: again.only: keeps no point; give fewer conditions"
+        msg = f"{sweep.path}: {key}.only: keeps no point; give fewer conditions"
         raise InputError(msg)
-    return [_derived(sweep, {**point, **again.constants}) for point in chosen]
+    return chosen
 
 
 def _refuse_shared(sweep: Sweep, names: Mapping[str, set[str]]) -> None:

@@ -13,6 +13,7 @@ points:                             # any of these; several are crossed with eac
 derived: {half: "(count / 2) | round | int"}                # expressions, in order
 repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
                                     # `seed_by_seed: true` beside it: all points with the first seed come first
+                                    # `more: {seeds: [4, 5], only: {friction: [0.2]}}`: more seeds of some points, after these
 again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
 """
 
@@ -22,9 +23,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest, shown
 from dem.refusal import refusals
@@ -97,23 +98,43 @@ class Points(Strict):
         return self
 
 
+def _once_each(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(seeds)) != len(seeds):
+        msg = f"a seed is given twice: got {list(seeds)}"
+        raise ValueError(msg)
+    return seeds
+
+
+Seeds = Annotated[tuple[int, ...], AfterValidator(_once_each)]
+
+
+class MoreSeeds(Strict):
+    """Further seeds of some points, where an answer asks for them; after those that all points have."""
+
+    seeds: Seeds = Field(min_length=1, description="seeds beside those of all points, one run each")
+    only: dict[str, list[Value]] = Field(
+        min_length=1, description="the points whose variable holds one of these values"
+    )
+
+
 class Repeats(Strict):
     """The same point with other random numbers."""
 
-    seeds: tuple[int, ...] = Field(min_length=1, description="seeds of the scene, one run each")
+    seeds: Seeds = Field(min_length=1, description="seeds of the scene, one run each")
     seed_by_seed: bool = Field(
         default=False,
         description="start every point with the first seed before any with the second, so that what is there when the "
         "sweep is interrupted covers all points",
     )
+    more: MoreSeeds | None = None
 
-    @field_validator("seeds")
-    @classmethod
-    def _unique(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        if len(set(seeds)) != len(seeds):
-            msg = f"a seed is given twice: got {list(seeds)}"
+    @model_validator(mode="after")
+    def _others(self) -> Repeats:
+        shared = [seed for seed in self.more.seeds if seed in self.seeds] if self.more else []
+        if shared:
+            msg = f"more.seeds: {shared[0]} is one of `seeds` already; leave it out of one of them"
             raise ValueError(msg)
-        return seeds
+        return self
 
 
 class Again(Strict):

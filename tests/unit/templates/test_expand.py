@@ -112,6 +112,47 @@ def test_what_comes_again_must_be_known(write_sweep: WriteSweep, old: str, new: 
         points(AGAIN.replace(old, new), write_sweep, scene=ENGINE_SCENE)
 
 
+MORE = """\
+schema_version: 1
+name: test
+template: scene.yaml.j2
+run_name: "n{{ count }}_seed{{ seed }}"
+points:
+  grid: {count: [10, 20, 30]}
+repeats: {seeds: [1, 2], seed_by_seed: true, more: {seeds: [7, 3], only: {count: [30, 10]}}}
+"""
+
+
+@pytest.mark.parametrize("seed_by_seed", [True, False])
+def test_some_points_have_more_seeds_after_those_of_all(write_sweep: WriteSweep, *, seed_by_seed: bool) -> None:
+    found = points(MORE if seed_by_seed else MORE.replace("seed_by_seed: true, ", ""), write_sweep)
+    assert sorted(point.name for point in found[:6]) == sorted(f"n{n}_seed{s}" for n in (10, 20, 30) for s in (1, 2))
+    assert [point.name for point in found[6:]] == ["n10_seed7", "n30_seed7", "n10_seed3", "n30_seed3"]
+    assert [(point.scene.seed, point.scene.count) for point in found[6:]] == [(7, 10), (7, 30), (3, 10), (3, 30)]
+    assert not any(point.again for point in found)
+
+
+def test_more_seeds_count(write_sweep: WriteSweep) -> None:
+    assert len(expand(load_sweep(write_sweep(MORE)), max_points=10)) == 10
+    with pytest.raises(InputError, match="10 runs, more than 9"):
+        expand(load_sweep(write_sweep(MORE)), max_points=9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("only: {count: [30, 10]}", "only: {cuont: [30]}", r"repeats.more.only.cuont: no such variable; did you mean"),
+        ("only: {count: [30, 10]}", "only: {count: [31]}", "repeats.more.only.count: no point has 31; there are 10,"),
+        ("seeds: [7, 3]", "seeds: [7, 2]", "more.seeds: 2 is one of `seeds` already"),
+        ("seeds: [7, 3]", "seeds: [7, 7]", "a seed is given twice"),
+        (", only: {count: [30, 10]}", "", "repeats.more.only: missing"),
+    ],
+)
+def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        points(MORE.replace(old, new), write_sweep)
+
+
 def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:
     found = points(
         sweep_with("{zip: {count: [10, 20], seed_: [3, 4]}}").replace("{{ seed }}", "{{ seed_ }}"),
