@@ -30,6 +30,7 @@ STUDIES: Mapping[str, Shipped] = MappingProxyType(
         for study in (
             gravish.SHIPPED,
             friction.SHIPPED,
+            friction.CONTACTS,
             friction.COMPACTION,
             sensitivity.SHIPPED,
             sensitivity.SECTION,

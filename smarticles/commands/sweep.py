@@ -32,6 +32,7 @@ A sweep file makes many scenes from one template:
     table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file
   derived: {half: "(count / 2) | round | int"}
   repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
+                                      # more: {seeds: [4], only: {friction: [0.2]}} gives some points more
   again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}
                                       # some of these runs once more, last, with other constants
 

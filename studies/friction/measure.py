@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
-from postprocess.scene_file import read_scene
+from postprocess.scene_file import Settings, read_scene
 from postprocess.statistics.columns import ASPECT
 from studies.base.figures import History
 from studies.base.runs import DEFINITION, Collected, MeasuredRun
@@ -55,8 +55,21 @@ def friction_run(run: RunManifest) -> MeasuredRun:
         InputError: It was not shaken after another phase, its walls have another friction than its smarticles, or it
             cannot be read.
     """
+    return shaken_run(run, {FRICTION: _friction(run)})
+
+
+def shaken_run(run: RunManifest, known: Mapping[str, object]) -> MeasuredRun:
+    """φ by stage and in the course of shaking, and its history.
+
+    Args:
+        run: A finished run.
+        known: Further columns of its row.
+
+    Raises:
+        InputError: It was not shaken after another phase, or cannot be read.
+    """
     history = packing_history(run)
-    row = {FRICTION: _friction(run), **measured_row(run, [DEFINITION])}
+    row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:
         if time <= history.active + 1e-6:
             row[column(at_time(time))] = _around(history, time)
@@ -91,12 +104,26 @@ def refuse_repeats(found: Collected) -> None:
     found.refuse_repeats("point", lambda run: f"l/w {run.manifest.aspect_ratio:g} friction {run.row[FRICTION]:g}")
 
 
-def _friction(run: RunManifest) -> float:
-    """The one coefficient of friction of a run [-]."""
+def contact_of(run: RunManifest, study: str) -> Settings:
+    """What the scene of a run says of its contacts.
+
+    Args:
+        run: The run.
+        study: Whose runs say it.
+
+    Raises:
+        InputError: It says nothing.
+    """
     contact = read_scene(run.directory).part("contact")
     if contact is None:
-        msg = f"{run.directory}: scene.yaml tells no contact; give runs of the study friction"
+        msg = f"{run.directory}: scene.yaml tells no contact; give runs of the study {study}"
         raise InputError(msg)
+    return contact
+
+
+def _friction(run: RunManifest) -> float:
+    """The one coefficient of friction of a run [-]."""
+    contact = contact_of(run, "friction")
     between, wall = contact.number("friction_smarticle"), contact.number("friction_wall")
     if between != wall:
         msg = (

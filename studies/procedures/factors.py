@@ -18,15 +18,16 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from postprocess.scene_file import read_scene
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.factorial import paired_differences
 from postprocess.statistics.findings import Finding, judge, negative, told
 from postprocess.statistics.points import averaged, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
+from studies.base.combinations import draw_combinations
 from studies.base.paper import PaperStudy
 from studies.base.procedures import CROSSINGS, PROCEDURE, SHAPE
 from studies.base.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
-from studies.procedures import factor_figures
 
 LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
 FACTORS: Mapping[str, tuple[object, object]] = MappingProxyType(
@@ -50,6 +51,7 @@ _CALLED = {
     RADIUS: "the wall's radius (22.4 mm, for 23.4)",
 }
 _SYMBOLS = {CROSSINGS: "⟨N⟩", HEIGHT: "h/h0", PHI_ACTIVE: "φ_f", ENERGY: "energy per smarticle [J]"}
+_DRAWN = {CROSSINGS: r"$\langle N \rangle$ after the shape change [-]", HEIGHT: r"height over $h_0$ after it [-]"}
 _SIGNS = {CROSSINGS: 1, HEIGHT: 1, PHI_ACTIVE: -1, ENERGY: 1}
 
 
@@ -127,23 +129,30 @@ class Factors(PaperStudy):
 
     def draw(self, output: Path, analysis: Analysis[Finding], footer: Sequence[str]) -> Sequence[Path]:
         """⟨N⟩ and height of every combination."""
-        return factor_figures.draw(output, points=analysis.tables["points"], factors=FACTORS, footer=footer)
+        return draw_combinations(
+            output / "factors",
+            points=analysis.tables["points"],
+            factors=FACTORS,
+            shown=_DRAWN,
+            named=_named,
+            footer=footer,
+        )
 
 
-def effects(runs: pd.DataFrame, quantity: str, factor: str) -> pd.Series:
+def effects(runs: pd.DataFrame, quantity: str, factor: str) -> pd.DataFrame:
     """Paired differences of a quantity, by the code's rule less by the text's, all else alike."""
     others = [name for name in (*FACTORS, ASPECT, SEED) if name != factor]
-    wide = runs.pivot_table(index=others, columns=factor, values=quantity)
-    by_text, by_code = FACTORS[factor]
-    if by_text not in wide or by_code not in wide:
-        return pd.Series(dtype=float)
-    return (wide[by_code] - wide[by_text]).dropna()
+    return paired_differences(runs, quantity, factor, FACTORS[factor], others)
+
+
+def _named(row: pd.Series) -> str:
+    return f"{row[LAW]}, μ = {row[FRICTION]:g}, r = {1e3 * row[RADIUS]:.1f} mm"
 
 
 def _effect(runs: pd.DataFrame, quantity: str, factor: str) -> Finding:
     differences = effects(runs, quantity, factor)
-    effect, sign, symbol = mean_over_seeds(differences), _SIGNS[quantity], _SYMBOLS[quantity]
-    by_aspect = differences.groupby(level=ASPECT).mean() if len(differences) else {}
+    effect, sign, symbol = mean_over_seeds(differences[quantity]), _SIGNS[quantity], _SYMBOLS[quantity]
+    by_aspect = differences.groupby(ASPECT)[quantity].mean()
     places = ", ".join(f"{aspect:g}: {value:+.3g}" for aspect, value in by_aspect.items()) or "none"
     return Finding(
         paper=f"(ours) {symbol} after a shape change is {'raised' if sign > 0 else 'lowered'} by {_CALLED[factor]}",

@@ -13,7 +13,7 @@ points:                             # any of these; several are crossed with eac
 derived: {half: "(count / 2) | round | int"}                # expressions, in order
 repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
                                     # `seed_by_seed: true` beside it: all points with the first seed come first
-                                    # `more: {seeds: [4, 5], only: {friction: [0.2]}}`: more seeds of some points, after these
+                                    # `more: {seeds: [4], only: {friction: [0.2]}}`: more of some points, afterwards
 again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
 """
 

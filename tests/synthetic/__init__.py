@@ -32,7 +32,8 @@ class SyntheticRun:
 
     `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
     a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
-    `wall_s` [s]; `more` are constant series: name, value. The scene tells of contact where there is a `friction`.
+    `wall_s` [s]; `more` are constant series: name, value. The scene tells of contact where there is a `friction`, which
+    is that of walls too unless these have their own.
     """
 
     aspect_ratio: float = 0.7
@@ -53,6 +54,8 @@ class SyntheticRun:
     wall_s: float = 1.0
     more: tuple[tuple[str, float], ...] = ()
     friction: float | None = None
+    friction_wall: float | None = None
+    restitution: float = 0.7
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -219,7 +222,9 @@ def _write_scene(directory: Path, run: SyntheticRun) -> None:
     phases = [{"type": kind, **settings.get(kind, {"duration_s": run.durations[kind]})} for kind in run.phases]
     scene: dict[str, Any] = {"schema_version": 1, "phases": phases}
     if run.friction is not None:
-        scene["contact"] = {"friction_smarticle": run.friction, "friction_wall": run.friction}
+        wall = run.friction if run.friction_wall is None else run.friction_wall
+        contact = {"friction_smarticle": run.friction, "friction_wall": wall, "restitution": run.restitution}
+        scene["contact"] = contact
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
 
 

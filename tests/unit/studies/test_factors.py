@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,6 @@ from PIL import Image
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE
 from studies.base.procedures import CROSSINGS
-from studies.procedures import factor_figures
 from studies.procedures.factors import FACTORS, FRICTION, LAW, QUANTITIES, RADIUS, Factors, effects
 
 SCATTER = {CROSSINGS: 0.1, HEIGHT: 0.01, PHI_ACTIVE: 0.001, ENERGY: 1e-6}
@@ -36,7 +37,7 @@ def runs(**put_in: dict[str, float]) -> pd.DataFrame:
 def test_an_effect_is_that_put_in_and_others_stay_out_of_it() -> None:
     table = runs(**{CROSSINGS: {LAW: 2.0, FRICTION: 1.0}})
     for factor, size in ((LAW, 2.0), (FRICTION, 1.0), (RADIUS, 0.0)):
-        differences = effects(table, CROSSINGS, factor)
+        differences = effects(table, CROSSINGS, factor)[CROSSINGS]
         assert len(differences) == 64
         # Four standard errors of a mean of 64 differences of two.
         assert differences.mean() == pytest.approx(size, abs=4 * 0.1 * np.sqrt(2 / 64))
@@ -74,7 +75,8 @@ def test_the_figure_names_every_combination(tmp_path: Path) -> None:
             head, unit = quantity.rsplit(" [", 1)
             row |= {quantity: group[quantity].mean(), f"{head} 95 % [{unit}": 2 * group[quantity].sem()}
         rows.append(row)
-    files = factor_figures.draw(tmp_path, points=pd.DataFrame(rows), factors=FACTORS, footer=["Footer."])
+    analysis: Any = SimpleNamespace(tables={"points": pd.DataFrame(rows)})
+    files = Factors().draw(tmp_path, analysis, ["Footer."])
     svg = next(path for path in files if path.suffix == ".svg").read_text(encoding="utf-8")
     for law, friction, radius in product(*FACTORS.values()):
         assert f"{law}, μ = {friction:g}, r = {1e3 * radius:.1f} mm" in svg
