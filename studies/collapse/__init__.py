@@ -24,6 +24,6 @@ SHIPPED = Shipped(
     pictured={"l_over_w": 0.4, "gamma": 2.5},
     about="""\
 free-standing columns of U-shapes on a vibrating floor at Γ = 2 to 4: collapse times, and Δ of
-τ = (1/f) exp(Δ/Γ) against l/w, compared with Gravish et al. (PRL 108, 208001). 72 runs, seed by seed;
+τ = (1/f) exp(Δ/Γ) against l/w, compared with Gravish et al. (PRL 108, 208001). 192 runs, seed by seed;
 columns that stand to the end give bounds. --quick takes minutes: lower and narrower columns.""",
 )

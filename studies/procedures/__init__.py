@@ -44,7 +44,7 @@ SHIPPED = Shipped(
     about="""\
 shape change, external and internal oscillation of smarticles of several l/w, the latter with several
 amplitudes θ too, against the findings of Savoie et al. (Soft Matter 2023): packing fraction, entanglement,
-energy, height. 302 runs at the paper's eight l/w and counts, seed by seed, so that what is finished covers all
+energy, height. 326 runs at the paper's eight l/w and counts, seed by seed, so that what is finished covers all
 points; θ that the hinge cannot reach at a small l/w are left out. --quick takes minutes.""",
 )
 

@@ -294,7 +294,7 @@ def test_the_study_of_procedures_is_analysed(
     said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 36 runs instead of 302; ")
+    assert lines[0].startswith("not the full study: 36 runs instead of 326; ")
     assert lines[1].split()[:10] == ["engine", "procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again"]
     assert [line.split()[1] for line in lines[2:14]] == (
         ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3

@@ -385,8 +385,8 @@ def test_runs_that_cannot_be_averaged_are_refused(study, tmp_path, changes, mess
 
 def test_the_study_varies_friction_alone_and_at_the_papers_it_is_that_of_gravish():
     found = expand(load_sweep(study_file("friction")))
-    assert len(found) == 3 * 6 * 4
-    assert [point.scene.seed for point in found] == [seed for seed in (1, 2, 3, 4) for _ in range(18)]
+    assert len(found) == 3 * 6 * 8
+    assert [point.scene.seed for point in found] == [seed for seed in range(1, 9) for _ in range(18)]
     twins = {
         (point.scene.smarticle.aspect_ratio, point.scene.seed): point.scene
         for point in expand(load_sweep(study_file("gravish")))
