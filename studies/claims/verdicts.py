@@ -17,7 +17,7 @@ import pandas as pd
 import yaml
 
 from dem.errors import InputError
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 
@@ -229,9 +229,19 @@ def _basis(folder: Path) -> str:
     parts = [f"{_span(runs[_COUNT])} smarticles"]
     if ASPECT in runs:
         parts.append(f"l/w {_span(runs[ASPECT])}")
-    seeds = runs[SEED].nunique()
-    parts += [f"{seeds} seed{'' if seeds == 1 else 's'}", " and ".join(engines)]
+    seeds = _seeds(folder, runs)
+    parts += [f"{seeds} seed{'' if seeds == '1' else 's'}", " and ".join(engines)]
     return ", ".join(parts)
+
+
+def _seeds(folder: Path, runs: pd.DataFrame) -> str:
+    """From the point with the fewest to that with the most; how many there are at all where no table of points tells."""
+    for name in ("points.csv", "summary.csv"):
+        if (folder / name).is_file():
+            points = pd.read_csv(folder / name, comment="#")
+            if SEEDS in points:
+                return _span(points[SEEDS])
+    return str(runs[SEED].nunique())
 
 
 def _span(values: pd.Series) -> str:

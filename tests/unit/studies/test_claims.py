@@ -57,6 +57,17 @@ def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
     assert {claim.verdict for claim in found} == {"reproduced", "not testable"}
 
 
+def test_seeds_are_told_from_the_point_with_the_fewest_to_that_with_the_most(tmp_path: Path) -> None:
+    folder = written(tmp_path, {})
+    (folder / "procedures" / "points.csv").write_text("point,seeds [-]\na,16\nb,8\n# Study\n")
+    (folder / "procedures-code" / "points.csv").write_text("point,seeds [-]\na,1\n# Study\n")
+    most = one_of(claims(folder), "shape change entangles most")
+    assert most.text is not None
+    assert most.code is not None
+    assert most.text.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 8 – 16 seeds, links"
+    assert most.code.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 1 seed, links"
+
+
 HIGHEST = "⟨N⟩ is highest for shape change"
 
 
