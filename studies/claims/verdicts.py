@@ -235,7 +235,7 @@ def _basis(folder: Path) -> str:
 
 
 def _seeds(folder: Path, runs: pd.DataFrame) -> str:
-    """From the point with the fewest to that with the most; how many there are at all where no table of points tells."""
+    """From the point with the fewest to that with the most; how many in all where no table tells of points."""
     for name in ("points.csv", "summary.csv"):
         if (folder / name).is_file():
             points = pd.read_csv(folder / name, comment="#")
