@@ -27,11 +27,10 @@ demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 mi
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)
 
-PAPER := procedures procedures-code procedures-code-yade factors melting melting-code casting casting-code fracture fracture-code strength strength-code collapse chain chain-bodies friction contacts compaction landscape finite-size
+PAPER := gravish procedures procedures-code procedures-code-yade factors melting melting-code casting casting-code fracture fracture-code strength strength-code collapse chain chain-bodies friction contacts compaction landscape finite-size
 
 paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (days; goes on where it was stopped)
 	for study in $(PAPER); do $(BIN)/smarticles study $$study --out out/paper/$$study || exit 1; done
-	$(BIN)/smarticles study gravish --out out/paper/gravish-links
 	$(BIN)/python -m studies.claims out/paper
 
 claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, from the tables in results/ (seconds)

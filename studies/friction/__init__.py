@@ -14,11 +14,9 @@ if TYPE_CHECKING:
 
 
 def _load(*, quick: bool) -> Friction:
-    from studies.friction.scatter import AT_THE_PAPERS  # noqa: PLC0415  (pandas)
     from studies.friction.study import Friction  # noqa: PLC0415  (pandas, matplotlib)
 
-    # Fewer smarticles scatter more than those runs did.
-    return Friction({} if quick else AT_THE_PAPERS)
+    return Friction()
 
 
 def _load_compaction(*, quick: bool) -> Compaction:

@@ -7,7 +7,7 @@ have the same friction, static and sliding alike. How errors come about is in `s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +16,6 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
-from postprocess.statistics.seeds import Scatter
 from studies.base.questions import Question, QuestionStudy, questions_lines
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
@@ -51,17 +50,10 @@ from studies.friction.tables import (
 
 
 class Friction(QuestionStudy):
-    """Runs that were poured and shaken, at several coefficients of friction.
-
-    Args:
-        known: Relative scatter of each stage that is known beforehand, see `scatter.scatters`.
-    """
+    """Runs that were poured and shaken, at several coefficients of friction."""
 
     name = "friction"
     text_name = "friction.md"
-
-    def __init__(self, known: Mapping[str, Scatter]) -> None:
-        self.known = known
 
     def measure(self, run: RunManifest) -> MeasuredRun:
         """φ before, in the course of, at the end of and after shaking."""
@@ -74,7 +66,7 @@ class Friction(QuestionStudy):
     def tabulate(self, found: Collected) -> Tables:
         """Runs, means, the friction that each curve asks for, how near each friction comes, and growth."""
         runs = runs_table(found).sort_values([ASPECT, FRICTION, SEED], ignore_index=True, kind="stable")
-        scatter = scatters(runs, self.known)
+        scatter = scatters(runs)
         means = points(runs, read_reference(), scatter)
         found_curves = curves(means, scatter)
         return {
@@ -107,13 +99,12 @@ class Friction(QuestionStudy):
         ratios, frictions = (
             " ".join(f"{value:g}" for value in sorted(runs[name].unique())) for name in (ASPECT, FRICTION)
         )
-        beforehand = ", those of 24 runs at μ = 0.4 (results/gravish-links) among them" if self.known else ""
         return (
             f"l/w {ratios}, μ {frictions}, {told_seeds(runs, counts, 'point')}; shaken for {told_shaken(runs)} "
             f"(Gravish: {SHAKE_TIME:g} s).",
             f"φ by {DEFINITION}; {WHEN}; in the course of shaking a mean over {WINDOW:g} s.",
             "Error bars: 95 % confidence of the mean over seeds, Student's t; scatter relative to the mean, pooled "
-            f"over all points of a stage{beforehand}.",
+            "over all points of a stage.",
         )
 
     def text(self, analysis: Analysis[Question]) -> Sequence[str]:

@@ -104,7 +104,7 @@ def test_every_folder_of_results_is_told_in_one_line(site: Path) -> None:
     folders = [folder.name for folder in RESULTS.iterdir() if folder.is_dir()]
     assert len(folders) > 10
     for folder in folders:
-        # Not as the beginning of another's name: gravish of gravish-links.
+        # Not as the beginning of another's name: gravish of gravish-yade.
         assert re.search(rf"results/{re.escape(folder)}(?![\w-])", text), (
             f"results/{folder}/README.md: begin with '# …' and '> the finding, with its numbers'"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -53,7 +54,9 @@ SEED_NOISE = 0.004  # of what all combinations of a seed share: their poses
 LEVELS = {PHI_0: 0.11, PHI_F: 0.15, PHI_RELAXED: 0.16, CROSSED: 6.0, RISEN: -0.1}
 
 
-def runs(together: float = 0.0, noise: float = NOISE, **put_in: dict[str, float]) -> pd.DataFrame:
+def runs(
+    put_in: Mapping[str, Mapping[str, float]] | None = None, *, together: float = 0.0, noise: float = NOISE
+) -> pd.DataFrame:
     """A full factorial of eight seeds; `put_in` says by how much each factor's second level changes a quantity."""
     generator, rows = np.random.default_rng(3), []
     shared = {(ratio, seed): SEED_NOISE * generator.standard_normal() for ratio in RATIOS for seed in range(1, 9)}
@@ -62,7 +65,7 @@ def runs(together: float = 0.0, noise: float = NOISE, **put_in: dict[str, float]
         for quantity, level in LEVELS.items():
             value = level - 0.02 * ratio + shared[ratio, seed] + noise * generator.standard_normal()
             changed = {name: row[name] == FACTORS[name][1] for name in FACTORS}
-            value += sum(change * changed[factor] for factor, change in put_in.get(quantity, {}).items())
+            value += sum(change * changed[factor] for factor, change in (put_in or {}).get(quantity, {}).items())
             value += together * (changed[FRICTION] and changed[WALL]) * (quantity == PHI_F)
             row[quantity] = value
         rows.append(row)
@@ -79,7 +82,7 @@ def asked(found: dict[str, str], *words: str) -> str:
 
 
 def test_effects_are_those_put_in_and_what_a_seed_shares_is_no_scatter() -> None:
-    table = runs(**{PHI_F: {FRICTION: -0.02, WALL: -0.005}})
+    table = runs({PHI_F: {FRICTION: -0.02, WALL: -0.005}})
     found = effects(table).set_index([QUANTITY, FACTOR, ASPECT])
     for factor, size in (
         (CALLED[FRICTION], -0.02),
@@ -106,14 +109,14 @@ def test_an_interaction_is_the_difference_of_effects() -> None:
 
 
 def test_each_answer_is_given_to_data_that_deserve_it() -> None:
-    one = answered(runs(**{PHI_F: {FRICTION: -0.02, WALL: 0.01}, RISEN: {WALL: 0.1}}))
+    one = answered(runs({PHI_F: {FRICTION: -0.02, WALL: 0.01}, RISEN: {WALL: 0.1}}))
     assert asked(one, "phi_f fall", "between smarticles") == "yes"
     assert asked(one, "phi_f fall", "at the container") == "no"
     assert asked(one, "phi_f fall", "restitution") == "undetermined"
     assert asked(one, "phi_0 fall", "between smarticles") == "undetermined"
     assert asked(one, "more than friction at the container") == "yes"
     assert asked(one, "lowest") == "no"
-    other = answered(runs(together=-0.01, **{PHI_F: {WALL: -0.02}}))
+    other = answered(runs({PHI_F: {WALL: -0.02}}, together=-0.01))
     assert asked(other, "more than friction at the container") == "no"
     assert asked(other, "more where that between") == "yes"
 
@@ -139,7 +142,7 @@ def test_deviations_have_the_error_of_reading_in_them() -> None:
 
 
 def test_runs_that_are_missing_take_their_pairs_with_them() -> None:
-    table = runs(noise=0.0, **{PHI_F: {FRICTION: -0.02}})
+    table = runs({PHI_F: {FRICTION: -0.02}}, noise=0.0)
     gone = (table[FRICTION] == 0.8) & (table[SEED] == 3) & (table[ASPECT] == 0.7)
     left = by_seed(table[~gone], PHI_F, FRICTION)
     assert len(left) == 23

@@ -1,6 +1,5 @@
 """The study of friction, from run directories with known packing fractions."""
 
-import csv
 import math
 import shutil
 from pathlib import Path
@@ -14,13 +13,12 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from postprocess.statistics.seeds import Scatter
 from studies.base.references import read_reference
 from studies.base.runs import DEFINITION
 from studies.base.shipped import differences
 from studies.friction.findings import answers
 from studies.friction.measure import FRICTION, column
-from studies.friction.scatter import AT_THE_PAPERS, scatters
+from studies.friction.scatter import scatters
 from studies.friction.study import Friction
 from studies.friction.tables import (
     GROWTHS,
@@ -68,8 +66,8 @@ def runs_table(*, at=0.5, slope=0.6, relaxed=1.08, spread=SPREAD, frictions=FRIC
     return pd.DataFrame(rows)
 
 
-def tables(runs, known=None):
-    scatter = scatters(runs, known or {})
+def tables(runs):
+    scatter = scatters(runs)
     means = points(runs, read_reference(), scatter)
     found = curves(means, scatter)
     return {
@@ -81,8 +79,8 @@ def tables(runs, known=None):
     }
 
 
-def answered(runs, known=None):
-    found = tables(runs, known)
+def answered(runs):
+    found = tables(runs)
     return {
         one.question.split(",")[0]: one
         for one in answers(*(found[name] for name in ("crossings", "verdicts", "nearest", "growth")))
@@ -97,33 +95,8 @@ def one_friction(what):
 
 
 def test_scatter_is_relative_and_pooled_over_points():
-    scatter = scatters(runs_table(), {})["phi_f"]
+    scatter = scatters(runs_table())["phi_f"]
     assert (scatter.value, scatter.freedom) == (pytest.approx(0.002, rel=1e-3), 2 * 15)
-
-
-def test_what_is_known_beforehand_counts_with_its_degrees_of_freedom():
-    known = {"phi_f": Scatter(value=0.01, freedom=30)}
-    found = scatters(runs_table(), known)
-    assert found["phi_f"].freedom == 60
-    assert found["phi_f"].value == pytest.approx(math.sqrt((0.002**2 + 0.01**2) / 2), rel=1e-3)
-    assert found["phi 5 s"].freedom == 60  # as at the end
-    assert found["phi_0"].freedom == 30
-    alone = scatters(runs_table(spread={1: 1.0}), known)
-    assert (alone["phi_f"].value, alone["phi_f"].freedom) == (0.01, 30)
-    assert alone["phi_0"].freedom == 0
-
-
-def test_the_scatter_known_beforehand_is_that_of_the_runs_it_names():
-    with (ROOT / "results/gravish-links/runs.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    assert len(rows) == 24
-    for stage, known in AT_THE_PAPERS.items():
-        groups = {}
-        for row in rows:
-            groups.setdefault(row[ASPECT], []).append(float(row[column(stage)]))
-        squares = sum(float(np.sum((np.array(group) / np.mean(group) - 1) ** 2)) for group in groups.values())
-        assert known.freedom == 24 - len(groups)
-        assert known.value == pytest.approx(math.sqrt(squares / known.freedom), abs=5e-5)
 
 
 def test_points_have_the_error_of_their_seeds_and_deviations_also_gravishs():
@@ -181,8 +154,6 @@ def test_one_seed_without_known_scatter_proves_nothing():
     )
     table = tables(runs_table(spread={1: 1.0}))["crossings"]
     assert table[FRICTION].notna().all()
-    known = {"phi_f": Scatter(value=0.002, freedom=30)}
-    assert answered(runs_table(spread={1: 1.0}), known)[one_friction("phi_f")].answer == "yes"
 
 
 @pytest.mark.parametrize(("at", "answer"), [(0.4, "yes"), (0.7, "no"), (0.485, "undetermined")])
@@ -268,7 +239,7 @@ def study(tmp_path_factory):
                 run = SyntheticRun(aspect_ratio=ratio, seed=seed, packing=packing, friction=friction, status=status)
                 directories.append(write_run(root / f"lw{ratio:.2f}_mu{friction:.2f}_seed{seed}", run))
     directories.append(root / "lw0.40_mu0.20_seed1")
-    return root, directories, Friction({}).analyse(directories, root / "out", **ORIGIN)
+    return root, directories, Friction().analyse(directories, root / "out", **ORIGIN)
 
 
 def test_what_was_put_in_is_found(study):
@@ -294,7 +265,6 @@ def test_footer_text_and_terminal_tell_the_same(study):
     assert [one.status for one in report.missing] == ["failed", "not started"]
     words = ["l/w 0.7 1, μ 0.2 0.5 0.8, seeds 1 2 (1 to 2 per point)", "shaken for 20 s", "pooled", ORIGIN["note"]]
     assert not [word for word in words if word not in " ".join(report.footer)]
-    assert "gravish-links" not in " ".join(report.footer)
     text = report.files["friction.md"].read_text()
     assert "| phi_f | 1 | 0.1050 | above 0.8 (" in text
     assert "Lust, Engineering Guide CDA3000, table 7.21" in text
@@ -326,13 +296,6 @@ def test_figures_tell_which_points_gravish_has_not(study):
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_what_is_known_beforehand_is_said(study, tmp_path):
-    report = Friction(AT_THE_PAPERS).analyse(study[1], tmp_path / "out", **ORIGIN)
-    assert "24 runs at μ = 0.4 (results/gravish-links)" in " ".join(report.footer)
-    assert report.tables["scatter"].set_index("stage").loc["phi_f", "degrees of freedom [-]"] == 16 + 5
-
-
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("contact", "cause"),
     [
@@ -345,7 +308,7 @@ def test_a_run_of_no_one_friction_is_listed_as_unusable(study, tmp_path, contact
     other = shutil.copytree(study[1][0], tmp_path / "other")
     scene = yaml.safe_load((other / "scene.yaml").read_text()) | {"contact": contact}
     (other / "scene.yaml").write_text(yaml.safe_dump(scene))
-    report = Friction({}).analyse([study[1][2], other], tmp_path / "out", **ORIGIN)
+    report = Friction().analyse([study[1][2], other], tmp_path / "out", **ORIGIN)
     (missing,) = report.missing
     assert missing.status == "unusable"
     assert cause in missing.cause
@@ -354,14 +317,14 @@ def test_a_run_of_no_one_friction_is_listed_as_unusable(study, tmp_path, contact
 @pytest.mark.usefixtures("undrawn")
 def test_a_run_that_was_not_shaken_is_listed_as_unusable(study, tmp_path):
     calm = SyntheticRun(phases=("deposit", "relax"), packing=(0.1, 0.1), friction=0.4)
-    report = Friction({}).analyse([study[1][0], write_run(tmp_path / "calm", calm)], tmp_path / "out", **ORIGIN)
+    report = Friction().analyse([study[1][0], write_run(tmp_path / "calm", calm)], tmp_path / "out", **ORIGIN)
     assert "no packing fraction was recorded while shaking" in report.missing[0].cause
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_short_shaking_has_no_phi_of_later_times(tmp_path):
     run = write_run(tmp_path / "short", SyntheticRun(shake_time=6.0, friction=0.4))
-    report = Friction({}).analyse([run], tmp_path / "out", **ORIGIN)
+    report = Friction().analyse([run], tmp_path / "out", **ORIGIN)
     assert f"phi 10 s {DEFINITION} [-]" not in report.tables["runs"].columns
     assert "no run was shaken for 20 s" in " ".join(report.told)
 
@@ -377,7 +340,7 @@ def test_short_shaking_has_no_phi_of_later_times(tmp_path):
 def test_runs_that_cannot_be_averaged_are_refused(study, tmp_path, changes, message):
     other = write_run(tmp_path / "other", SyntheticRun(**{"friction": 0.2, **changes}))
     with pytest.raises(InputError, match=message):
-        Friction({}).analyse([study[1][0], other], tmp_path / "out", **ORIGIN)
+        Friction().analyse([study[1][0], other], tmp_path / "out", **ORIGIN)
 
 
 # The sweep
@@ -404,7 +367,7 @@ def test_the_study_varies_friction_alone_and_at_the_papers_it_is_that_of_gravish
 def test_the_quick_variant_says_how_it_differs():
     quick, full = (expand(load_sweep(study_file("friction", quick=quick))) for quick in (True, False))
     lines = differences(quick, full)
-    assert lines[0] == "27 runs instead of 72"
+    assert lines[0] == "27 runs instead of 144"
     assert "fidelity: draft instead of standard" in lines
     assert "friction: only 0.2, 0.5, 0.8 of 0.2, 0.3, 0.4, 0.5, 0.65, 0.8" in lines
     assert not any(line.startswith("shake_s") for line in lines)
