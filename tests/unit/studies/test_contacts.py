@@ -63,7 +63,7 @@ def runs(
     for *levels, ratio, seed in product(*FACTORS.values(), RATIOS, range(1, 9)):
         row: dict[str, float] = {**dict(zip(FACTORS, levels, strict=True)), ASPECT: ratio, SEED: seed}
         for quantity, level in LEVELS.items():
-            value = level - 0.02 * ratio + shared[ratio, seed] + noise * generator.standard_normal()
+            value = level - 0.02 * ratio + shared[ratio, int(seed)] + noise * generator.standard_normal()
             changed = {name: row[name] == FACTORS[name][1] for name in FACTORS}
             value += sum(change * changed[factor] for factor, change in (put_in or {}).get(quantity, {}).items())
             value += together * (changed[FRICTION] and changed[WALL]) * (quantity == PHI_F)
