@@ -32,6 +32,7 @@ PAPER := gravish procedures procedures-code procedures-code-yade factors melting
 paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (days; goes on where it was stopped)
 	for study in $(PAPER); do $(BIN)/smarticles study $$study --out out/paper/$$study || exit 1; done
 	$(BIN)/python -m studies.claims out/paper
+	$(BIN)/python -m studies.hours out/paper $(PAPER)
 
 claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, from the tables in results/ (seconds)
 	$(BIN)/python -m studies.claims results

@@ -75,6 +75,7 @@ class RunManifest:
         end_time: Simulated time at which the run ended [s]; None while unfinished.
         steps: Time steps of a done run; None otherwise.
         wall_time: Wall time of a done run [s]; None otherwise.
+        processor_time: Processor time of a done run [s]; None otherwise, and where it was not told yet.
         taken_over: Where its smarticles come from, if from another run, see ARCHITECTURE.md; None otherwise.
     """
 
@@ -111,6 +112,7 @@ class RunManifest:
     end_time: float | None = None
     steps: int | None = None
     wall_time: float | None = None
+    processor_time: float | None = None
     taken_over: Mapping[str, Any] | None = None
 
     @property
@@ -328,6 +330,7 @@ def _ending(directory: Path, phases: tuple[PhaseRecord, ...]) -> dict[str, Any]:
             "end_time": done.number("time_s"),
             "steps": done.integer("steps"),
             "wall_time": done.number("wall_s"),
+            "processor_time": done.number("cpu_s") if "cpu_s" in done.data else None,
         }
     if (directory / FAILED).exists():
         failed = Document.read(directory / FAILED)

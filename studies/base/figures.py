@@ -2,22 +2,26 @@
 
 Error bars are of one kind in all of them, 95 % confidence of a mean over seeds: `draw_means` draws them, `finished`
 says so in one sentence. Where a band is something else, such as the range of the seeds, the figure has no error bars.
+`draw_combinations` is a whole figure, that of factorial studies.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.container import ErrorbarContainer
 
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
+from postprocess.statistics.columns import ASPECT
+from postprocess.statistics.points import marked
 from studies.base.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
 from studies.base.runs import BARS
 
@@ -41,6 +45,9 @@ SHAPES: Mapping[str, str] = MappingProxyType({SHAPE: "s", EXTERNAL: "D", INTERNA
 
 BAND = "band: lowest to highest seed, no error"
 """What the bands of histories are, for footers."""
+
+_MARKERS_OF_ASPECTS = (("o", figures.BLUE, figures.BLUE), ("s", figures.ORANGE, "white"), ("^", figures.GREY, "white"))
+_ASIDE = 0.16  # of the rows' places, so that bars do not lie on each other
 
 _LEAST_BIN = 0.1  # s: three periods of shaking at 30 Hz
 _BINS = 100
@@ -208,3 +215,49 @@ def _has_bars(figure: Figure) -> bool:
         if isinstance(bars, ErrorbarContainer)
         for lines in bars.lines[2]
     )
+
+
+def draw_combinations(
+    path: Path,
+    *,
+    points: pd.DataFrame,
+    factors: Mapping[str, tuple[object, object]],
+    shown: Mapping[str, str],
+    named: Callable[[pd.Series], str],
+    told: Sequence[str] = (),
+    footer: Sequence[str],
+) -> list[Path]:
+    """Draws and writes quantities of every combination, those with all first levels at the top.
+
+    Args:
+        path: Of the figure, without suffix.
+        points: Means of combinations by aspect ratio, with their `… 95 %`.
+        factors: Both levels of each, by column; the first ones change most slowly from row to row.
+        shown: Labels of the axes, by column.
+        named: Name of a combination's row.
+        told: What the figure says besides.
+        footer: Lines below the figure.
+
+    Returns:
+        The files.
+    """
+    second = pd.DataFrame({name: points[name] == levels[1] for name, levels in factors.items()})
+    weights = [2**place for place in reversed(range(len(factors)))]
+    rows = points.assign(_changed=second.sum(axis=1), _order=second.to_numpy() @ weights)
+    first_of = rows.drop_duplicates("_order").sort_values(["_changed", "_order"])
+    order = list(first_of["_order"])
+    with figures.style():
+        figure = figures.blank_figure(7.0, 0.9 + 0.32 * max(len(order), 2))
+        for axes, (quantity, label) in zip(figure.subplots(1, len(shown), sharey=True), shown.items(), strict=True):
+            for number, (aspect, group) in enumerate(rows.sort_values("_order").groupby(ASPECT)):
+                places = [order.index(one) + _ASIDE * (number - 0.5) for one in group["_order"]]
+                look = {**marker(*_MARKERS_OF_ASPECTS[number % len(_MARKERS_OF_ASPECTS)]), "linestyle": "none"}
+                bars = group[marked(quantity, "95 %")]
+                draw_means(axes, group[quantity], places, None, look=look, label=f"l/w = {aspect:g}", across=bars)
+            axes.set_xlabel(label)
+        first = figure.axes[0]
+        first.set_yticks(range(len(order)), [named(row) for _, row in first_of.iterrows()])
+        first.invert_yaxis()
+        legend_above(first)
+        figure.tight_layout()
+        return finished(figure, path, list(told), footer)

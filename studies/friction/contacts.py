@@ -14,7 +14,7 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
-from studies.base.combinations import draw_combinations
+from studies.base.figures import draw_combinations
 from studies.base.questions import Question, QuestionStudy, questions_lines
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference, told_reference
 from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds

@@ -23,7 +23,7 @@ from postprocess.statistics.findings import Finding, judge, negative, told
 from postprocess.statistics.points import averaged, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
-from studies.base.combinations import draw_combinations
+from studies.base.figures import draw_combinations
 from studies.base.paper import PaperStudy
 from studies.base.procedures import CROSSINGS, PROCEDURE, SHAPE
 from studies.base.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
