@@ -150,7 +150,7 @@ def answers(runs: pd.DataFrame, means: pd.DataFrame) -> tuple[Question, ...]:
         called = QUANTITIES[quantity][0]
         for factor, (low, high) in FACTORS.items():
             asked.append(
-                _below_zero(
+                _asked(
                     f"Does {called} fall when {CALLED[factor]} goes from {low:g} to {high:g}?",
                     by_seed(runs, quantity, factor),
                     quantity,
@@ -161,30 +161,32 @@ def answers(runs: pd.DataFrame, means: pd.DataFrame) -> tuple[Question, ...]:
     both[PHI_F] = both[PHI_F] - both[f"{PHI_F} wall"]
     return (
         *asked,
-        _below_zero("Does friction between smarticles lower phi_f more than friction at the container?", both, PHI_F),
-        _below_zero(
+        _asked("Does friction between smarticles lower phi_f more than friction at the container?", both, PHI_F),
+        _asked(
             "Does friction at the container lower phi_f more where that between smarticles is 0.8?",
             by_seed(runs, PHI_F, FRICTION, WALL),
             PHI_F,
         ),
-        _below_zero(
-            "Do the lowest smarticles rise less when friction at the container goes from 0.4 to 0.8?",
+        _asked(
+            "Do the lowest smarticles rise more when friction at the container goes from 0.4 to 0.8?",
             by_seed(runs, RISEN, WALL),
             RISEN,
+            sign=1,
         ),
         _near_gravish(means),
     )
 
 
-def _below_zero(question: str, table: pd.DataFrame, quantity: str) -> Question:
+def _asked(question: str, table: pd.DataFrame, quantity: str, *, sign: int = -1) -> Question:
+    """Whether an effect is clearly of a sign, over all aspect ratios and seeds."""
     effect, form = mean_over_seeds(table[quantity]), QUANTITIES[quantity][1]
     places = ", ".join(
         f"{ratio:g}: {_told(mean_over_seeds(group[quantity]), form)}" for ratio, group in table.groupby(ASPECT)
     )
     answer: YesNo = "undetermined"
-    if effect.value < -effect.half_width:
+    if sign * effect.value > effect.half_width:
         answer = "yes"
-    elif effect.value > effect.half_width:
+    elif sign * effect.value < -effect.half_width:
         answer = "no"
     return Question(
         question=question, answer=answer, evidence=f"{_told(effect, form)} (n = {effect.count}); by l/w {places}"
@@ -203,9 +205,12 @@ def _near_gravish(means: pd.DataFrame) -> Question:
         return Question(question=question, answer="undetermined", evidence="no points of Gravish's at these l/w")
     off, error = known[DEVIATION].abs(), known[marked(DEVIATION, "95 %")]
     told = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
-    each = told.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": "max"})
-    answer: YesNo = "yes" if each["_inside"].any() else "no" if each["_outside"].all() else "undetermined"
-    best = pd.Series(dict(zip(FACTORS, each["_off"].idxmin(), strict=True)))
+    each = told.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
+    each.columns = pd.Index(["inside", "outside", "off", "places"])
+    # A combination that lacks an aspect ratio can be refused by another one, and not accepted.
+    whole = each[each["places"] == each["places"].max()]
+    answer: YesNo = "yes" if whole["inside"].any() else "no" if each["outside"].all() else "undetermined"
+    best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
     rows = told[np.all([told[name] == best[name] for name in FACTORS], axis=0)]
     places = ", ".join(
         f"{row[ASPECT]:g}: {told_number(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"

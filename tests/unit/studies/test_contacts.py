@@ -115,7 +115,7 @@ def test_each_answer_is_given_to_data_that_deserve_it() -> None:
     assert asked(one, "phi_f fall", "restitution") == "undetermined"
     assert asked(one, "phi_0 fall", "between smarticles") == "undetermined"
     assert asked(one, "more than friction at the container") == "yes"
-    assert asked(one, "lowest") == "no"
+    assert asked(one, "lowest") == "yes"
     other = answered(runs({PHI_F: {WALL: -0.02}}, together=-0.01))
     assert asked(other, "more than friction at the container") == "no"
     assert asked(other, "more where that between") == "yes"
@@ -131,6 +131,16 @@ def test_gravish_is_met_or_missed_only_beyond_all_errors(off: float, noise: floa
     # The error of reading alone is ± 0.003, up to 2.9 % of φ_f.
     table[PHI_F] = at * (1 + off) + noise * generator.standard_normal(len(table))
     assert asked(answered(table), "within 5 %") == answer
+
+
+def test_a_combination_that_lacks_an_aspect_ratio_is_not_accepted() -> None:
+    table = runs(noise=1e-4)
+    reference = read_reference()
+    at = table[ASPECT].map({ratio: reference_at(reference, ratio, "phi_f") for ratio in RATIOS})
+    right = (table[FRICTION] == 0.8) & (table[WALL] == 0.4) & (table[RESTITUTION] == 0.7)
+    table[PHI_F] = at * np.where(right, 1.0, 1.2)
+    assert asked(answered(table), "within 5 %") == "yes"
+    assert asked(answered(table[~(right & (table[ASPECT] == 0.4))]), "within 5 %") == "undetermined"
 
 
 def test_deviations_have_the_error_of_reading_in_them() -> None:
