@@ -131,24 +131,18 @@ class Contacts(QuestionStudy):
     def table(self, analysis: Analysis[Question]) -> tuple[list[str], list[list[str]]]:
         """The effects."""
         found = analysis.tables["effects"]
+        places = sorted(set(found[ASPECT]) - {EVERYWHERE}, key=float)
         rows = []
         for (quantity, factor), group in found.groupby([QUANTITY, FACTOR], sort=False):
             form = next(form for called, form in QUANTITIES.values() if called == quantity)
-            rows.append(
-                [
-                    str(quantity),
-                    str(factor),
-                    *(told_number(row[EFFECT], f"+{form}", row[marked(EFFECT, "95 %")]) for _, row in group.iterrows()),
-                    told_number(group[SHARE].iloc[-1], "+.1f"),
-                ]
-            )
-        places = list(dict.fromkeys(found[ASPECT]))
-        header = [
-            QUANTITY,
-            FACTOR,
-            *(f"l/w {place}" if place != EVERYWHERE else place for place in places),
-            "of the mean [%]",
-        ]
+            told = {
+                row[ASPECT]: told_number(row[EFFECT], f"+{form}", row[marked(EFFECT, "95 %")])
+                for _, row in group.iterrows()
+            }
+            # A factor that was not varied at an aspect ratio has no effect there.
+            cells = [told.get(place, "–") for place in (*places, EVERYWHERE)]
+            rows.append([str(quantity), str(factor), *cells, told_number(group[SHARE].iloc[-1], "+.1f")])
+        header = [QUANTITY, FACTOR, *(f"l/w {place}" for place in places), EVERYWHERE, "of the mean [%]"]
         return header, rows
 
 

@@ -160,6 +160,18 @@ def test_runs_that_are_missing_take_their_pairs_with_them() -> None:
     assert by_seed(table[table[FRICTION] == 0.4], PHI_F, FRICTION).empty
 
 
+def test_a_factor_that_was_not_varied_everywhere_leaves_a_gap() -> None:
+    table = runs()
+    left = table[(table[ASPECT] == 0.7) | (table[RESTITUTION] == 0.7)]
+    analysis: Any = SimpleNamespace(tables={"effects": effects(left)})
+    header, rows = Contacts().table(analysis)
+    assert header[2:] == ["l/w 0.4", "l/w 0.7", "l/w 1", "all", "of the mean [%]"]
+    assert {len(row) for row in rows} == {len(header)}
+    (gap,) = [row for row in rows if row[:2] == ["phi_f", CALLED[RESTITUTION]]]
+    assert (gap[2], gap[4]) == ("–", "–")
+    assert gap[3] == gap[5]
+
+
 def test_the_figure_names_every_combination(tmp_path: Path) -> None:
     table = runs()
     analysis: Any = SimpleNamespace(tables={"points": points(table)})
