@@ -29,7 +29,7 @@ validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 
 PAPER := gravish procedures procedures-code procedures-code-yade factors melting melting-code casting casting-code fracture fracture-code strength strength-code collapse chain chain-bodies friction contacts compaction landscape finite-size
 
-paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (days; goes on where it was stopped)
+paper: setup ## the paper's studies by its text and by its code, and what they say of its claims (47 hours of one core; goes on where it was stopped)
 	for study in $(PAPER); do $(BIN)/smarticles study $$study --out out/paper/$$study || exit 1; done
 	$(BIN)/python -m studies.claims out/paper
 	$(BIN)/python -m studies.hours out/paper $(PAPER)
