@@ -300,7 +300,7 @@ def test_the_quick_procedures_say_how_they_differ() -> None:
     assert "oscillate_s: 2.0 instead of 5.0" in lines
     assert "l_over_w: only 0.4, 0.7, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
     assert "theta_deg: only 0, 10, 30 of 0, 5, 10, 15, 20, 30" in lines
-    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5, 6, 7, 8" in lines
+    assert "seed: only 1, 2, 3 of 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16" in lines
 
 
 def test_the_code_and_the_factors_go_by_the_same_points() -> None:
