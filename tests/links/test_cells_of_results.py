@@ -51,7 +51,7 @@ CELLS = [
     ("landscape", "internal20_0.25s_lw1.10_seed1"),
     ("gravish", "lw1.10_links_seed1"),
     ("collapse", "lw1.17_gamma4.0_seed1"),
-    ("contacts", "lw0.70_mu0.40_wall0.80_e0.7_seed1"),
+    ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1"),
 ]
 OTHERS = [
     ("procedures", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
@@ -67,7 +67,7 @@ OTHERS = [
     ("landscape", "internal20_0.25s_lw1.10_seed1", "static_0s_lw1.10_seed1"),
     ("gravish", "lw1.10_links_seed1", "lw1.00_links_seed1"),
     ("collapse", "lw1.17_gamma4.0_seed1", "lw0.66_gamma4.0_seed1"),
-    ("contacts", "lw0.70_mu0.40_wall0.80_e0.7_seed1", "lw0.70_mu0.80_wall0.80_e0.7_seed1"),
+    ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1", "lw1.00_mu0.80_wall0.80_e0.7_seed1"),
 ]
 FEWEST = {"friction": 4, "collapse": 3, "finite-size": 6, "landscape": 3}
 """Seeds of a cell where there are fewer than eight: the fewer, the wider is where a further one would lie."""
