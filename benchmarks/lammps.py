@@ -57,7 +57,7 @@ def told(run: Path) -> dict[str, float]:
     rest = phi[(phases == 1) & (times > (manifest.phases[1].end or 0.0) - 0.1)]
     shaken = manifest.phases[2]
     half = ((shaken.start or 0.0) + (shaken.end or 0.0)) / 2
-    crossings = [float(link_crossings(frame.vertices).mean()) for frame in read_frames(run) if frame.time > half]
+    crossings = [float(link_crossings(frame.vertices).mean()) for frame in read_frames(run).after(half)]
     return {
         "phi_0 [-]": float(rest.mean()),
         "phi_f [-]": float(phi[times > half].mean()),

@@ -15,6 +15,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.manifest import read_run
+from dem.record.names import MANIFEST, OF_SWEEP
 from postprocess.report.markdown import table_lines
 from templates.sweep.folder import Folder, open_folder
 
@@ -40,7 +41,7 @@ def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
     if not folder.is_dir():
         msg = f"{folder}: there is no such directory; give the one that `make paper` wrote into"
         raise InputError(msg)
-    sweeps = [folder / name for name in studies] or sorted(one.parent for one in folder.glob("*/sweep.json"))
+    sweeps = [folder / name for name in studies] or sorted(one.parent for one in folder.glob(f"*/{OF_SWEEP}"))
     if not sweeps:
         msg = f"{folder}: none of its folders is that of a sweep; give the one that `make paper` wrote into"
         raise InputError(msg)
@@ -77,7 +78,7 @@ def _rows(sweep: Folder) -> list[dict[str, object]]:
 
 def _taken(directory: Path) -> float:
     """Hours that a run took; NaN unless it is done."""
-    seconds = read_run(directory).processor_time if (directory / "run.json").is_file() else None
+    seconds = read_run(directory).processor_time if (directory / MANIFEST).is_file() else None
     return math.nan if seconds is None else seconds / 3600
 
 

@@ -112,6 +112,13 @@ class FrameSequence(Sequence[Frame]):
             raise InputError(msg)
         return int(np.argmin(np.abs(self.times - time)))
 
+    def after(self, time: float) -> FrameSequence:
+        """The frames later than a time [s], by the list alone: none of them is read.
+
+        A frame at that very time is not later, whatever the ninth digit says, to which the list rounds.
+        """
+        return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
+
     def in_phase(self, phase: int) -> FrameSequence:
         """The frames of one phase, found by bisection: phases follow each other in time.
 

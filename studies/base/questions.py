@@ -34,6 +34,13 @@ class Question:
         return f"{self.question} {self.answer.upper()}\n    {self.evidence}"
 
 
+def above_zero(value: float, half_width: float) -> YesNo:
+    """Whether a value is clearly above 0: yes or no beyond its 95 % half-width, undetermined without one."""
+    if value > half_width:
+        return "yes"
+    return "no" if value < -half_width else "undetermined"
+
+
 def questions_lines(judged: Sequence[Question]) -> Sequence[str]:
     """A table of Markdown, one row per question."""
     rows = [(one.question, f"**{one.answer}**", one.evidence) for one in judged]

@@ -94,7 +94,7 @@ def size_row(run: RunManifest) -> dict[str, object]:
     }
     for stage, phase in zip(STAGES, (1, 3), strict=True):
         row |= _at_rest(run, frames, stage, phase)
-    late = [frame for frame in frames.in_phase(2) if frame.time > (run.phases[2].end or 0.0) - WINDOW - 1e-6]
+    late = frames.in_phase(2).after((run.phases[2].end or 0.0) - WINDOW - 1e-6)
     row[MOVING] = float(np.mean([packing_of(frame, run, definition=DEFINITION) for frame in late])) if late else np.nan
     return row | {
         "escaped at the end [-]": escaped(frames[-1], run),

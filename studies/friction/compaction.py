@@ -16,14 +16,13 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.questions import Question, QuestionStudy, YesNo, questions_lines
+from studies.base.questions import Question, QuestionStudy, above_zero, questions_lines
 from studies.base.references import GRAVISH, SHAKE_TIME, Reference
-from studies.base.runs import Collected, MeasuredRun, runs_table, told_seeds
-from studies.base.shaken import told_shaken
+from studies.base.runs import Collected, MeasuredRun, runs_table
 from studies.base.study import Analysis, Tables
 from studies.friction import compaction_figures
 from studies.friction.laws import FIRST, INTERVALS, LAWS, LOGARITHMIC, STRETCHED, fit, spread_out
-from studies.friction.measure import FRICTION, friction_run, history_of, refuse_repeats, while_shaken
+from studies.friction.measure import FRICTION, friction_run, history_of, refuse_repeats, told_piles, while_shaken
 
 TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 """When φ is told [s]; each a mean over the last fifth of that time."""
@@ -100,12 +99,7 @@ class Compaction(QuestionStudy):
     def about_points(self, analysis: Analysis[Question]) -> str:
         """Seeds, and what φ is."""
         runs = analysis.tables["runs"]
-        counts = runs.groupby([ASPECT, FRICTION]).size()
-        ratios = " ".join(f"{value:g}" for value in sorted(runs[ASPECT].unique()))
-        return (
-            f"l/w {ratios}, {told_seeds(runs, counts, 'point')}; shaken for {told_shaken(runs)} (Gravish: "
-            f"{SHAKE_TIME:g} s); φ by the median height that the series records."
-        )
+        return f"{told_piles(runs, [FRICTION], 'point')}; φ by the median height that the series records."
 
     def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
         """φ against time with both laws, and what these leave."""
@@ -199,13 +193,9 @@ def _question(question: str, values: pd.Series, told: str) -> Question:
     """Whether a quantity of each run is clearly above 0 in the mean."""
     known = values.dropna().tolist()
     mean = mean_over_seeds(known)
-    answer: YesNo = "undetermined"
-    if mean.value > mean.half_width:
-        answer = "yes"
-    elif mean.value < -mean.half_width:
-        answer = "no"
     number = told.format(told_number(mean.value, "+.2f", mean.half_width))
-    return Question(question=question, answer=answer, evidence=f"{number} over {len(known)} runs")
+    evidence = f"{number} over {len(known)} runs"
+    return Question(question=question, answer=above_zero(mean.value, mean.half_width), evidence=evidence)
 
 
 def _told_law(key: tuple[float, str], group: pd.DataFrame) -> list[str]:

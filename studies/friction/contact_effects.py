@@ -21,7 +21,7 @@ from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.factorial import paired_differences
 from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.questions import Question, YesNo
+from studies.base.questions import Question, YesNo, above_zero
 from studies.base.references import DIGITISING_ERROR, read_reference, reference_at
 from studies.friction.measure import FRICTION, WINDOW, column
 from studies.friction.tables import MARGIN
@@ -76,7 +76,7 @@ def risen(run: RunManifest) -> float:
     shaken = next(phase.index for phase in run.phases if phase.type == "shake")
     for phase in (shaken - 1, shaken):
         part = frames.in_phase(phase)
-        late = [frame for frame in part if frame.time > part.times[-1] - WINDOW]
+        late = part.after(part.times[-1] - WINDOW)
         heights.append(
             float(np.mean([_lowest_tenth(centres_of_mass(one.vertices)[:, 2] - one.floor_z) for one in late]))
         )
@@ -183,13 +183,10 @@ def _asked(question: str, table: pd.DataFrame, quantity: str, *, sign: int = -1)
     places = ", ".join(
         f"{ratio:g}: {_told(mean_over_seeds(group[quantity]), form)}" for ratio, group in table.groupby(ASPECT)
     )
-    answer: YesNo = "undetermined"
-    if sign * effect.value > effect.half_width:
-        answer = "yes"
-    elif sign * effect.value < -effect.half_width:
-        answer = "no"
     return Question(
-        question=question, answer=answer, evidence=f"{_told(effect, form)} (n = {effect.count}); by l/w {places}"
+        question=question,
+        answer=above_zero(sign * effect.value, effect.half_width),
+        evidence=f"{_told(effect, form)} (n = {effect.count}); by l/w {places}",
     )
 
 

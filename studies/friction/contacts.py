@@ -16,9 +16,9 @@ from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
 from studies.base.figures import draw_combinations
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.references import GRAVISH, SHAKE_TIME, Reference, told_reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
-from studies.base.shaken import WHEN, told_shaken
+from studies.base.references import GRAVISH, Reference, told_reference
+from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table
+from studies.base.shaken import WHEN
 from studies.base.study import Analysis, Tables
 from studies.friction.contact_effects import (
     CALLED,
@@ -39,7 +39,7 @@ from studies.friction.contact_effects import (
     points,
     risen,
 )
-from studies.friction.measure import FRICTION, WINDOW, contact_of, shaken_run
+from studies.friction.measure import FRICTION, WINDOW, contact_of, shaken_run, told_piles
 
 
 class Contacts(QuestionStudy):
@@ -108,12 +108,7 @@ class Contacts(QuestionStudy):
     def about_points(self, analysis: Analysis[Question]) -> str:
         """Seeds, and what φ is."""
         runs = analysis.tables["runs"]
-        counts = runs.groupby([ASPECT, *FACTORS]).size()
-        ratios = " ".join(f"{value:g}" for value in sorted(runs[ASPECT].unique()))
-        return (
-            f"l/w {ratios}, {told_seeds(runs, counts, 'combination')}; shaken for {told_shaken(runs)} (Gravish: "
-            f"{SHAKE_TIME:g} s); φ by {DEFINITION}."
-        )
+        return f"{told_piles(runs, [*FACTORS], 'combination')}; φ by {DEFINITION}."
 
     def draw(self, output: Path, analysis: Analysis[Question], footer: Sequence[str]) -> Sequence[Path]:
         """How far every combination is from Gravish, and by how much the lowest smarticles rose."""

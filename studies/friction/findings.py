@@ -10,7 +10,7 @@ import pandas as pd
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds, slope_within
-from studies.base.questions import Question, YesNo
+from studies.base.questions import Question, YesNo, above_zero
 from studies.friction.measure import FRICTION, TIMES
 from studies.friction.steel import AS_IT_COMES, CLEANED, Published, spanned
 from studies.friction.tables import (
@@ -157,25 +157,18 @@ def _growing(growth: pd.DataFrame) -> tuple[Question, ...]:
     return (
         Question(
             question=still,
-            answer=_sign(mean.value, mean.half_width),
+            answer=above_zero(mean.value, mean.half_width),
             evidence=f"by {told_number(mean.value, '+.1f', mean.half_width)} % over {mean.count} points, "
             f"{int((known[late] > 0).sum())} of them grow; from {TIMES[0]:g} to {TIMES[1]:g} s by "
             f"{told_number(earlier.value, '+.1f', earlier.half_width)} %",
         ),
         Question(
             question=stronger,
-            answer=_sign(slope.value, slope.half_width),
+            answer=above_zero(slope.value, slope.half_width),
             evidence=f"per 0.1 of friction {told_number(slope.value / 10, '+.2f', slope.half_width / 10)} % more at "
             f"equal l/w; mean over l/w: {told}",
         ),
     )
-
-
-def _sign(value: float, half_width: float) -> YesNo:
-    """Whether a value is clearly above 0."""
-    if value > half_width:
-        return "yes"
-    return "no" if value < -half_width else "undetermined"
 
 
 def _counted(count: int) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
@@ -13,8 +14,9 @@ from dem.record.manifest import RunManifest
 from postprocess.scene_file import Settings, read_scene
 from postprocess.statistics.columns import ASPECT
 from studies.base.figures import History
-from studies.base.runs import DEFINITION, Collected, MeasuredRun
-from studies.base.shaken import measured_row, packing_history
+from studies.base.references import SHAKE_TIME
+from studies.base.runs import DEFINITION, Collected, MeasuredRun, told_seeds
+from studies.base.shaken import measured_row, packing_history, told_shaken
 
 FRICTION = "friction [-]"
 
@@ -102,6 +104,20 @@ def refuse_repeats(found: Collected) -> None:
     """
     found.refuse_mixed_counts()
     found.refuse_repeats("point", lambda run: f"l/w {run.manifest.aspect_ratio:g} friction {run.row[FRICTION]:g}")
+
+
+def told_piles(runs: pd.DataFrame, varied: Sequence[str], point: str) -> str:
+    """Which aspect ratios, seeds and times of shaking runs have, for footers.
+
+    Args:
+        runs: The table of runs.
+        varied: Columns that tell points of one aspect ratio apart.
+        point: What a point is called.
+    """
+    counts = runs.groupby([ASPECT, *varied]).size()
+    ratios = " ".join(f"{value:g}" for value in sorted(runs[ASPECT].unique()))
+    seeds = told_seeds(runs, counts, point)
+    return f"l/w {ratios}, {seeds}; shaken for {told_shaken(runs)} (Gravish: {SHAKE_TIME:g} s)"
 
 
 def contact_of(run: RunManifest, study: str) -> Settings:

@@ -74,6 +74,25 @@ def test_frames_of_a_phase(make_run):
     assert frames.in_phase(2)[0].time == pytest.approx(0.1)
 
 
+def test_frames_after_a_time(make_run):
+    """Those at that very time are not later, and no file is read for it."""
+    run = make_run([(0, 0.0), (0, 0.0), (0, 0.0), (0, 0.0)])
+    for path in (run / "frames").glob("*.vtu"):
+        path.unlink()
+    frames = read_frames(run)
+    assert [len(frames.after(time)) for time in (-1.0, 0.0, 0.05, 0.3 - 0.2, 0.1 + 0.1, 0.3, 1.0)] == [
+        4,
+        3,
+        3,
+        2,
+        1,
+        0,
+        0,
+    ]
+    np.testing.assert_allclose(frames.after(0.15).times, [0.2, 0.3])
+    assert len(frames[1:].after(0.15)) == 2
+
+
 def test_frames_are_read_lazily(run):
     (run / "frames" / "frame_000001.vtu").unlink()
     frames = read_frames(run)
