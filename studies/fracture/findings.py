@@ -4,15 +4,15 @@ Runs of one l/w and seed were poured alike, so they are compared seed by seed, a
 paper's text claims nothing of how the force depends on l/w or on θ by itself: of these there are figures and means.
 
 A pile that holds fast, so that the hook stops at its limit, has a peak of at least that, at a place that is not known:
-of two procedures one is then only said to be above the other where what is unknown cannot change that, and of slopes
-and places nothing is said.
+of two procedures one is then only said to be above the other where what is unknown cannot change that, and of places
+nothing is said.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,6 @@ import pandas as pd
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import told_less
-from postprocess.statistics.seeds import slope_within
 from studies.base.procedures import (
     AMPLITUDE,
     CROSSINGS,
@@ -33,6 +32,7 @@ from studies.base.procedures import (
     of_procedure,
     paired,
 )
+from studies.base.tensile import BY_RANKS, goes_with
 from studies.fracture.measure import HELD_FAST, NET, PEAK, PEAK_RAISED
 
 SHOWN_ASPECT = 0.7
@@ -72,11 +72,6 @@ def _above(table: pd.DataFrame, upper: str, lower: str) -> Verdict:
     if (verdict == "found" and _holding(table, lower)) or (verdict == "not found" and _holding(table, upper)):
         return "not resolved"
     return verdict
-
-
-def _if_known(verdict: Verdict, part: pd.DataFrame) -> Verdict:
-    """The verdict of a slope or a place of peaks, which only piles that did not hold fast tell."""
-    return "not resolved" if verdict in ("found", "not found") and part[HELD_FAST].any() else verdict
 
 
 def _holding(table: pd.DataFrame, procedure: str) -> int:
@@ -170,7 +165,7 @@ def _goes_with_crossings_over_amplitude(table: pd.DataFrame) -> Finding:
         paper="Internal oscillation: over θ, the peak force goes with ⟨N⟩",
         ours=f"{ours}, θ = {thetas}°, l/w = {SHOWN_ASPECT:g}" if thetas else "no data",
         verdict=verdict,
-        criterion=f"slope of the peak force against ⟨N⟩ > 0, within seeds, l/w = {SHOWN_ASPECT:g}",
+        criterion=f"over θ within seeds, l/w = {SHOWN_ASPECT:g}: {BY_RANKS}",
     )
 
 
@@ -183,29 +178,25 @@ def _goes_with_crossings(table: pd.DataFrame) -> Finding:
         paper="Tensile strength and number of entanglements are connected",
         ours=f"all runs: {ours}; beside the criterion: internal over θ and l/w: {beside}",
         verdict=verdict,
-        criterion="slope of the peak force against ⟨N⟩ > 0 over all procedures and θ, within runs of one l/w and seed",
+        criterion=f"over all procedures and θ, within runs of one l/w and seed: {BY_RANKS}",
     )
 
 
-def _against_crossings(part: pd.DataFrame, blocks: Sequence[object]) -> tuple[str, Verdict]:
-    """Slope and correlation of the peak force with ⟨N⟩ within blocks."""
-    slope = slope_within(part[CROSSINGS], part[PEAK], [str(block) for block in blocks])
-    back = slope_within(part[PEAK], part[CROSSINGS], [str(block) for block in blocks])
-    # The product of the two slopes is r².
-    product = slope.value * back.value
-    correlation = f", r = {math.copysign(math.sqrt(product), slope.value):+.2f}" if product >= 0 else ""
-    return f"peak against ⟨N⟩ {told(slope, 3, ' per link')}{correlation}", _if_known(judge(slope), part)
+def _against_crossings(part: pd.DataFrame, blocks: Sequence[Hashable]) -> tuple[str, Verdict]:
+    return goes_with(part[CROSSINGS], part[PEAK], part[HELD_FAST], blocks)
 
 
 def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
-    compared = pd.concat([of_procedure(part, name) for name in (SHAPE, INTERNAL)])
     harder, brittle = (paired(part, quantity, SHAPE, INTERNAL) for quantity in (PEAK, PEAK_RAISED))
+    early = judge(negative(brittle))
+    if early in ("found", "not found") and (_holding(part, SHAPE) or _holding(part, INTERNAL)):
+        early = "not resolved"
     return Finding(
         paper="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
         ours=f"shape-change less internal: peak {told(harder, 3)}, hook raised at the peak {told(brittle, 3, ' m')}",
-        verdict=all_of([_above(part, SHAPE, INTERNAL), _if_known(judge(negative(brittle)), compared)]),
+        verdict=all_of([_above(part, SHAPE, INTERNAL), early]),
         criterion="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
     )

@@ -18,6 +18,7 @@ from postprocess.statistics.findings import Finding, Verdict, all_of, judge, neg
 from postprocess.statistics.pairs import mean_difference, told_less
 from postprocess.statistics.seeds import SeedMean, slope_within
 from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA, of_procedure
+from studies.base.tensile import BY_RANKS, goes_with
 from studies.strength.measure import ABOVE, CARRIED, HELD_FAST, PEAK, PEAK_RAISED, THROUGH, UPPER, WORK
 
 THREE = (EXTERNAL, INTERNAL, SHAPE)
@@ -180,7 +181,7 @@ def _goes_with_crossings(runs: pd.DataFrame) -> Finding:
         paper="Tensile strength and number of entanglements are connected",
         ours=ours,
         verdict=verdict,
-        criterion="slope of the peak force against ⟨N⟩ > 0 over all procedures, within runs of one height and seed",
+        criterion=f"over all procedures, within runs of one height and seed: {BY_RANKS}",
     )
 
 
@@ -196,7 +197,7 @@ def _over_amplitude(runs: pd.DataFrame) -> Finding:
         paper="Internal oscillation: over θ, the peak force goes with ⟨N⟩",
         ours=f"{ours}, θ = {thetas}°; beside the criterion: {beside}" if thetas else "no data",
         verdict=verdict,
-        criterion="slope of the peak force against ⟨N⟩ > 0 over θ, within runs of one height and seed",
+        criterion=f"over θ, within runs of one height and seed: {BY_RANKS}",
     )
 
 
@@ -206,8 +207,4 @@ def _blocks(part: pd.DataFrame) -> list[str]:
 
 
 def _against_crossings(part: pd.DataFrame) -> tuple[str, Verdict]:
-    slope = slope_within(part[CROSSINGS], part[PEAK], _blocks(part))
-    verdict = judge(slope)
-    if verdict in ("found", "not found") and part[HELD_FAST].any():
-        verdict = "not resolved"
-    return f"peak against ⟨N⟩ {told(slope, 3, ' per link')}", verdict
+    return goes_with(part[CROSSINGS], part[PEAK], part[HELD_FAST], _blocks(part))

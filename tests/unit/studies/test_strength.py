@@ -107,6 +107,9 @@ def test_runs_with_a_wall_are_none_of_this_study(tmp_path: Path, undrawn: None) 
 # -- findings on tables -----------------------------------------------------------------------------------------------
 
 
+SEEDS = range(1, 9)
+
+
 def as_in_the_paper() -> pd.DataFrame:
     random = np.random.default_rng(0)
     rows = [
@@ -129,7 +132,7 @@ def as_in_the_paper() -> pd.DataFrame:
             (INTERNAL, 0.5, 4e-3, 4.4),
             (SHAPE, 1.2, 1e-3, 6.0),
         )
-        for seed in (1, 2, 3)
+        for seed in SEEDS
         for upper in (0.013, 0.016)
     ]
     return pd.DataFrame(rows)
@@ -143,7 +146,7 @@ def test_findings_of_the_paper_are_found_and_their_opposite_is_not() -> None:
     table = as_in_the_paper()
     assert verdicts(table) == ["found"] * 6 + ["no data"]
     # Two heights of one seed are one sample, not two.
-    assert "n = 3" in findings(table)[0].ours
+    assert "n = 8" in findings(table)[0].ours
     table[PEAK], table[WORK], table[PEAK_RAISED] = 2 - table[PEAK], 2 - table[WORK], 1e-2 - table[PEAK_RAISED]
     assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found", "no data"]
 
@@ -163,7 +166,7 @@ def test_what_a_held_pile_leaves_unknown_is_not_judged() -> None:
 def test_a_seed_counts_where_it_has_all_heights() -> None:
     table = as_in_the_paper()
     part = table[~((table[SEED] == 3) & (table[measure.UPPER] == 0.016))]
-    assert "n = 2" in findings(part)[0].ours
+    assert "n = 7" in findings(part)[0].ours
 
 
 def over_theta(rise: float) -> pd.DataFrame:
@@ -189,12 +192,22 @@ def test_other_amplitudes_are_compared_among_themselves_alone() -> None:
         before, after = findings(as_in_the_paper()), findings(table)
         assert [one.ours for one in before[:-1]] == [one.ours for one in after[:-1]]
         assert after[-1].verdict == verdict
-        # Four θ of three seeds; the upper hook has one θ alone.
-        assert "(n = 12)" in after[-1].ours
+        # Four θ of eight seeds; the upper hook has one θ alone.
+        assert "(n = 8)" in after[-1].ours
+        assert "(n = 32)" in after[-1].ours
         assert "θ = 5 10 20 30°" in after[-1].ours
-    table = over_theta(0.01)
-    table.loc[table.index[-1], HELD_FAST] = 1.0
-    assert findings(table)[-1].verdict == "not resolved"
+
+
+def test_a_pile_that_one_smarticle_braces_does_not_decide() -> None:
+    """Its peak, many times that of its like, turns the slope; of ranks it is one among many, held fast or not."""
+    table = over_theta(-0.01)
+    most = table[THETA].idxmax()
+    table.loc[most, PEAK] = 50.0
+    assert findings(table)[-1].verdict == "not found"
+    assert "criterion: +" in findings(table)[-1].ours
+    table.loc[most, HELD_FAST], table.loc[most, PEAK] = 1.0, 2.0
+    assert findings(table)[-1].verdict == "not found"
+    assert "1 of the peaks lower bounds" in findings(table)[-1].ours
 
 
 def test_other_amplitudes_have_points_of_their_own(tmp_path: Path) -> None:

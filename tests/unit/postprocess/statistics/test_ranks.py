@@ -11,6 +11,7 @@ from scipy.stats import spearmanr
 
 from postprocess.statistics.ranks import (
     common_slopes,
+    correlation_within,
     few_blocks,
     interval,
     rank_correlations,
@@ -104,6 +105,48 @@ def test_copies_of_a_run_do_not_make_it_surer() -> None:
     assert widths(*four) == pytest.approx((low, high), abs=0.03)
     naive = widths(four[0], four[1], np.arange(160))
     assert naive[1] - naive[0] < 0.65 * (high - low)
+
+
+def test_within_blocks_it_is_the_mean_of_spearmans() -> None:
+    random = np.random.default_rng(3)
+    x, y = random.normal(size=(2, 8, 5))
+    levels = 100 * random.normal(size=(8, 1))
+    blocks = np.repeat(np.arange(8), 5).tolist()
+    found = correlation_within(x.ravel().tolist(), (y + levels).ravel().tolist(), blocks)
+    each = [spearmanr(*pair).statistic for pair in zip(x, y, strict=True)]
+    assert found.value == pytest.approx(np.mean(each))
+    assert found.standard_error == pytest.approx(np.std(each, ddof=1) / math.sqrt(8))
+    # How far above the others one is does not matter, nor what is not known at all.
+    y[:, 0] = 10
+    told = correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks)
+    y[:, 0] = math.inf
+    assert correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks) == told
+    more = correlation_within([*x.ravel(), 5.0], [*y.ravel(), math.nan], [*blocks, 0])
+    assert more == told
+
+
+def test_five_blocks_tell_no_error() -> None:
+    """All on one side by chance alone: one time in sixteen."""
+    for count in (5, 6):
+        x, blocks = [0.0, 1.0] * count, np.repeat(np.arange(count), 2).tolist()
+        found = correlation_within(x, x, blocks)
+        assert (found.value, found.count) == (pytest.approx(1), count)
+        assert math.isnan(found.half_width) == (count == 5)
+    # A block in which nothing varies does not count.
+    assert correlation_within([*x, 0, 1], [*x, 3, 3], [*blocks, -1, -1]).count == 6
+
+
+@pytest.mark.parametrize(("count", "size"), [(8, 4), (18, 2), (6, 2)])
+def test_of_nothing_it_is_clear_one_time_in_twenty(count: int, size: int) -> None:
+    random = np.random.default_rng(5)
+    blocks = np.repeat(np.arange(count), size).tolist()
+    clear = 0
+    for _ in range(400):
+        x, y = random.normal(size=(2, count * size))
+        found = correlation_within(x.tolist(), y.tolist(), blocks)
+        clear += abs(found.value) > found.half_width
+    # Mean of 20 and its standard deviation of 4.4; a rule without the half-width's t would have twice as many.
+    assert clear < 20 + 3 * 4.4
 
 
 def test_an_interval_of_values_that_are_mostly_unknown_has_no_ends() -> None:
