@@ -21,6 +21,8 @@ from scipy import stats
 
 from dem.record.manifest import read_run
 from dem.scene.reading import dump_scene
+from dem.scene.scene import Scene
+from studies.base.runs import DEFINITION
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import SEED, load_sweep
@@ -41,11 +43,16 @@ CELLS = [
     ("procedures-code", "shape-change_lw1.10_links_seed1"),
     ("factors", "text_halt_mu0.4_lw1.00_seed1"),
     ("engines", "hook_links_seed2"),
+    ("melting", "static_lw0.70_links_seed1"),
     ("melting-code", "static_lw0.70_links_seed1"),
     ("casting", "static_links_seed1"),
+    ("casting-code", "static_links_seed1"),
     ("fracture", "static_lw0.70_links_seed1"),
+    ("fracture-code", "static_lw0.70_links_seed1"),
+    ("strength", "static_h13_lw0.70_links_seed1"),
     ("strength-code", "static_h13_lw0.70_links_seed1"),
     ("chain", "baseline_n2_hH0.520_seed1"),
+    pytest.param("chain-bodies", "baseline_n2_hH0.520_seed1", marks=pytest.mark.engine),
     ("friction", "lw1.00_mu0.20_seed1"),
     ("finite-size", "lw0.09_n100_seed1"),
     ("landscape", "internal20_0.25s_lw1.10_seed1"),
@@ -69,7 +76,7 @@ OTHERS = [
     ("collapse", "lw1.17_gamma4.0_seed1", "lw0.66_gamma4.0_seed1"),
     ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1", "lw1.00_mu0.80_wall0.80_e0.7_seed1"),
 ]
-FEWEST = {"friction": 4, "collapse": 3, "finite-size": 6, "landscape": 3}
+FEWEST = {"friction": 4, "compaction": 4, "collapse": 3, "finite-size": 6, "landscape": 3}
 """Seeds of a cell where there are fewer than eight: the fewer, the wider is where a further one would lie."""
 
 
@@ -126,21 +133,45 @@ def cell(table: str, run: str) -> Cell:
     return Cell(table=table, run=run, rows=numbers)
 
 
+def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, object]:
+    """What the study measures of a scene that is run now."""
+    file, out = folder / f"{run}.yaml", folder / "runs" / run
+    file.write_text(dump_scene(scene), encoding="utf-8")
+    command = [sys.executable, "-m", "smarticles", "run", str(file), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return shipped(table).load(quick=False).measure(read_run(out)).rows[0]
+
+
 @pytest.mark.parametrize(("table", "run"), CELLS)
 def test_a_cell_comes_out_again(table: str, run: str, tmp_path: Path) -> None:
     point = points(table)[run]
     told = runs(table).loc[run]
     assert told["scene_sha256"] == point.scene_sha256, "the table is of another scene than the study has now"
-    scene, out = tmp_path / f"{run}.yaml", tmp_path / "runs" / run
-    scene.write_text(dump_scene(point.scene), encoding="utf-8")
-    command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    measured = shipped(table).load(quick=False).measure(read_run(out)).rows[0]
+    measured = again(table, run, point.scene, tmp_path)
     known = cell(table, run)
     assert len(known.rows) >= FEWEST.get(table, 8)
     assert set(known.rows) - {"engine"} <= set(measured)
     assert known.outside(measured) == {}
+
+
+def test_a_long_run_begins_as_the_table_has_it(tmp_path: Path) -> None:
+    """Two hundred seconds of shaking are minutes; their first five are not."""
+    table, run, begin = "compaction", "lw0.70_mu0.65_seed1", 5.0
+    point = points(table)[run]
+    assert runs(table).loc[run]["scene_sha256"] == point.scene_sha256
+    phases = [
+        phase.model_copy(update={"duration_s": begin}) if phase.type == "shake" else phase
+        for phase in point.scene.phases
+    ]
+    assert phases != list(point.scene.phases)
+    measured = again(table, run, point.scene.model_copy(update={"phases": tuple(phases)}), tmp_path)
+    known = cell(table, run)
+    columns = [f"phi_0 {DEFINITION} [-]", "crossings before [-]", f"phi {begin:g} s {DEFINITION} [-]"]
+    part = Cell(table=table, run=run, rows=known.rows[columns])
+    assert len(part.rows) >= FEWEST[table]
+    assert part.outside(measured) == {}
+    assert part.outside(runs("friction").loc["lw0.40_mu0.65_seed1"].to_dict())
 
 
 @pytest.mark.parametrize(("table", "run", "other"), OTHERS)
