@@ -34,5 +34,5 @@ def goes_with(
     slope = slope_within(crossings.tolist(), peaks.tolist(), blocks)
     number = int((held > 0).sum())
     bounds = f", {number} of the peaks lower bounds" if number else ""
-    ours = f"rank correlation {told(found, 2)}; beside the criterion: {told(slope, 3, ' n W_s per link')}{bounds}"
+    ours = f"rank correlation {told(found, 2)}; slope, not judged, {told(slope, 3, ' n W_s per link')}{bounds}"
     return ours, judge(found)
