@@ -100,14 +100,15 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
     for across, up, block in points:
         if not (math.isnan(across) or math.isnan(up)):
             parts.setdefault(block, []).append((across, up))
-    each = [float(_correlation(np.array(part, dtype=np.float64))) for part in parts.values()]
+    each = [_correlation(np.array(part, dtype=np.float64)) for part in parts.values()]
     mean = mean_over_seeds([one for one in each if math.isfinite(one)])
     return mean if mean.count >= _COINS else replace(mean, standard_error=math.nan, half_width=math.nan)
 
 
 def _correlation(part: Floats) -> float:
     one = np.zeros(len(part), dtype=np.int64)
-    return float(rank_correlations(part[:, :1], part[:, 1], one)[0])
+    # Without what rounding leaves of none, which would be told as a number.
+    return round(float(rank_correlations(part[:, :1], part[:, 1], one)[0]), 12)
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:

@@ -167,8 +167,14 @@ def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer
             label=_LABELS[procedure],
         )
     others = points[(points[PROCEDURE] == INTERNAL) & (points[THETA] != AMPLITUDE)]
-    axes.plot(
-        others[CROSSINGS], others[PEAK], SHAPES[INTERNAL], color=COLOURS[INTERNAL], markerfacecolor="white", zorder=6
+    draw_means(
+        axes,
+        others[CROSSINGS],
+        others[PEAK],
+        others[marked(PEAK, "95 %")],
+        across=others[marked(CROSSINGS, "95 %")],
+        look={**procedure_marker(INTERNAL), "linestyle": "none", "markerfacecolor": "white", "zorder": 6},
+        label="",
     )
     for k, (_, point) in enumerate(others.sort_values(CROSSINGS).iterrows()):
         # Above runs nearby, by turns at two heights, with a line down to its mean.
