@@ -12,11 +12,20 @@ import pandas as pd
 from dem.record.manifest import RunManifest
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.base.collapse.collapse_time import CollapseTime
-from studies.base.collapse.column import COM, DEFINITIONS, collapse_of, column_history, vibration
+from studies.base.collapse.column import (
+    COM,
+    DEFINITIONS,
+    REMAINING,
+    collapse_of,
+    column_history,
+    height_with_the_wall,
+    vibration,
+)
 from studies.base.runs import duration
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, HEIGHT_BEFORE = "container radius [m]", "com height before vibration [m]"
+HEIGHT_WITH, STANDS = "com height with the wall [m]", "within the radius before vibration [-]"
 DEFINITION, OUTCOME, TIME, TIME_ERROR, BOUND = "definition", "outcome", "tau [s]", "tau SE in run [s]", "tau above [s]"
 LOG, DELTA = "ln(f tau) [-]", "Delta of the run [-]"
 
@@ -56,7 +65,9 @@ def collapse_rows(run: RunManifest) -> list[dict[str, object]]:
         WATCHED: duration(shaken.phase),
         "smarticles [-]": run.count,
         RADIUS: run.container_radius,
+        HEIGHT_WITH: height_with_the_wall(run),
         HEIGHT_BEFORE: histories[COM].before,
+        STANDS: histories[REMAINING].before,
         "fidelity": run.fidelity,
     }
     ending = {"scene_sha256": run.scene_sha256, "run": run.directory.name}

@@ -16,6 +16,7 @@ from synthetic.series import write_series
 F = 30.0
 PHASES = ("deposit", "shake", "relax", "remove-container", "shake")
 H0 = 0.0075  # m
+WITH_WALL = 1.25  # of it: the column sinks when its wall goes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +74,7 @@ def _write_series(directory: Path, column: Column, table: NDArray[np.float64]) -
     columns = {
         "time_s": times,
         "phase": phases.astype(np.int64),
-        "com_height_m": H0 * (sunk + bounce),
+        "com_height_m": H0 * (sunk + bounce) * np.where(phases < len(column.phases) - 2, WITH_WALL, 1.0),
         "outside_count": _outside(column, left),
     }
     write_series(directory, columns, seed=column.seed)

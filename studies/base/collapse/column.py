@@ -124,6 +124,21 @@ def column_history(run: RunManifest, definition: str, shaken: Vibration) -> Colu
     return ColumnHistory(times=times, heights=heights / before, before=before)
 
 
+def height_with_the_wall(run: RunManifest) -> float:
+    """Height of the centre of mass when the wall was last there [m].
+
+    Raises:
+        InputError: The run lacks its series, or samples before its wall went.
+    """
+    series = read_series(run.directory)
+    gone = [phase.type for phase in run.phases].index("remove-container")
+    heights = series["com_height_m"][series["phase"] < gone]
+    if not len(heights):
+        msg = f"{run.directory}: no height of the column before its wall went; record more often"
+        raise InputError(msg)
+    return float(heights[-1])
+
+
 def _from_series(
     run: RunManifest, definition: str, shaken: Vibration
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
-from synthetic.columns import H0, PHASES, Column, F, write_column
+from synthetic.columns import H0, PHASES, WITH_WALL, Column, F, write_column
 
 from dem.errors import InputError
 from dem.record.manifest import read_run
@@ -27,7 +27,17 @@ from studies.collapse.law import (
     levels,
     slope_through_origin,
 )
-from studies.collapse.measure import DEFINITION, DELTA, GAMMA, HEIGHT_BEFORE, LOG, TIME, collapse_rows
+from studies.collapse.measure import (
+    DEFINITION,
+    DELTA,
+    GAMMA,
+    HEIGHT_BEFORE,
+    HEIGHT_WITH,
+    LOG,
+    STANDS,
+    TIME,
+    collapse_rows,
+)
 from studies.collapse.reference import read_collapse_reference, reference_delta
 from studies.collapse.study import Collapse
 
@@ -82,6 +92,8 @@ def test_each_definition_gives_its_own_time(one):
     assert rows.loc[REMAINING, LOG] == pytest.approx(math.log(F * rows.loc[REMAINING, TIME]))
     assert rows.loc[REMAINING, DELTA] == pytest.approx(2.5 * rows.loc[REMAINING, LOG])
     assert rows.loc[REMAINING, HEIGHT_BEFORE] == pytest.approx(H0)
+    assert rows.loc[REMAINING, HEIGHT_WITH] == pytest.approx(WITH_WALL * H0)
+    assert rows.loc[REMAINING, STANDS] == 1
 
 
 def test_a_mean_over_a_period_does_not_see_the_bouncing_within():
