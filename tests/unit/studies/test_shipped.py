@@ -113,8 +113,13 @@ def test_chains_with_bodies_have_one_engine() -> None:
 @pytest.mark.parametrize("quick", [False, True])
 @pytest.mark.parametrize("name", CODES)
 def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str, quick: bool) -> None:
-    """Point by point, in the same order: what else differs in the scene is what the protocol says."""
+    """Point by point, in the same order: what else differs in the scene is what the protocol says.
+
+    By the code there may be further seeds.
+    """
     text, code = (points_of(one, quick=quick) for one in (name, f"{name}-code"))
+    seeds = {point.scene.seed for point in text}
+    code = [point for point in code if point.scene.seed in seeds]
     assert len(text) == len(code) > 0
     for one, other in zip(text, code, strict=True):
         assert one.name == other.name
