@@ -42,6 +42,7 @@ from studies.base.procedures import (
     THETA,
     of_procedure,
 )
+from studies.procedures.energy_readings import draw_readings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,6 +100,7 @@ def draw(
         written = _draw_heights(output / "height_time", runs, manifests, footer)
         for panel in panels:
             written += _draw_panel(output / panel.name, panel, points, footer)
+        written += draw_readings(output / "energy_readings", points, footer)
     return written
 
 

@@ -222,6 +222,16 @@ def test_the_opposite_is_not_found(start):
     assert row_of(table, start).verdict == "not found"
 
 
+def test_what_only_leans_towards_a_maximum_is_none():
+    """Above the mean of its neighbours, yet below one of them: the top of a bump that stands beside it."""
+    table = as_in_the_paper()
+    put(ENERGY, INTERNAL, lambda part: 1e-5 * (part[ASPECT] > 0.85) + 2e-5 * part[ASPECT])(table)
+    found = row_of(table, PEAK)
+    assert found.verdict == "not found"
+    assert "there less at 0.8 +1.2" in found.ours
+    assert "; less at 1 -" in found.ours
+
+
 INDIFFERENT = {
     "Shape change: the centre of mass rises": put(STRAIGHT, SHAPE, 1.0),
     "Shape change: the centre of mass does not": put(HEIGHT, SHAPE, 1.0),
