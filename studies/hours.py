@@ -111,7 +111,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         table = hours(told.folder, told.studies)
     except InputError as error:
         parser.error(str(error))
-    table.round(4).to_csv((told.out or told.folder) / "hours.csv", index=False)
+    out: Path = told.out or told.folder
+    out.mkdir(parents=True, exist_ok=True)
+    table.round(4).to_csv(out / "hours.csv", index=False)
     print(text(table), end="")
 
 

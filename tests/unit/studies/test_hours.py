@@ -68,9 +68,10 @@ def test_hours_are_those_planned_and_those_that_finished_runs_took(studies: Path
 
 
 def test_the_table_is_written_and_told(studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main([str(studies), "two", "--out", str(tmp_path)])
+    out = tmp_path / "there" / "is none yet"
+    main([str(studies), "two", "--out", str(out)])
     assert "| two | links | 2 | 0.0 | 1 | 0.01 | 0.01 | 0.50 |" in capsys.readouterr().out
-    assert len(pd.read_csv(tmp_path / "hours.csv")) == 3
+    assert len(pd.read_csv(out / "hours.csv")) == 3
 
 
 def test_what_holds_no_study_is_refused(studies: Path, tmp_path: Path) -> None:
