@@ -76,7 +76,7 @@ OTHERS = [
     ("collapse", "lw1.17_gamma4.0_seed1", "lw0.66_gamma4.0_seed1"),
     ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1", "lw1.00_mu0.80_wall0.80_e0.7_seed1"),
 ]
-FEWEST = {"compaction": 4, "collapse": 3, "finite-size": 6, "landscape": 3}
+FEWEST = {"compaction": 4, "finite-size": 6, "landscape": 3}
 """Seeds of a cell where there are fewer than eight: the fewer, the wider is where a further one would lie."""
 
 
