@@ -29,6 +29,9 @@ AMPLITUDE = 10.0
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"
 
+BY_RANKS = "mean over seeds of the rank correlation of peak force and ⟨N⟩ > 0; what held fast is above all that did not"
+"""Criterion by which the force that tears a pile goes with its entanglement, see `postprocess.statistics.bounded`."""
+
 NAMED: Mapping[str, Callable[[pd.Series], str]] = MappingProxyType(
     {
         "procedure": lambda point: str(point[PROCEDURE]),

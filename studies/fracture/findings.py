@@ -17,11 +17,13 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 import pandas as pd
 
+from postprocess.statistics.bounded import goes_with
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import told_less
 from studies.base.procedures import (
     AMPLITUDE,
+    BY_RANKS,
     CROSSINGS,
     EXTERNAL,
     INTERNAL,
@@ -32,7 +34,6 @@ from studies.base.procedures import (
     of_procedure,
     paired,
 )
-from studies.base.tensile import BY_RANKS, goes_with
 from studies.fracture.measure import HELD_FAST, NET, PEAK, PEAK_RAISED
 
 SHOWN_ASPECT = 0.7
@@ -183,7 +184,8 @@ def _goes_with_crossings(table: pd.DataFrame) -> Finding:
 
 
 def _against_crossings(part: pd.DataFrame, blocks: Sequence[Hashable]) -> tuple[str, Verdict]:
-    return goes_with(part[CROSSINGS], part[PEAK], part[HELD_FAST], blocks)
+    crossings, peaks, held = part[CROSSINGS], part[PEAK], part[HELD_FAST]
+    return goes_with(crossings, peaks, held, blocks, unit="n W_s per link", called="peaks")
 
 
 def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:

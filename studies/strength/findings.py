@@ -13,12 +13,22 @@ from collections.abc import Callable, Sequence
 
 import pandas as pd
 
+from postprocess.statistics.bounded import goes_with
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import mean_difference, told_less
 from postprocess.statistics.seeds import SeedMean, slope_within
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, THETA, of_procedure
-from studies.base.tensile import BY_RANKS, goes_with
+from studies.base.procedures import (
+    BY_RANKS,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PROCEDURE,
+    SHAPE,
+    STATIC,
+    THETA,
+    of_procedure,
+)
 from studies.strength.measure import ABOVE, CARRIED, HELD_FAST, PEAK, PEAK_RAISED, THROUGH, UPPER, WORK
 
 THREE = (EXTERNAL, INTERNAL, SHAPE)
@@ -207,4 +217,5 @@ def _blocks(part: pd.DataFrame) -> list[str]:
 
 
 def _against_crossings(part: pd.DataFrame) -> tuple[str, Verdict]:
-    return goes_with(part[CROSSINGS], part[PEAK], part[HELD_FAST], _blocks(part))
+    crossings, peaks, held = part[CROSSINGS], part[PEAK], part[HELD_FAST]
+    return goes_with(crossings, peaks, held, _blocks(part), unit="n W_s per link", called="peaks")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from studies.base.tensile import goes_with
+from postprocess.statistics.bounded import goes_with
+
+WORDS = {"unit": "n W_s per link", "called": "peaks"}
 
 
 def table(peaks: list[float]) -> pd.DataFrame:
@@ -19,17 +21,17 @@ def test_with_it_against_it_and_neither() -> None:
         runs = table([float(peak) for peak in peaks])
         runs["peak"] += 0.7 * (runs["seed"] % 3)
         runs.loc[runs["seed"] == 0, "peak"] *= -1
-        told, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist())
+        told, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist(), **WORDS)
         assert found == verdict, told
 
 
 def test_what_held_fast_is_above_all_that_did_not() -> None:
     """Whatever its bound is: here below what the others took."""
     runs = table([2.0, 3.0, 4.0, 1.0])
-    before, _ = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist())
+    before, _ = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist(), **WORDS)
     assert before.startswith("rank correlation -0.2 ")
     runs.loc[runs["crossings"] == 4, "held"] = 1.0
-    told, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist())
+    told, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist(), **WORDS)
     assert told.startswith("rank correlation +1 ")
     assert told.endswith(", 8 of the peaks lower bounds")
     assert found == "found"
@@ -39,5 +41,5 @@ def test_what_held_fast_is_above_all_that_did_not() -> None:
 def test_too_few_seeds_tell_nothing(seeds: int) -> None:
     runs = table([1.0, 2.0, 3.0, 9.0])
     runs = runs[runs["seed"] < seeds]
-    _, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist())
+    _, found = goes_with(runs["crossings"], runs["peak"], runs["held"], runs["seed"].tolist(), **WORDS)
     assert found == ("not resolved" if seeds else "no data")
