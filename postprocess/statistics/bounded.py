@@ -1,4 +1,4 @@
-"""Does one quantity go with another of which some values are lower bounds, or many times their like?
+"""What can be said of a quantity of which some values are lower bounds, or many times their like.
 
 Such as the force that tears a pile with its entanglement: a pile that holds fast has a peak of at least what it took,
 and one that a single smarticle braces for a moment has one many times that of its like. Neither has a place on a
@@ -13,9 +13,23 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.findings import Verdict, judge, told
+from postprocess.statistics.findings import Effect, Verdict, judge, told
 from postprocess.statistics.ranks import correlation_within
 from postprocess.statistics.seeds import slope_within
+
+
+def above(effect: Effect, *, upper: bool, lower: bool) -> Verdict:
+    """Whether one thing is clearly above another, where values of either may be lower bounds.
+
+    Args:
+        effect: The one less the other.
+        upper: Whether values of the one are lower bounds: it may be higher still, so that it is never below.
+        lower: The same of the other.
+    """
+    verdict = judge(effect)
+    if (verdict == "found" and lower) or (verdict == "not found" and upper):
+        return "not resolved"
+    return verdict
 
 
 def goes_with(

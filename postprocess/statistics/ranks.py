@@ -95,9 +95,8 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
         >>> f'{correlation_within([1, 2, 1, 2], [5, 7, 1, math.inf], ["a", "a", "b", "b"]).value:.3f}'
         '1.000'
     """
-    points = zip(x, y, blocks, strict=True)
     parts: dict[Hashable, list[tuple[float, float]]] = {}
-    for across, up, block in points:
+    for across, up, block in zip(x, y, blocks, strict=True):
         if not (math.isnan(across) or math.isnan(up)):
             parts.setdefault(block, []).append((across, up))
     each = [_correlation(np.array(part, dtype=np.float64)) for part in parts.values()]

@@ -154,6 +154,43 @@ def draw_means(
             lines.set_label(_CONFIDENCE)
 
 
+def draw_against(axes: Axes, means: pd.DataFrame, x: str, y: str, *, look: Mapping[str, Any], label: str) -> None:
+    """Means of one quantity against those of another, with the 95 % of both.
+
+    Args:
+        axes: To draw in.
+        means: Rows with both quantities and what `postprocess.statistics.points.marked` calls their 95 %.
+        x: Quantity across.
+        y: Quantity upwards.
+        look: Marker, see `marker`.
+        label: For the legend.
+    """
+    errors = {"half_widths": means[marked(y, "95 %")], "across": means[marked(x, "95 %")]}
+    draw_means(axes, means[x], means[y], look={**look, "linestyle": "none"}, label=label, **errors)
+
+
+def draw_runs(
+    axes: Axes, runs: pd.DataFrame, x: str, y: str, *, bounds: str, length: float, shape: str, colour: str
+) -> None:
+    """Every run as a small marker, with an arrow upwards where its y is a lower bound.
+
+    Args:
+        axes: To draw in.
+        runs: One row each.
+        x: Quantity across.
+        y: Quantity upwards.
+        bounds: Column that is above 0 where y is a lower bound.
+        length: Of the arrows, in the unit of y.
+        shape: Of the markers.
+        colour: Of both.
+    """
+    axes.plot(runs[x], runs[y], shape, color=colour, markersize=1.8, alpha=0.55)
+    held = runs[runs[bounds] > 0]
+    draw_bounds(
+        axes, held[x], held[y], length, look={"color": colour, "elinewidth": 0.6, "alpha": 0.55, "capsize": 1.6}
+    )
+
+
 def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, look: Mapping[str, Any]) -> None:
     """Lower bounds: markers with an arrow upwards of some length, which is no error; NaN are left out."""
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))

@@ -19,9 +19,10 @@ from studies.base.figures import (
     SHAPES,
     THETA_LABEL,
     History,
-    draw_bounds,
+    draw_against,
     draw_history,
     draw_means,
+    draw_runs,
     finished,
     legend_above,
     marker,
@@ -193,23 +194,14 @@ def _draw_peaks(path: Path, x: str, points: pd.DataFrame, told: Sequence[str], f
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     """Peak force against ⟨N⟩: every run, and the means."""
     figure, axes = figures.new_figure(height=2.8)
+    length = 0.08 * float(runs[PEAK].max())
     for line in _all_points(runs):
         one, mean = line.part(runs), line.part(points)
         if one.empty:
             continue
-        axes.plot(one[CROSSINGS], one[PEAK], line.shape, color=line.colour, markersize=1.8, alpha=0.55)
-        held = one[one[HELD_FAST] > 0]
-        arrow = {"color": line.colour, "elinewidth": 0.6, "alpha": 0.55, "capsize": 1.6}
-        draw_bounds(axes, held[CROSSINGS], held[PEAK], 0.08 * float(runs[PEAK].max()), look=arrow)
-        draw_means(
-            axes,
-            mean[CROSSINGS],
-            mean[PEAK],
-            mean[marked(PEAK, "95 %")],
-            across=mean[marked(CROSSINGS, "95 %")],
-            look={"markersize": 4.2, **marker(line.shape, line.colour, "white"), "linestyle": "none"},
-            label=line.label,
-        )
+        draw_runs(axes, one, CROSSINGS, PEAK, bounds=HELD_FAST, length=length, shape=line.shape, colour=line.colour)
+        look = {"markersize": 4.2, **marker(line.shape, line.colour, "white")}
+        draw_against(axes, mean, CROSSINGS, PEAK, look=look, label=line.label)
     axes.set_xlabel(_CROSSINGS_LABEL)
     axes.set_ylabel(_PEAK_LABEL)
     axes.set_ylim(bottom=0)

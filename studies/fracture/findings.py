@@ -17,7 +17,7 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.bounded import goes_with
+from postprocess.statistics.bounded import above, goes_with
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import told_less
@@ -69,10 +69,8 @@ def _told_less(table: pd.DataFrame, quantity: str, one: str, others: Sequence[st
 
 def _above(table: pd.DataFrame, upper: str, lower: str) -> Verdict:
     """Whether the peaks of one procedure are above those of another, which are lower bounds where a pile held fast."""
-    verdict = judge(paired(table, PEAK, upper, lower))
-    if (verdict == "found" and _holding(table, lower)) or (verdict == "not found" and _holding(table, upper)):
-        return "not resolved"
-    return verdict
+    holding = {"upper": bool(_holding(table, upper)), "lower": bool(_holding(table, lower))}
+    return above(paired(table, PEAK, upper, lower), **holding)
 
 
 def _holding(table: pd.DataFrame, procedure: str) -> int:
@@ -191,14 +189,12 @@ def _against_crossings(part: pd.DataFrame, blocks: Sequence[Hashable]) -> tuple[
 def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:
     part = at_shown_aspect(table)
     harder, brittle = (paired(part, quantity, SHAPE, INTERNAL) for quantity in (PEAK, PEAK_RAISED))
-    early = judge(negative(brittle))
-    if early in ("found", "not found") and (_holding(part, SHAPE) or _holding(part, INTERNAL)):
-        early = "not resolved"
+    unknown = bool(_holding(part, SHAPE) or _holding(part, INTERNAL))
     return Finding(
         paper="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
         ours=f"shape-change less internal: peak {told(harder, 3)}, hook raised at the peak {told(brittle, 3, ' m')}",
-        verdict=all_of([_above(part, SHAPE, INTERNAL), early]),
+        verdict=all_of([_above(part, SHAPE, INTERNAL), above(negative(brittle), upper=unknown, lower=unknown)]),
         criterion="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
     )

@@ -96,11 +96,12 @@ def draw(
         _Panel(name="crossings_theta", quantity=CROSSINGS, label=CROSSINGS_LABEL, x=THETA, lines=_of_aspects),
         _Panel(name="energy_theta", quantity=ENERGY, label=_ENERGY_LABEL, x=THETA, lines=_of_aspects, log=True),
     ]
+    moved = {name: _LABELS[name] for name in (SHAPE, INTERNAL)}
     with figures.style():
         written = _draw_heights(output / "height_time", runs, manifests, footer)
         for panel in panels:
             written += _draw_panel(output / panel.name, panel, points, footer)
-        written += draw_readings(output / "energy_readings", points, footer)
+        written += draw_readings(output / "energy_readings", points, moved, footer)
     return written
 
 

@@ -19,9 +19,10 @@ from studies.base.figures import (
     CROSSINGS_LABEL,
     SHAPES,
     History,
-    draw_bounds,
+    draw_against,
     draw_history,
     draw_means,
+    draw_runs,
     finished,
     legend_above,
     procedure_marker,
@@ -148,34 +149,18 @@ def _draw_means(path: Path, points: pd.DataFrame, footer: Sequence[str]) -> list
 def _draw_crossings(path: Path, points: pd.DataFrame, runs: pd.DataFrame, footer: Sequence[str]) -> list[Path]:
     """Peak force against ⟨N⟩: every run, an arrow where it held fast, and the means of each height and θ."""
     figure, axes = figures.new_figure(height=2.8)
+    length = 0.08 * float(runs[PEAK].max())
     for procedure in ORDER:
         one, mean = runs[runs[PROCEDURE] == procedure], of_procedure(points, procedure)
         if one.empty:
             continue
-        colour = COLOURS[procedure]
-        axes.plot(one[CROSSINGS], one[PEAK], SHAPES[procedure], color=colour, markersize=1.8, alpha=0.55)
-        held = one[one[HELD_FAST] > 0]
-        arrow = {"color": colour, "elinewidth": 0.6, "alpha": 0.55, "capsize": 1.6}
-        draw_bounds(axes, held[CROSSINGS], held[PEAK], 0.08 * float(runs[PEAK].max()), look=arrow)
-        draw_means(
-            axes,
-            mean[CROSSINGS],
-            mean[PEAK],
-            mean[marked(PEAK, "95 %")],
-            across=mean[marked(CROSSINGS, "95 %")],
-            look={"markersize": 4.2, **procedure_marker(procedure), "linestyle": "none"},
-            label=_LABELS[procedure],
-        )
+        shape, colour = SHAPES[procedure], COLOURS[procedure]
+        draw_runs(axes, one, CROSSINGS, PEAK, bounds=HELD_FAST, length=length, shape=shape, colour=colour)
+        look = {"markersize": 4.2, **procedure_marker(procedure)}
+        draw_against(axes, mean, CROSSINGS, PEAK, look=look, label=_LABELS[procedure])
     others = points[(points[PROCEDURE] == INTERNAL) & (points[THETA] != AMPLITUDE)]
-    draw_means(
-        axes,
-        others[CROSSINGS],
-        others[PEAK],
-        others[marked(PEAK, "95 %")],
-        across=others[marked(CROSSINGS, "95 %")],
-        look={**procedure_marker(INTERNAL), "linestyle": "none", "markerfacecolor": "white", "zorder": 6},
-        label="",
-    )
+    open_marker = {**procedure_marker(INTERNAL), "markerfacecolor": "white", "zorder": 6}
+    draw_against(axes, others, CROSSINGS, PEAK, look=open_marker, label="")
     for k, (_, point) in enumerate(others.sort_values(CROSSINGS).iterrows()):
         # Above runs nearby, by turns at two heights, with a line down to its mean.
         place, above = (point[CROSSINGS], point[PEAK]), (point[CROSSINGS], (0.36 + 0.07 * (k % 2)) * axes.dataLim.y1)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 import pandas as pd
 
-from postprocess.statistics.bounded import goes_with
+from postprocess.statistics.bounded import above, goes_with
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import mean_difference, told_less
@@ -77,10 +77,8 @@ def less(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
 
 def _above(table: pd.DataFrame, upper: str, lower: str, quantity: str = PEAK) -> Verdict:
     """Whether one procedure is above another in what is a lower bound where a pile held fast."""
-    verdict = judge(less(table, quantity, upper, lower))
-    if (verdict == "found" and _holding(table, lower)) or (verdict == "not found" and _holding(table, upper)):
-        return "not resolved"
-    return verdict
+    holding = {"upper": bool(_holding(table, upper)), "lower": bool(_holding(table, lower))}
+    return above(less(table, quantity, upper, lower), **holding)
 
 
 def _holding(table: pd.DataFrame, procedure: str) -> bool:
@@ -159,14 +157,12 @@ def _other_order_than_crossings(table: pd.DataFrame) -> Finding:
 
 def _harder_but_more_brittle(table: pd.DataFrame) -> Finding:
     harder, brittle = (less(table, quantity, SHAPE, INTERNAL) for quantity in (PEAK, PEAK_RAISED))
-    early = judge(negative(brittle))
-    if early in ("found", "not found") and (_holding(table, SHAPE) or _holding(table, INTERNAL)):
-        early = "not resolved"
+    unknown = bool(_holding(table, SHAPE) or _holding(table, INTERNAL))
     return Finding(
         paper="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
         ours=f"shape-change less internal: peak {told(harder, 3)}, hook raised at the peak {told(brittle, 3, ' m')}",
-        verdict=all_of([_above(table, SHAPE, INTERNAL), early]),
+        verdict=all_of([_above(table, SHAPE, INTERNAL), above(negative(brittle), upper=unknown, lower=unknown)]),
         criterion="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
     )

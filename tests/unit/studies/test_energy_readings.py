@@ -15,6 +15,7 @@ from studies.base.activity import ENERGY, SAMPLED
 from studies.base.procedures import AMPLITUDE, INTERNAL, PROCEDURE, SHAPE, THETA
 from studies.procedures.energy_readings import draw_readings
 
+LABELS = {SHAPE: "shape change", INTERNAL: "internal oscillation"}
 FOOTER = ["Study procedures: 32 runs.", "More: findings.md."]
 
 
@@ -38,7 +39,7 @@ def means(*, sampled: float) -> pd.DataFrame:
 
 def drawn(folder: Path, points: pd.DataFrame) -> list[Path]:
     with figures.style():
-        return draw_readings(folder / "energy_readings", points, FOOTER)
+        return draw_readings(folder / "energy_readings", points, LABELS, FOOTER)
 
 
 def test_two_panels_of_one_scale_tell_which_is_which(tmp_path: Path) -> None:
@@ -51,6 +52,9 @@ def test_two_panels_of_one_scale_tell_which_is_which(tmp_path: Path) -> None:
     assert "Error bars: 95 %" in text
     # 200 µJ are on the axis that both panels share.
     assert "200" in text
+    # By samples it is 20 µJ at most, which a scale of its own would name.
+    assert text.split().count("200") == 1
+    assert "20" not in text.split()
 
 
 def test_without_samples_there_is_no_such_figure(tmp_path: Path) -> None:
