@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from postprocess import read_frames, read_series
+from postprocess import read_frames
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,8 @@ def segments(vertices: Array) -> Array:
     Returns:
         (3N, 2, 3) ends of each link's axis [m].
     """
-    return np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
+    found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return found
 
 
 def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
@@ -63,7 +65,8 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
 
     def volume(time: Array) -> Array:
         u, v, apart = ends(time)
-        return (np.cross(u, v) * apart).sum(axis=-1)
+        found: Array = (np.cross(u, v) * apart).sum(axis=-1)
+        return found
 
     found = np.zeros(len(i), dtype=bool)
     times = np.linspace(0, 1, 17)
@@ -110,7 +113,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
         if not finite:
             wrong.append(f"no number in the frame at {frame.time:.4f} s")
             break
-        height = vertices[..., 2] - frame.floor
+        height = vertices[..., 2] - frame.floor_z
         out = np.hypot(vertices[..., 0], vertices[..., 1]) + thickness / 2 - radius
         floor_depth = max(floor_depth, float((thickness / 2 - height).max()) / thickness)
         wall_depth = max(wall_depth, float(np.where(height < wall, out, -np.inf).max()) / thickness)
@@ -146,10 +149,11 @@ def energy_errors(path: Path, scene: Mapping[str, Any]) -> tuple[float, float]:
 
     Energy is put in by gravity at the pour, by throwing, and by the works of motors and container. NaN is passed on.
     """
-    series = read_series(path)
+    with h5py.File(path / "series.h5") as file:
+        series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}
 
     def column(name: str) -> Array:
-        return np.asarray(series[name], dtype=float) if name in series else np.zeros(len(series["time_s"]))
+        return series.get(name, np.zeros(len(series["time_s"])))
 
     size = scene["smarticle"]
     section = size["thickness_normal_m"] * size["thickness_in_plane_m"]
