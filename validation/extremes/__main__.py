@@ -89,7 +89,8 @@ def main() -> int:
         for run in runs:
             rows.append(run.result())
             pd.DataFrame(rows).to_csv(path, index=False, float_format="%.4g")
-            print("{scene:4d} {end:20s} {wall time [s]:6.1f} s  {last phase}: {cause}".format(**rows[-1]), flush=True)
+            row = rows[-1]
+            print(f"{row['scene']:4d} {row['end']:20s} {row['last phase']}: {row['cause']}", flush=True)
     table = pd.DataFrame(rows)
     print(table["end"].value_counts().to_string())
     return int((table["end"] == WRONG).any())
