@@ -3,7 +3,7 @@
 A pile per seed is poured once, on links; every engine gets its poses, lets them rest, and shakes them at Γ = 2 and
 30 Hz, or swings the barbs by 10° where it has motors. Every simulation is a process of its own on one thread, one after
 the other, seed by seed. Timed is the activity alone, by processor time. Rows go to `rivals.csv` as they come, where a
-later call with the same `--out` goes on; the table is made of them. What is not installed is left out, in one
+later call with the same `--out` goes on; table and figure are made of them. What is not installed is left out, in one
 line each.
 """
 
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.rivals import running
+from benchmarks.rivals import figure, running
 from benchmarks.rivals.ours import RESIDUAL
 from benchmarks.rivals.settings import ACTIVITIES, ENGINES, SETTINGS, Setting
 from benchmarks.rivals.table import markdown, medians, verdicts
@@ -110,7 +110,7 @@ def machine() -> str:
 
 
 def main() -> int:
-    """Run all; write the table and the origin."""
+    """Run all; write the table, the figure and the origin."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rivals", description=__doc__)
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES), help="(default: all)")
     parser.add_argument("--activities", nargs="+", choices=ACTIVITIES, default=list(ACTIVITIES))
@@ -118,7 +118,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=0.4, help="of the activity [s] (default: %(default)s)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="piles; what is costly has the first")
     parser.add_argument("--quick", action="store_true", help="a small pile, and little time")
-    parser.add_argument("--analyse", action="store_true", help="run nothing: table of the rows in --out")
+    parser.add_argument("--analyse", action="store_true", help="run nothing: table and figure of the rows in --out")
     parser.add_argument("--out", type=Path, default=None, help="folder (default: a new one); goes on if it exists")
     arguments = parser.parse_args()
     if arguments.quick:
@@ -153,6 +153,10 @@ def main() -> int:
     }
     (folder / "rivals.json").write_text(json.dumps(origin, indent=2) + "\n", encoding="utf-8")
     (folder / "rivals.md").write_text(markdown(table, said), encoding="utf-8")
+    about = f"N = {arguments.count}, l/w = 0.7; {origin['machine']}; git {origin['versions']['git']}"
+    figure.draw(
+        folder / "rivals", table, [about, "Medians over seeds; overlap of the shapes that each engine keeps apart."]
+    )
     print((folder / "rivals.md").read_text(encoding="utf-8"))
     return 0
 

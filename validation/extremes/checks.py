@@ -32,6 +32,29 @@ def segments(vertices: Array) -> Array:
     return found
 
 
+def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
+    """Return points of all axes, and how much material surrounds each.
+
+    A link ends at its tip, where there is nothing beyond the axis; half a thickness from there on it is a thickness
+    wide. So neither a square nor a rounded end is taken for more than it is.
+
+    Args:
+        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip [m].
+        thickness: of a link [m].
+
+    Returns:
+        (M, 3) points [m], (M,) radius of the material about each [m].
+    """
+    ends = segments(vertices)
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=-1)
+    wide = length > thickness
+    step = along[wide] / length[wide, None] * thickness / 2
+    inner = np.concatenate([ends[wide, 0] + step, ends[wide, 1] - step])
+    points = np.concatenate([ends.reshape(-1, 3), inner])
+    return points, np.repeat([0.0, thickness / 2], [2 * len(ends), len(inner)])
+
+
 def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     """Find axes of different smarticles that pass through each other while vertices move along straight lines.
 
@@ -113,9 +136,10 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
         if not finite:
             wrong.append(f"no number in the frame at {frame.time:.4f} s")
             break
-        height = vertices[..., 2] - frame.floor_z
-        out = np.hypot(vertices[..., 0], vertices[..., 1]) + thickness / 2 - radius
-        floor_depth = max(floor_depth, float((thickness / 2 - height).max()) / thickness)
+        points, inset = surface(vertices, thickness)
+        height = points[:, 2] - frame.floor_z - inset
+        out = np.hypot(points[:, 0], points[:, 1]) + inset - radius
+        floor_depth = max(floor_depth, float((-height).max()) / thickness)
         wall_depth = max(wall_depth, float(np.where(height < wall, out, -np.inf).max()) / thickness)
         if last is not None:
             count = min(len(last), len(vertices))

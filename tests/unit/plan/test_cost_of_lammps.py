@@ -6,52 +6,10 @@ from typing import Any
 
 import pytest
 
+from benchmarks.lammps import scene_data
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from smarticles.sweeps import expected_wall_s
-
-
-def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "schema_version": 1,
-        "name": "lammps",
-        "engine": engine,
-        "fidelity": fidelity,
-        "seed": seed,
-        "count": count,
-        "phases": list(phases),
-        "recording": {"frame_interval_s": 0.04, "checkpoint_interval_s": None},
-    }
-
-
-WELDED = {
-    **scene_data(
-        "lammps",
-        7,
-        100,
-        "draft",
-        {"type": "deposit", "per_layer": 12},
-        {"type": "relax", "duration_s": 0.1},
-        {"type": "shake", "duration_s": 0.4, "frequency_hz": 50.0, "peak_acceleration_g": 3.0},
-    ),
-    "smarticle": {"aspect_ratio": 0.5},
-    "container": {"radius_m": 0.018},
-    "recording": {"checkpoint_interval_s": None},
-}
-DENSE = {
-    **scene_data(
-        "lammps",
-        7,
-        250,
-        "draft",
-        {"type": "deposit", "per_layer": 25},
-        {"type": "relax", "duration_s": 0.1},
-        {"type": "shake", "duration_s": 0.2, "frequency_hz": 20.0, "peak_acceleration_g": 1.5},
-    ),
-    "smarticle": {"aspect_ratio": 1.0},
-    "container": {"radius_m": 0.03},
-    "recording": {"checkpoint_interval_s": None},
-}
 
 
 def rates(data: dict[str, Any]) -> dict[str, float]:
@@ -68,13 +26,6 @@ PHASES = ({"type": "deposit"}, {"type": "relax", "duration_s": 0.2}, {"type": "s
         # results/lammps, agree: six seeds.
         (scene_data("lammps", 1, 60, "draft", *PHASES), "relax", 1.9),
         (scene_data("lammps", 1, 60, "draft", *PHASES), "shake", 4.6),
-        # results/bench, planned.csv.
-        (WELDED, "deposit", 4.6),
-        (WELDED, "relax", 2.6),
-        (WELDED, "shake", 5.0),
-        (DENSE, "deposit", 15.5),
-        (DENSE, "relax", 7.4),
-        (DENSE, "shake", 16.2),
     ],
 )
 def test_costs_are_those_measured(data: dict[str, Any], kind: str, measured: float) -> None:

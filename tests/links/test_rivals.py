@@ -1,0 +1,193 @@
+"""Engines of the bench beside the rivals: each adapter on a known answer; skipped where an engine is not installed."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from synthetic import SyntheticRun, mesh_of, write_ending, write_manifest
+
+from benchmarks.rivals import __main__ as bench
+from benchmarks.rivals import running, settings
+from benchmarks.rivals.given import Given, Outcome
+from benchmarks.rivals.settings import ENGINES, OSCILLATE, SETTINGS, SHAKE, Setting
+from dem.body.state import State
+from dem.record.frames import FrameWriter
+from dem.scene.reading import parse_scene
+
+Array = NDArray[np.float64]
+
+LOOK = 1e-3  # s
+GAMMA, FREQUENCY = 2.0, 30.0
+FLOOR_FRICTION = 0.4
+CHOSEN = {  # settings that are tried: stiff ones of others, which do not sink in
+    "links": "standard",
+    "lammps": "standard",
+    "mujoco": "2e-4 s, CG 50, stiff",
+    "bullet": "2e-4 s",
+    "rapier": "2e-4 s, stiff",
+}
+BOXED = ("mujoco", "bullet", "rapier")
+
+
+def setting_of(engine: str) -> Setting:
+    """One setting of an engine; skips the test where it is missing."""
+    if ENGINES[engine].missing:
+        pytest.skip(str(ENGINES[engine].missing))
+    return next(each for each in SETTINGS if each.engine == engine and each.name == CHOSEN[engine])
+
+
+def flat(folder: Path, height: float) -> Path:
+    """A run that left one smarticle lying flat, its centre at a height [m]."""
+    run = SyntheticRun(count=1, phases=("deposit", "relax"))
+    folder.mkdir()
+    write_manifest(folder, run)
+    boxes = parse_scene({"schema_version": 1, "seed": 1, "count": 1, "phases": [{"type": "deposit"}]}, source="x")
+    still = np.zeros((1, 3))
+    place = np.array([[0.0, 0.0, height]])
+    state = State.rigid(boxes.particle.boxes, place, np.eye(3)[None], still, still)
+    FrameWriter(folder).write(mesh_of(state.vertices, phase=1), 0.0)
+    write_ending(folder, run.phases, [(0, 1), (1, 2)], status="done", wall=1.0)
+    return folder
+
+
+def given_of(
+    setting: Setting, pile: Path, folder: Path, *, activity: str, seconds: float, gamma: float = GAMMA
+) -> Given:
+    """What the engine is told: contacts that hardly spring back, as those of the others do not."""
+    scene = running.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, look=LOOK, account=False)
+    scene["contact"] = {"restitution": 0.01}
+    scene["container"] = {"radius_m": 0.0234}
+    if activity == SHAKE:
+        scene["phases"][-1]["peak_acceleration_g"] = gamma
+    return Given(parse_scene(scene, source="x"), folder, LOOK)
+
+
+def simulated(
+    engine: str, tmp_path: Path, *, activity: str, seconds: float, gamma: float = GAMMA
+) -> tuple[Given, Outcome]:
+    """One smarticle, put down from a tenth of a millimetre."""
+    setting = setting_of(engine)
+    pile = flat(tmp_path / "pile", 0.735e-3)
+    given = given_of(setting, pile, tmp_path, activity=activity, seconds=seconds, gamma=gamma)
+    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[engine].module}")
+    return given, module.simulate(given, setting.knobs)
+
+
+def flight(times: Array) -> tuple[Array, float]:
+    """Height over a shaken floor [m] of what does not spring back and lies on it at first, until it lands; and when."""
+    omega, gravity = 2 * math.pi * FREQUENCY, 9.81
+    amplitude = GAMMA * gravity / omega**2
+    leaves = math.asin(1 / GAMMA) / omega
+
+    def above(t: Array) -> Array:
+        since = t - leaves
+        start, speed = amplitude * math.sin(omega * leaves), amplitude * omega * math.cos(omega * leaves)
+        found: Array = start + speed * since - gravity * since**2 / 2 - amplitude * np.sin(omega * t)
+        return found
+
+    fine = np.linspace(leaves + 1e-3, 0.05, 100_000)
+    lands = float(fine[np.argmax(above(fine) < 0)])
+    return np.where((times > leaves) & (times < lands), above(times), 0.0), lands
+
+
+def thickness(given: Given, shape: str) -> float:
+    """How high the centre of one that lies flat is [m]."""
+    particle = given.scene.particle
+    return particle.boxes.thickness_normal / 2 if shape == "boxes" else particle.radius
+
+
+@pytest.mark.parametrize("engine", CHOSEN)
+def test_a_smarticle_lies_on_the_floor_and_goes_with_it(engine: str, tmp_path: Path) -> None:
+    # At half of gravity the floor never leaves it, and moves by 0.28 mm.
+    given, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03, gamma=0.5)
+    heights = found.positions[:, 0, :, 2]
+    assert len(heights) == 2 + 30
+    assert heights == pytest.approx(thickness(given, setting_of(engine).shape), abs=1.5e-5)
+    # As it was put down: not turned, at its place.
+    assert np.abs(found.frames - given.state.link_rotations).max() < 0.02
+    assert found.positions[0, 0, :, :2] == pytest.approx(given.state.link_positions[0, :, :2], abs=2e-5)
+    assert found.processor_s > 0
+    assert found.version.lower().startswith(("links", "lammps", "mujoco", "pybullet", "rapier"))
+
+
+@pytest.mark.parametrize("engine", CHOSEN)
+def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
+    _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)
+    heights = found.positions[:, 0, 1, 2]
+    times = LOOK * np.arange(1, len(heights) - 1)
+    expected, lands = flight(times)
+    assert expected.max() > 5e-4
+    assert lands > 0.02
+    flying = times < lands - LOOK
+    assert np.abs(heights[2:] - heights[1] - expected)[flying].max() < 0.05 * expected.max()
+
+
+def push_bullet(world: Any) -> None:
+    world._bullet.resetBaseVelocity(world._bodies[0], [100 * SPEED, 0, 0], [0, 0, 0])
+
+
+def push_rapier(world: Any) -> None:
+    world._world.rigid_bodies[world._handles[0]].linvel = (100 * SPEED, 0.0, 0.0)
+
+
+def push_mujoco(world: Any) -> None:
+    world._data.qvel[0] = SPEED
+
+
+SPEED = 0.1  # m/s
+WORLDS: dict[str, tuple[str, Callable[[Any], None]]] = {
+    "bullet": ("InBullet", push_bullet),
+    "rapier": ("InRapier", push_rapier),
+    "mujoco": ("InMujoco", push_mujoco),
+}
+
+
+@pytest.mark.parametrize("engine", BOXED)
+def test_friction_stops_what_slides_where_coulomb_says(engine: str, tmp_path: Path) -> None:
+    setting = setting_of(engine)
+    given = given_of(setting, flat(tmp_path / "pile", 0.635e-3), tmp_path, activity=SHAKE, seconds=0.1)
+    name, push = WORLDS[engine]
+    world = getattr(importlib.import_module(f"benchmarks.rivals.{ENGINES[engine].module}"), name)(
+        given, **setting.knobs
+    )
+    world.advance(0.05)
+    before = world.links()[0]
+    push(world)
+    world.advance(0.1)
+    slid = (world.links()[0] - before).mean(axis=(0, 1))
+    assert slid[0] == pytest.approx(SPEED**2 / (2 * FLOOR_FRICTION * 9.81), rel=0.05)
+    assert abs(slid[1]) < 1e-4
+
+
+@pytest.mark.parametrize("engine", ["links", "mujoco"])
+def test_barbs_follow_their_schedule(engine: str, tmp_path: Path) -> None:
+    given, found = simulated(engine, tmp_path, activity=OSCILLATE, seconds=0.05)
+    still = np.zeros_like(found.positions[0])
+    states = [State(given.boxes, *pose, still, still) for pose in zip(found.positions, found.frames, strict=True)]
+    angles = np.array([state.angles[0] for state in states[2:]])
+    told = np.array([given.gait.targets(LOOK * k)[0] for k in range(1, len(angles) + 1)])
+    assert np.ptp(told) > math.radians(9)
+    assert np.abs(angles - told).max() < 0.03
+    # Hinges hold, and links keep their lengths: vertices are where both links of a hinge have them.
+    assert all(np.ptp(state.link_positions[0, :, 2]) < 1e-4 for state in states)
+
+
+def test_what_is_missing_is_told_in_one_line_and_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    absent = {**ENGINES, "bullet": replace(ENGINES["bullet"], needs="no_such_package")}
+    monkeypatch.setattr(bench, "ENGINES", absent)
+    monkeypatch.setattr("sys.argv", ["rivals", "--engines", "bullet", "--out", str(tmp_path / "out")])
+    assert bench.main() == 1
+    told = capsys.readouterr()
+    assert told.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
+    assert told.err == "nothing was run\n"
+    assert settings.ENGINES["bullet"].needs == "pybullet"
