@@ -49,7 +49,7 @@ def test_scenes_are_drawn_alike_and_some_are_valid() -> None:
 
 def test_a_link_that_stands_or_lies_on_the_floor_is_not_below_it() -> None:
     thickness = 0.5
-    standing, lying = ALONG_X[:, [2, 1, 0]] + [0, 0, 3], ALONG_X + [0, 0, thickness / 2]
+    standing, lying = ALONG_X[:, [2, 1, 0]] + np.array([0, 0, 3]), ALONG_X + np.array([0, 0, thickness / 2])
     for vertices, depth in ((standing, 0.0), (lying, 0.0), (lying - [0, 0, 0.2], 0.2)):
         points, inset = surface(vertices[None], thickness)
         assert (inset - points[:, 2]).max() == pytest.approx(depth)
