@@ -87,7 +87,7 @@ class Tables:
         (self.folder / engine).mkdir(parents=True, exist_ok=True)
         path = self.folder / engine / f"{name}.csv"
         write_text(path, new.to_csv(index=False, float_format="%.10g"))
-        cells = new.astype(str).map(lambda text: text.replace("|", "\\|").replace("\n", " "))
+        cells = new.astype(object).map(lambda value: str(value).replace("|", "\\|").replace("\n", " "))
         lines = [" | ".join(line) for line in (new.columns, ["---"] * len(new.columns), *cells.to_numpy())]
         write_text(path.with_suffix(".md"), "\n".join(f"| {line} |" for line in lines) + "\n")
 
