@@ -38,7 +38,7 @@ claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, f
 	$(BIN)/python -m studies.claims results
 
 verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
-	$(BIN)/smarticles verify --engine both --out out/verify-$(STAMP)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:xdist -q validation/known --results out/verify-$(STAMP)
 
 bench: setup ## measure speed, what each effect costs, and rivals that are installed (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.engines
@@ -52,11 +52,10 @@ rivals: setup ## install the engines that make bench compares with, into .venv (
 	@command -v lmp >/dev/null || echo "LAMMPS is a package of Debian: apt-get install lammps"
 
 stability: setup ## hard cases in full size, and where the stable time step ends (an hour; goes on where it was stopped)
-	for engine in yade links; do for part in onset figure cases kills; do \
-	OMP_NUM_THREADS=1 $(BIN)/python -m smarticles.verification $$part --engine $$engine || exit 1; done; done
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:xdist -q -m long validation/hard --results out/stability
 
 test: lint types ## all checks and tests, as continuous integration runs them (minutes)
-	$(PYTEST) -m "not validation"
+	$(PYTEST) tests validation -m "not validation and not long"
 
 lint: setup ## style: ruff (seconds)
 	$(BIN)/ruff check .

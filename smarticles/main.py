@@ -28,7 +28,6 @@ from smarticles.commands import (
     status,
     study,
     sweep,
-    verify,
     view,
 )
 from smarticles.completion import add_completion
@@ -37,7 +36,7 @@ from smarticles.stopping import orderly_stop
 
 COMMANDS = (
     *(scene_files, run, plan, doctor, measure, compare, render, view, export, report),
-    *(sweep, status, resume, study, accuracy, verify),
+    *(sweep, status, resume, study, accuracy),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
 

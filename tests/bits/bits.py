@@ -80,7 +80,6 @@ ALLOWED = (
     Allowed("*.txt", re.compile(r"(?<= simulated in )\d+(?= s$)", re.M), "wall time"),
     Allowed("*.txt", re.compile(r"(?<=(?:done|iled) after )[\d:]+"), "wall time"),
     Allowed("*.txt", re.compile(r"^\d+ of \d+ runs ended.*\n", re.M), "told twice a minute of wall time"),
-    Allowed("*-verify.out.txt", re.compile(r"^ *[\d.]+(?= s  )", re.M), "wall time"),
     Allowed("*-plan.*", re.compile(r"(?<=table: )/\S*(?=/results/accuracy/)"), "where the checkout lies"),
     Allowed("*/array.sh", re.compile(r"(?<=[ (])/\S*(?=/)"), "where the folder and the program lie"),
     Allowed("*/array.sh", re.compile(r"(?<=--job-name=).*"), "bears a hash of where the folder lies"),

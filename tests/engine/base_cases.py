@@ -14,7 +14,7 @@ from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from smarticles.verification.bench import scene_of
+from validation.bench import scene_of
 
 
 def last_shake(scene: Scene) -> tuple[float, float]:

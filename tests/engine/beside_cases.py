@@ -9,7 +9,7 @@ import numpy as np
 from dem.body.placement import place_layer
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
-from smarticles.verification.bench import scene_of
+from validation.bench import scene_of
 
 
 def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every: int) -> dict[str, Any]:

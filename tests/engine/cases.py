@@ -24,9 +24,9 @@ from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from smarticles.verification.bench import add, advance_watched, body_rotations, scene_of
-from smarticles.verification.hands.yade import YadeHands
-from smarticles.verification.known.floor import resting
+from validation.bench import add, advance_watched, body_rotations, scene_of
+from validation.known.floor import resting
+from validation.yade_access import YadeAccess
 
 
 def build(
@@ -50,7 +50,7 @@ def version() -> str:
 
 def push(engine: YadeEngine, k: int, **motion: Any) -> None:
     """Give a welded smarticle a velocity and a spin."""
-    YadeHands().push(engine, k, **motion)
+    YadeAccess().push(engine, k, **motion)
 
 
 def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def stopping(data: dict[str, Any]) -> dict[str, Any]:
 def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
     """A smarticle lying flat on a floor without friction is pushed along it."""
     scene = scene_of(data)
-    engine = resting(YadeHands(), scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
+    engine = resting(YadeAccess(), scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
     engine.advance(round(duration / engine.time_step))
     return {"v": engine.state().velocities[0, 1]}
 

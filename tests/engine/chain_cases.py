@@ -15,7 +15,7 @@ from dem.physics.strings import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
 from dem.scene.scene import Scene
-from smarticles.verification.bench import scene_of
+from validation.bench import scene_of
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
 

@@ -18,7 +18,7 @@ from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from smarticles.verification.bench import FLAT, add, advance_watched, scene_of
+from validation.bench import FLAT, add, advance_watched, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 

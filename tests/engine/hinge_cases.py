@@ -20,10 +20,10 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine.yade.kind import contact_law_of, hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
-from smarticles.verification.bench import Targets, drive
-from smarticles.verification.hands.yade import YadeHands
-from smarticles.verification.hands.yade import bodies_of as bodies
-from smarticles.verification.known.hinge import upright
+from validation.bench import Targets, drive
+from validation.known.hinge import upright
+from validation.yade_access import YadeAccess
+from validation.yade_access import bodies_of as bodies
 
 
 def gait(
@@ -263,7 +263,7 @@ def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest:
     scene = cases.scene_of(data)
     reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
     height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
-    engine = upright(YadeHands(), scene, gravity=0.0, height=height)
+    engine = upright(YadeAccess(), scene, gravity=0.0, height=height)
     begun = engine.state().angles[0]
     rows = []
     for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):

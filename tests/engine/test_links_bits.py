@@ -10,7 +10,7 @@ import pytest
 from processes import complete, differing, finish, results, start
 from test_restart import INTERVAL_S, kill_often, log_of
 
-from smarticles.verification.hard.kills import SAME, kills
+from validation.hard.kills import SAME, kills
 
 SCENE = """\
 schema_version: 1

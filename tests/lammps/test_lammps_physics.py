@@ -18,7 +18,7 @@ from dem.engine.lammps.kind import contact_law_of
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from smarticles.verification.known.theory import dashpot_impact
+from validation.known.theory import dashpot_impact
 
 G = 9.81
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)

@@ -19,7 +19,7 @@ from smarticles.stopping import orderly_stop
 
 COMMANDS = {
     "run", "plan", "schema", "doctor", "measure", "render", "view", "export", "sweep", "status", "resume", "study",
-    "accuracy", "verify", "init", "compare", "report",
+    "accuracy", "init", "compare", "report",
 }  # fmt: skip
 
 

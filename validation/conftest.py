@@ -1,0 +1,111 @@
+"""Fixtures of the suites: engines in processes of their own, and the tables that `--results DIR` asks for."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dem.engine.kinds import engine_kind
+from dem.errors import RunError
+from dem.record.files import write_text
+from dem.run.run import _git_revision
+
+TIMEOUT = 3600  # s of wall time, for machines that are busy with long simulations
+
+os.environ["OMP_NUM_THREADS"] = "1"  # bits depend on the number of threads on YADE
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `--results DIR`."""
+    parser.addoption(
+        "--results", type=Path, metavar="DIR", help="write the measured tables into DIR/ENGINE, go on with those there"
+    )
+
+
+def _version(engine: str) -> str:
+    return engine_kind(engine).version()
+
+
+@pytest.fixture(scope="session")
+def yade() -> Iterator[ProcessPoolExecutor]:
+    """Give one process that has loaded YADE, which cannot share one with Matplotlib."""
+    pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        pool.submit(_version, "yade").result(TIMEOUT)
+    except RunError as error:
+        pool.shutdown(wait=False, cancel_futures=True)
+        pytest.skip(f"needs YADE: {error}")
+    yield pool
+    pool.shutdown(wait=True, cancel_futures=True)
+
+
+@pytest.fixture
+def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
+    """Call a function where an engine is: YADE in its own process, links in this one."""
+
+    def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
+        if engine == "links":
+            return function(*arguments, **options)
+        return request.getfixturevalue("yade").submit(function, *arguments, **options).result(TIMEOUT)
+
+    return run
+
+
+@pytest.fixture
+def call_alone() -> Callable[..., Any]:
+    """Call a function in a fresh process."""
+
+    def run(function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            return pool.submit(function, *arguments, **options).result(TIMEOUT)
+
+    return run
+
+
+class Tables:
+    """The tables of a folder, each rewritten whole after each test; None: nothing is written."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+
+    def write(self, engine: str, name: str, rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> None:
+        """Write rows into DIR/ENGINE/NAME.csv and .md, in place of those with the same keys."""
+        if self.folder is None or not rows:
+            return
+        new, old = pd.DataFrame(rows).assign(commit=_git_revision()), self._read(engine, name)
+        if old is not None:
+            mark = pd.MultiIndex.from_frame(new[list(keys)].astype(str))
+            kept = old[~pd.MultiIndex.from_frame(old[list(keys)].astype(str)).isin(mark)]
+            new = pd.concat([kept, new], ignore_index=True) if len(kept) else new
+        (self.folder / engine).mkdir(parents=True, exist_ok=True)
+        path = self.folder / engine / f"{name}.csv"
+        write_text(path, new.to_csv(index=False, float_format="%.10g"))
+        cells = new.astype(object).map(lambda value: str(value).replace("|", "\\|").replace("\n", " "))
+        lines = [" | ".join(line) for line in (new.columns, ["---"] * len(new.columns), *cells.to_numpy())]
+        write_text(path.with_suffix(".md"), "\n".join(f"| {line} |" for line in lines) + "\n")
+
+    def skip_recorded(self, engine: str, name: str, **keys: Any) -> None:
+        """Skip the test if its rows are in the table."""
+        table = self._read(engine, name)
+        if table is not None and all(key in table for key in keys):
+            same = pd.concat([table[key].astype(str) == str(value) for key, value in keys.items()], axis=1).all(axis=1)
+            bad = "verdict" in table and (table.loc[same, "verdict"] == "BAD").any()
+            if same.any() and not bad:
+                pytest.skip("recorded already")
+
+    def _read(self, engine: str, name: str) -> pd.DataFrame | None:
+        path = None if self.folder is None else self.folder / engine / f"{name}.csv"
+        return pd.read_csv(path, keep_default_na=False) if path is not None and path.exists() else None
+
+
+@pytest.fixture(scope="session")
+def tables(request: pytest.FixtureRequest) -> Tables:
+    """Give the tables of `--results DIR`."""
+    return Tables(request.config.getoption("--results"))

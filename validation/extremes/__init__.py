@@ -1,0 +1,1 @@
+"""Random extreme scenes, and a checker of their runs that shares no code with the engines."""

@@ -1,0 +1,55 @@
+"""The checker finds crossings and rejects the null answer; scenes are drawn alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dem.errors import InputError
+from dem.scene.reading import parse_scene
+from validation.extremes.checks import crossings, surface
+from validation.extremes.scenes import draw_scene
+
+ALONG_X = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
+ALONG_Y = ALONG_X[:, [1, 0, 2]]
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "pairs"),
+    [
+        ((0, 0, 1), (0, 0, -1), [(1, 4)]),  # middle through middle
+        ((2, 0, 1), (2, 0, -1), [(2, 4)]),  # middle through a barb
+        ((0, 0, 1), (0, 0, 0.1), []),  # comes near
+        ((4, 0, 1), (4, 0, -1), []),  # passes beside the end
+    ],
+)
+def test_axes_that_pass_through_each_other_are_found(
+    start: tuple[float, ...], end: tuple[float, ...], pairs: list[tuple[int, int]]
+) -> None:
+    before, after = (np.array([ALONG_X, ALONG_Y + np.array(way)]) for way in (start, end))
+    assert crossings(before, after) == pairs
+
+
+def test_a_link_without_length_crosses_nothing() -> None:
+    above = np.tile([0.0, 0.0, 1.0], (4, 1))
+    assert crossings(np.array([ALONG_X, above]), np.array([ALONG_X, -above])) == []
+
+
+def test_scenes_are_drawn_alike_and_some_are_valid() -> None:
+    assert draw_scene(3) == draw_scene(3) != draw_scene(4)
+    accepted = 0
+    for number in range(20):
+        try:
+            parse_scene(draw_scene(number), source="extremes")
+        except InputError:
+            continue
+        accepted += 1
+    assert accepted > 10
+
+
+def test_a_link_that_stands_or_lies_on_the_floor_is_not_below_it() -> None:
+    thickness = 0.5
+    standing, lying = ALONG_X[:, [2, 1, 0]] + np.array([0, 0, 3]), ALONG_X + np.array([0, 0, thickness / 2])
+    for vertices, depth in ((standing, 0.0), (lying, 0.0), (lying - [0, 0, 0.2], 0.2)):
+        points, inset = surface(vertices[None], thickness)
+        assert (inset - points[:, 2]).max() == pytest.approx(depth)

@@ -1,0 +1,232 @@
+"""Where steps above the stable one begin to chatter and to blow up.
+
+A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
+four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
+from nowhere, or the engine ends in numbers that are none. Every scene is run with several seeds, which move where and
+how high smarticles begin. A scene and seed that is in the table already is skipped.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from dem.body.placement import Poses, place_layer
+from dem.engine.interface import Engine
+from dem.errors import RunError
+from dem.plan.steps import stable_step
+from dem.run.run import _git_revision
+from dem.scene.scene import Scene
+from validation.bench import lying, scene_of, watched
+from validation.engines import EngineAccess, engine_access
+from validation.hard.scenes import scene, shape_change
+
+FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
+SETTLE, WATCH = 0.25, 0.05  # s
+# m/s, root mean square. A stack at rest has 1e-6 at most; what still rolls or topples at half the stable step is not
+# at rest, and tells nothing of chatter.
+QUIET, CHATTER = 1e-4, 1e-3
+WHAT = ("chatter", "blow-up")
+BLOW_UP = 1.0  # energy from nowhere over that of lifting all smarticles by one sphere diameter
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is let go.
+
+    Args:
+        placed: "stack": flat, all alike; "crossed": flat, every other one turned; "pile": at random.
+        articulated: hinged links, their motors holding, or welded.
+        ratio: l/w.
+        fidelity: draft, standard or reference.
+        keys: further keys of the scene.
+        count: smarticles.
+    """
+
+    placed: str
+    articulated: bool
+    ratio: float
+    fidelity: str
+    keys: str = ""
+    count: int = 6
+
+    @property
+    def name(self) -> str:
+        """Name in tables and figures."""
+        kind = "articulated" if self.articulated else "welded"
+        where = f", {self.keys}" if self.keys else ""
+        return f"{kind} {self.placed}{where}, l/w = {self.ratio:g}, {self.fidelity}"
+
+    def data(self, access: EngineAccess) -> dict[str, Any]:
+        """The scene; nothing of it is run but its engine."""
+        phases = [shape_change(1.5)] if self.articulated else []
+        data = scene(access, *phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
+        if self.keys == "at the wall":
+            data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
+        if self.keys == "on hooks":
+            data["hooks"] = {}
+        return data
+
+
+SETTINGS: Mapping[str, Setting] = {
+    setting.name: setting
+    for setting in (
+        *(Setting("stack", articulated=False, ratio=ratio, fidelity="draft") for ratio in (0.05, 0.4, 0.7, 1.0, 2.0)),
+        *(Setting("stack", articulated=False, ratio=0.7, fidelity=name) for name in ("standard", "reference")),
+        Setting("crossed", articulated=False, ratio=0.7, fidelity="draft"),
+        Setting("stack", articulated=False, ratio=0.7, fidelity="draft", keys="on hooks", count=3),
+        *(Setting("pile", articulated=False, ratio=ratio, fidelity="draft") for ratio in (0.7, 2.0)),
+        Setting("pile", articulated=False, ratio=0.7, fidelity="draft", keys="at the wall", count=4),
+        *(Setting("stack", articulated=True, ratio=ratio, fidelity="draft") for ratio in (0.4, 0.7, 1.0)),
+        Setting("stack", articulated=True, ratio=0.7, fidelity="standard"),
+        Setting("pile", articulated=True, ratio=0.7, fidelity="draft", count=4),
+        Setting("pile", articulated=True, ratio=0.7, fidelity="draft", keys="at the wall", count=3),
+    )
+}
+
+
+def poses(setting: Setting, described: Scene, seed: int) -> Poses:
+    """Where smarticles begin."""
+    rng, particle = np.random.default_rng(seed), described.particle
+    if setting.placed == "pile":
+        narrow, reach = setting.keys == "at the wall", particle.reach
+        layers = setting.count if narrow else 1
+        placed = [
+            place_layer(
+                particle,
+                count=setting.count // layers,
+                radius=described.cylinder.inner_radius,
+                bottom=1e-4 + 2 * reach * k,
+                height=2 * reach if narrow else 2 * described.smarticle.middle_length_m,
+                obstacles=np.empty((0, 3)),
+                rng=rng,
+            )
+            for k in range(layers)
+        ]
+        return Poses(np.concatenate([p.positions for p in placed]), tuple(r for p in placed for r in p.rotations))
+    bottom = 0.0
+    if described.hooks is not None:
+        bottom = described.hooks.upper_height_m + described.hooks.side_m / 2
+    heights = bottom + lying(described) * (2 * np.arange(setting.count) + 1)
+    heights += np.cumsum(rng.uniform(1e-5, 4e-5, setting.count))
+    turns = rng.uniform(-0.01, 0.01, setting.count)
+    if setting.placed == "crossed":
+        turns += np.pi / 2 * (np.arange(setting.count) % 2)
+    rotations = tuple(Rotation.from_euler("z", turn) for turn in turns)
+    return Poses(np.stack([0 * heights, 0 * heights, heights], axis=1), rotations)
+
+
+def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
+    """Let smarticles go at a factor of the stable step, and look at them; one row of the table."""
+    data = setting.data(access)
+    stable = stable_step(scene_of(data))
+    with tempfile.TemporaryDirectory() as scratch:
+        described, engine, _ = watched(data, scratch, dt=factor * stable)
+    engine.add(poses(setting, described, seed))
+    if setting.articulated:
+        engine.motors.articulate()
+    lift = setting.count * described.smarticle.boxes.mass * engine.gravity * described.sphere_diameter
+    speeds, lowest, rise = [], math.inf, 0.0
+    try:
+        for time, kinetic, total in _looks(engine, described):
+            lowest = min(lowest, total)
+            rise = max(rise, (total - lowest) / lift)
+            if time > SETTLE:
+                speeds.append(2 * kinetic / (setting.count * described.smarticle.boxes.mass))
+            if not rise <= BLOW_UP:
+                break
+    except RunError:
+        rise = math.inf
+    return {
+        "scene": setting.name,
+        "seed": seed,
+        "stable step [s]": stable,
+        "factor [1]": factor,
+        "speed at rest, root mean square [m/s]": math.sqrt(np.mean(speeds)) if speeds else math.nan,
+        "energy from nowhere over lifting by d [1]": rise if math.isfinite(rise) else math.inf,
+    }
+
+
+def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
+    """Let time pass; time [s], kinetic energy [J] and all energy but the motors' [J] about every millisecond."""
+    dt = engine.time_step
+    interval = dt * max(1, round(described.fidelity.control_interval_s / dt))
+    held, looks = engine.state().angles, max(1, round(1e-3 / interval))
+    while engine.time < SETTLE + WATCH:
+        for _ in range(looks):
+            if engine.motors.articulated:
+                engine.motors.actuate(held[None], interval)
+            engine.advance(round(interval / dt))
+        state = engine.state()
+        total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())
+        yield engine.time, state.kinetic_energy, total - engine.motors.work
+
+
+def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
+    """All factors of a scene and seed, up to the second that blows up."""
+    rows: list[dict[str, Any]] = []
+    for factor in FACTORS:
+        rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))
+        if sum(row["energy from nowhere over lifting by d [1]"] > BLOW_UP for row in rows) == 2:
+            break
+    return rows
+
+
+def onsets(runs: pd.DataFrame) -> pd.DataFrame:
+    """Per scene: the lowest factors that chatter and that blow up, least and most over the seeds.
+
+    inf: none did; NaN: what is not at rest at half the stable step cannot tell. Neither can smarticles that lie across
+    each other or at random, which are still rocking now and then at every step.
+    """
+    rows = []
+    for name, of_scene in runs.groupby("scene", sort=False):
+        row: dict[str, Any] = {"scene": name, "stable step [s]": of_scene["stable step [s]"].iloc[0]}
+        row["seeds"] = of_scene["seed"].nunique()
+        speed, factor = of_scene["speed at rest, root mean square [m/s]"], of_scene["factor [1]"]
+        blown = of_scene["energy from nowhere over lifting by d [1]"] > BLOW_UP
+        row["speed at rest at 0.9 or less, most [m/s]"] = speed[factor <= 0.9].max()
+        row["energy from nowhere at 0.9 or less over lifting by d, most [1]"] = of_scene.loc[
+            factor <= 0.9, "energy from nowhere over lifting by d [1]"
+        ].max()
+        rests = SETTINGS[name].placed == "stack" and not (speed[factor == min(FACTORS)] > QUIET).any()
+        for what, found in (("chatter", blown | (speed > CHATTER)), ("blow-up", blown)):
+            first = [of_seed["factor [1]"].min() for _, of_seed in of_scene[found].groupby("seed")]
+            first += [math.inf] * (row["seeds"] - len(first))
+            told = what == "blow-up" or rests
+            row[f"{what} from, least [1]"] = min(first) if told else math.nan
+            row[f"{what} from, most [1]"] = max(first) if told else math.nan
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def run_onset(out: Path, engine: str, seeds: Sequence[int]) -> None:
+    """Run what is not in the table of runs yet, and add it there.
+
+    Args:
+        out: folder of the table.
+        engine: its name.
+        seeds: of every scene.
+    """
+    path, commit = out / "onset_runs.csv", _git_revision()
+    runs = pd.read_csv(path) if path.exists() else pd.DataFrame()
+    for seed in seeds:
+        for name in SETTINGS:
+            if len(runs) and ((runs["scene"] == name) & (runs["seed"] == seed)).any():
+                continue
+            with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+                rows = pd.DataFrame(pool.submit(climb, engine, name, seed).result()).assign(commit=commit)
+            runs = pd.concat([runs, rows], ignore_index=True)
+            runs.to_csv(path, index=False, float_format="%.4g")
+            table = onsets(runs)
+            chatter, blow_up = table.loc[table["scene"] == name, [f"{w} from, least [1]" for w in WHAT]].iloc[0]
+            print(f"seed {seed}: {name}: chatters from {chatter:g}, blows up from {blow_up:g}", flush=True)

@@ -1,0 +1,78 @@
+"""Hard cases end right, or in an error that names the cause; kills keep every bit; where instability begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from validation.case import Size
+from validation.conftest import Tables
+from validation.hard.cases import CASES, checked
+from validation.hard.kills import SAME, kills
+from validation.hard.onset import SETTINGS, climb, onsets
+
+Call = Callable[..., Any]
+ON = [pytest.param("yade", marks=pytest.mark.engine), "links"]
+
+
+def rows_of(name: str, size: Size, checks: list[Any], wall: float) -> list[dict[str, Any]]:
+    """Return the rows of the table of cases."""
+    return [
+        {
+            "case": name,
+            "form": size,
+            "what is checked": check.what,
+            "measured": check.measured,
+            "limit": check.limit,
+            "verdict": "good" if check.good else "BAD",
+            "wall time [s]": round(wall, 1),
+        }
+        for check in checks
+    ]
+
+
+@pytest.mark.filterwarnings("ignore")  # of scenes that ask for trouble
+@pytest.mark.parametrize("engine", ON)
+@pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", CASES)
+def test_hard_case(
+    call: Call, call_alone: Call, tables: Tables, *, tmp_path: Path, name: str, size: Size, engine: str
+) -> None:
+    if reason := CASES[name].absent.get(engine):
+        pytest.skip(f"not applicable: {reason}")
+    if CASES[name].short is None and size == "short":
+        pytest.skip("only in its long form")
+    tables.skip_recorded(engine, "cases", case=name, form=size)
+    arguments = (checked, name, engine, size, tmp_path / "run")
+    # The long form measures memory and time, and runs alone in a fresh process.
+    checks, wall = call_alone(*arguments) if size == "long" else call(engine, *arguments)
+    tables.write(engine, "cases", rows_of(name, size, checks, wall), ["case", "form"])
+    assert checks
+    assert not [check for check in checks if not check.good]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ON)
+@pytest.mark.parametrize(("seed", "number"), [(1, 17), (2, 17), (3, 16)])
+def test_kills_keep_every_bit(tables: Tables, tmp_path: Path, seed: int, number: int, engine: str) -> None:
+    tables.skip_recorded(engine, "kills", seed=seed)
+    rows = kills(engine, 1, number, tmp_path, seed=seed)
+    tables.write(engine, "kills", rows, ["seed"])
+    assert [row for row in rows if row[SAME] != "yes"] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ON)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("name", SETTINGS)
+def test_stable_step_is_below_the_onset(call_alone: Call, tables: Tables, name: str, seed: int, engine: str) -> None:
+    tables.skip_recorded(engine, "onset_runs", scene=name, seed=seed)
+    rows = call_alone(climb, engine, name, seed)
+    tables.write(engine, "onset_runs", rows, ["scene", "seed"])
+    found = onsets(pd.DataFrame(rows)).iloc[0]
+    # The named fidelities use 0.9 of the stable step: blow-up begins above it.
+    assert found["blow-up from, least [1]"] > 0.9

@@ -1,0 +1,209 @@
+"""Impacts, overlaps, violent shaking, masses far apart."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.errors import RunError
+from validation.bench import TILTED, add, energy, fastest, look, lying, watched
+from validation.check import Check, above, below, near, says
+from validation.engines import EngineAccess
+from validation.hard.runs import Noting, whole
+from validation.hard.scenes import scene, shape_change
+
+
+def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> list[Check]:
+    """A smarticle hits the floor at 10 m/s."""
+    speed = 10.0
+    described, engine, recorder = watched(scene(access, shape_change(1.5), count=1), out)
+    add(engine, (0, 0, 0.02), TILTED)
+    access.push(engine, 0, velocity=(0, 0, -speed))
+    if articulated:
+        engine.motors.articulate()
+    held = engine.state().angles
+    said = look(engine, recorder)
+    energies, lows, gaps = [energy(engine)], [math.inf], [0.0]
+    interval = described.fidelity.control_interval_s
+    for _ in range(round(time / interval)):
+        if articulated:
+            engine.motors.actuate(held[None], interval)
+        engine.advance(round(interval / engine.time_step))
+        energies.append(energy(engine))
+        lows.append(engine.state().positions[0, 2])
+        gaps.append(engine.motors.gaps().max())
+    d, particle = described.sphere_diameter, described.particle
+    work = max(0.0, engine.motors.work)
+    # As deep as if one spring took it all.
+    depth = speed * math.sqrt(particle.boxes.mass / described.fidelity.stiffness_N_per_m)
+    return [
+        says(said, "1 smarticle(s) (0): a speed above", "fastest 10 m/s"),
+        below("highest energy over that of the impact [1]", (max(energies) - work) / energies[0], 1.001),
+        below("energy at the end over that of the impact [1]", energies[-1] / energies[0], 0.7),
+        above("lowest centre of mass [m]", min(lows), -depth),
+        below("lowest centre of mass [m]", min(lows), 0.005),
+        above("height at the end [m]", float(engine.state().positions[0, 2]), particle.radius),
+        below("largest joint gap [d]", max(gaps) / d, 1.0 if articulated else 1e-9),
+        below("joint gap at the end [d]", gaps[-1] / d, 0.01),
+    ]
+
+
+def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
+    """A barb's tip hits the floor so fast that a sphere's centre passes it, from where on YADE's floor pushes less."""
+    _, engine, recorder = watched(scene(access, count=1), out)
+    add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
+    access.push(engine, 0, velocity=(0, 0, -speed))
+    said, first = None, energy(engine)
+    while not said and engine.time < 0.05:
+        engine.advance(2)
+        said = look(engine, recorder)
+    return [
+        says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+        below("energy before over that of the start [1]", energy(engine) / first, 1.001),
+    ]
+
+
+def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
+    """Articulated smarticles fall in a heap, their motors taking ten times τ_max for a moment: no false alarm."""
+    described, engine, recorder = watched(scene(access, shape_change(1.5), count=4), out)
+    limits = recorder.watchdog
+    noting = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
+    recorder.watchdog = noting
+    for k in range(4):
+        add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
+    engine.motors.articulate()
+    held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
+    while not said and engine.time < time:
+        engine.motors.actuate(held[None], interval)
+        engine.advance(round(interval / engine.time_step))
+        assert engine.motors.readings is not None  # articulated smarticles have them
+        hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / described.torque_limit)
+        said = look(engine, recorder)
+    return [
+        Check("the watchdog says", said or "nothing", "nothing", said is None),
+        above("largest torque over τ_max [1]", hardest, 3.0),
+        below("energy from nowhere over the watchdog's limit [1]", noting.nearest["energy"], 0.25),
+    ]
+
+
+def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
+    """Two smarticles begin 0.4 diameters apart, overlapping over their whole length, in a high container."""
+    described, engine, recorder = watched(scene(access, count=2, container={"height_m": 1.0}), out)
+    d, start = described.sphere_diameter, 0.03
+    add(engine, (0, 0, start), TILTED)
+    add(engine, (0, 0, start + 0.4 * d), TILTED)
+    engine.advance(1)
+    said = look(engine, recorder)
+    energies = [energy(engine)]
+    for _ in range(round(time / 1e-3)):
+        engine.advance(round(1e-3 / engine.time_step))
+        energies.append(energy(engine))
+    spheres = engine.state().spheres(described.particle)
+    apart = np.linalg.norm(spheres[0][:, None] - spheres[1][None], axis=-1).min()
+    return [
+        says(said, "2 smarticle(s) (0, 1): contacts more than", "pass through each other"),
+        below("highest energy over that of the start [1]", max(energies) / energies[0], 1.01),
+        below("energy at the end over that of the start [1]", energies[-1] / energies[0], 0.9),
+        above("distance of the spheres at the end [d]", apart / d, 0.9),
+    ]
+
+
+def thrown_by_overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
+    """The same in a container of the usual height, with a watchdog that is blind for the overlap itself."""
+    described, engine, recorder = watched(scene(access, count=2), out)
+    recorder.watchdog.depth = math.inf
+    add(engine, (0, 0, 0.03), TILTED)
+    add(engine, (0, 0, 0.03 + 0.4 * described.sphere_diameter), TILTED)
+    said = None
+    while not said and engine.time < time:
+        engine.advance(round(1e-3 / engine.time_step))
+        said = look(engine, recorder)
+    # What flies down first meets a floor that gives way, where links have fewer and larger contacts than chains.
+    expected = {"yade": "(1): thrown out over the wall of", "links": "(0): left through the wall or the floor"}
+    return [says(said, "1 smarticle(s) " + expected[access.name])]
+
+
+def same_place(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
+    """Two smarticles in the very same place, where a contact has no direction."""
+    _, engine, recorder = watched(scene(access, count=2), out)
+    for _ in range(2):
+        add(engine, (0, 0, 0.03), TILTED)
+    try:
+        engine.advance(round(time / engine.time_step))
+        said = look(engine, recorder)
+    except RunError as error:
+        said = str(error)
+    return [says(said, "2 smarticle(s) (0, 1)")]
+
+
+def shaken(access: EngineAccess, out: Path, *, count: int, seconds: float, rest: float) -> list[Check]:
+    """Γ = 10 at 30 Hz, then rest."""
+    shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 30, "peak_acceleration_g": 10}
+    run = whole(scene(access, shake, {"type": "relax", "duration_s": rest}, count=count), out)
+    checks = run.sound()
+    if run.error is None:
+        peak = 10 * 9.81 / (2 * np.pi * 30)
+        thrown, height = run.during(1), run.series["com_height_m"]
+        fast = run.series["max_speed_m_per_s"][thrown].max()
+        checks += [
+            above("greatest speed over the container's [1]", fast / peak, 1.0),
+            below("greatest speed over the container's [1]", fast / peak, 4.0 if count < 50 else 8.0),
+            above("thrown above its height before [m]", height[thrown].max() - height[run.during(0)][-1], 2e-3),
+            above("thrown above its height after [m]", height[thrown].max() - height[-1], 2e-3),
+        ]
+    return checks
+
+
+def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
+    """Shaken at Γ = 30 in a container that is too low for it."""
+    shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 20, "peak_acceleration_g": 30}
+    # A pile that is struck this fast passes through itself where contacts are as few and soft as those of whole links.
+    fidelity = "draft" if access.name == "yade" else {"base": "draft", "stiffness_N_per_m": 5000}
+    run = whole(scene(access, shake, count=count, fidelity=fidelity, container={"height_m": 0.045}), out)
+    return [says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less")]
+
+
+def mass_ratio(
+    access: EngineAccess, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4
+) -> list[Check]:
+    """One of two smarticles that lie on each other is heavier; by hand, a scene has one density for all.
+
+    The contacts of draft cannot carry it, which the watchdog must say; contacts stiffer by the same ratio must.
+    """
+    carries = stiffness > 250 * ratio / 10
+    data = scene(access, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
+    described, engine, recorder = watched(data, out)
+    flat, d, centres = lying(described), described.sphere_diameter, access.ends(described.particle)
+    # Springs along a U give way more under its centre of mass, which is not their middle, than side by side.
+    middle = centres[:, 1].mean()
+    softness = (1 / len(centres) + middle**2 / ((centres[:, 1] - middle) ** 2).sum()) / stiffness
+    weight = described.smarticle.boxes.mass * described.gravity_m_per_s2
+    sunk = [(ratio + 1) * weight * softness, (ratio if heavy_above else 1) * weight * softness]
+    add(engine, (0, 0, flat - sunk[0] * carries))
+    add(engine, (0, 0, 3 * flat - sum(sunk) * carries))
+    if access.name == "links":
+        recorder.watchdog.energy = math.inf  # a load added through test access: its work is in no account
+    access.burden(engine, int(heavy_above), ratio, rise=0.0 if carries else time)
+    said, begun, heights = None, engine.time, []
+    while not said and engine.time < begun + time:
+        engine.advance(round(recorder.interval / engine.time_step) // 20)
+        said = look(engine, recorder)
+        heights.append(engine.state().positions[:, 2])
+    if not carries:
+        return [says(said, "at t = ", "raise fidelity.stiffness_N_per_m")]
+    # The heavy one tilts to and fro, undamped on this scale: the mean.
+    low, high = np.mean(heights, axis=0)
+    return [
+        Check("the watchdog says", said or "nothing", "nothing", said is None),
+        below("speed at the end [m/s]", fastest(engine), 0.01),
+        near("depth of the lower one in the floor [1e-6 d]", 1e6 * (flat - low) / d, *_within(sunk[0] / d)),
+        near("depth of one in the other [1e-6 d]", 1e6 * (2 * flat - high + low) / d, *_within(sunk[1] / d)),
+    ]
+
+
+def _within(depth: float) -> tuple[float, float]:
+    """A depth and the error allowed for it, a tenth, in millionths."""
+    return 1e6 * depth, 1e5 * depth

@@ -1,0 +1,274 @@
+"""On the floor under gravity: sliding, rolling, standing on each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import eigh
+
+from dem.body.particle import Particle
+from dem.engine.interface import Engine
+from dem.physics.contact import ContactLaw
+from dem.plan.steps import time_step
+from validation.bench import Array, G, add, ball_law, law_of, scene
+from validation.check import Answer
+from validation.engines import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
+
+FRICTION = 0.4
+
+
+def lowest(access: EngineAccess, particle: Particle) -> Array:
+    """(n, 2) where a body that lies flat touches the floor, from its centre of mass [m]."""
+    ends = access.ends(particle)
+    found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
+    return found
+
+
+def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> Engine:
+    """A body lying on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
+    engine = access.build(particle, law, dt=dt, gravity=G)
+    sunk = particle.boxes.mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
+    add(engine, (0, -0.03, particle.radius - float(particle.centres[:, 2].min()) - sunk))
+    access.push(engine, 0, velocity=(0, speed, 0))
+    return engine
+
+
+# -- sliding to rolling ------------------------------------------------------------------------------------------------
+
+
+def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
+    """A round body thrown along the floor: friction slows it and makes it spin until it rolls.
+
+    Args:
+        access: on the engine.
+        particle: a ball, or a bar that lies across its way.
+        law: with friction.
+        speed: at t = 0, without spin [m/s].
+        dt: time step [s].
+    """
+    friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
+    lever = particle.radius - access.arm_share * mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
+    share = inertia / (mass * lever**2)
+    rolling = speed / (1 + share)
+    begins = (speed - rolling) / (friction * G)
+    engine = resting(access, particle, law, dt=dt, speed=speed)
+    times, speeds, slips = [], [], []
+    for _ in range(400):
+        engine.advance(max(1, round(2 * begins / 400 / dt)))
+        state = engine.state()
+        times.append(engine.time)
+        speeds.append(state.velocities[0, 1])
+        slips.append(state.velocities[0, 1] + state.link_spins[0, 1, 0] * lever)
+    time, speeds_, slip = np.array(times), np.array(speeds), np.array(slips)
+    sliding = time < 0.9 * begins
+    # Slip falls along a straight line while the body slides: where that meets zero, rolling begins.
+    line = np.polyfit(time[sliding], slip[sliding], 1)
+    late = time > 1.3 * begins
+    return [
+        Answer(
+            quantity="deceleration while it slides",
+            unit="m/s²",
+            theory=friction * G,
+            measured=-float(np.polyfit(time[sliding], speeds_[sliding], 1)[0]),
+            tolerance=1e-4,
+            reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
+        ),
+        Answer(
+            quantity="time when rolling begins",
+            unit="s",
+            theory=begins,
+            measured=-float(line[1] / line[0]),
+            tolerance=1e-4,
+            reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
+        ),
+        Answer(
+            quantity="speed when it rolls",
+            unit="m/s",
+            theory=rolling,
+            measured=float(speeds_[late].mean()),
+            tolerance=1e-4,
+            reason="the tangential spring unwinds where sliding ends, and dies away",
+        ),
+        Answer(
+            quantity="slip when it rolls",
+            unit="m/s",
+            theory=0.0,
+            measured=float(np.abs(slip[late]).max()),
+            tolerance=1e-4,
+            reason="the tangential spring unwinds where sliding ends, and dies away",
+            scale=speed,
+        ),
+    ]
+
+
+def ball_rolls(access: EngineAccess) -> list[Answer]:
+    """A solid ball: 5/7 of its speed."""
+    law = ball_law(restitution=0.5, friction=FRICTION)
+    return roll(access, access.roller(), law, speed=0.3, dt=math.pi * math.sqrt(BALL_MASS / STIFFNESS) / 100)
+
+
+def bar_rolls(access: EngineAccess) -> list[Answer]:
+    """A bar of many spheres, with the inertia of its box."""
+    one = scene(access, fidelity="standard", smarticle={"aspect_ratio": 0})
+    return roll(access, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
+
+
+def slide(access: EngineAccess, *, aspect_ratio: float, friction: float) -> list[Answer]:
+    """A smarticle lying flat is pushed along the floor, along its axis of symmetry, and stops."""
+    speed = 0.3
+    one = scene(access, smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
+    engine = resting(access, one.particle, law_of(one), dt=time_step(one), speed=speed)
+    stops = speed / (friction * G)
+    times, ways, speeds = [0.0], [-0.03], [speed]
+    while engine.time < 1.5 * stops:
+        engine.advance(max(1, round(2e-3 / engine.time_step)))
+        state = engine.state()
+        times.append(engine.time)
+        ways.append(state.positions[0, 1])
+        speeds.append(state.velocities[0, 1])
+    sliding = np.array(times) < 0.8 * stops
+    reason = "friction at the height of the floor makes it rock on its stiff contacts; seen every 2 ms"
+    return [
+        Answer(
+            quantity="deceleration",
+            unit="m/s²",
+            theory=friction * G,
+            measured=-float(np.polyfit(np.array(times)[sliding], np.array(speeds)[sliding], 1)[0]),
+            tolerance=5e-3,
+            reason=reason,
+        ),
+        Answer(
+            quantity="way until it stops",
+            unit="m",
+            theory=speed**2 / (2 * friction * G),
+            measured=float(ways[-1] - ways[0]),
+            tolerance=5e-3,
+            reason=reason,
+        ),
+        Answer(
+            quantity="speed after it stopped",
+            unit="m/s",
+            theory=0.0,
+            measured=float(speeds[-1]),
+            tolerance=3e-4,
+            reason="it sticks; the tangential springs' vibration dies away",
+            scale=speed,
+        ),
+        Answer(
+            quantity="way across",
+            unit="m",
+            theory=0.0,
+            measured=float(state.positions[0, 0]),
+            tolerance=1e-7,
+            reason="symmetry, but for rounding",
+            scale=speed**2 / (2 * friction * G),
+        ),
+    ]
+
+
+def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
+    """Error of the way of a ball that slides and then rolls, after 0.1 s [m], against a four times finer step.
+
+    Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
+    acts only at steps that resolve the winding, a few µs.
+
+    Args:
+        access: on the engine.
+        steps: [s].
+        phases: speeds, so that rolling begins anywhere within a step.
+    """
+    law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
+    slowed = FRICTION * G
+    spun = slowed * BALL_MASS * BALL_RADIUS / float(access.roller().boxes.inertia[0])
+
+    def way(dt: float, number: int) -> Array:
+        speed = 1 + 0.1 * (0.618034 * number % 1)
+        engine = resting(access, access.roller(), law, dt=dt, speed=speed)
+        access.push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spun * dt / 2, 0, 0))
+        engine.advance(round(time / dt))
+        return np.asarray(engine.state().positions[0])
+
+    squares = np.zeros(len(steps))
+    for number in range(phases):
+        reference = way(min(steps) / 4, number)
+        squares += [float(((way(dt, number) - reference) ** 2).sum()) for dt in steps]
+    found: list[float] = np.sqrt(squares / phases).tolist()
+    return found
+
+
+# -- a stack -----------------------------------------------------------------------------------------------------------
+
+
+def two_high(
+    access: EngineAccess, law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool
+) -> Engine:
+    """Two balls on each other on the floor, let go as deep as they will be pressed, or just touching."""
+    press = BALL_MASS * G / STIFFNESS * sunk
+    engine = access.build(access.ball(), law, dt=dt, gravity=G)
+    add(engine, (0, 0, BALL_RADIUS - 2 * press), access.ball_turn)
+    add(engine, (0, 0, 3 * BALL_RADIUS - 3 * press), access.ball_turn)
+    for k, velocity in enumerate(velocities):
+        access.push(engine, k, velocity=(0, 0, velocity))
+    return engine
+
+
+def stack_at_rest(access: EngineAccess) -> list[Answer]:
+    """Two balls on each other come to rest: the lower contact bears both, the upper one the upper ball."""
+    engine = two_high(access, ball_law(restitution=0.2), dt=2e-5, sunk=False)
+    engine.advance(5000)
+    low, high = engine.state().positions[:, 2]
+    reason = "what is left of the vibration after 0.1 s, 40 periods of it"
+    weight = BALL_MASS * G
+    return [
+        Answer(
+            quantity="overlap with the floor",
+            unit="m",
+            theory=2 * weight / STIFFNESS,
+            measured=float(BALL_RADIUS - low),
+            tolerance=1e-6,
+            reason=reason,
+        ),
+        Answer(
+            quantity="overlap of the two",
+            unit="m",
+            theory=weight / STIFFNESS,
+            measured=float(2 * BALL_RADIUS - (high - low)),
+            tolerance=1e-6,
+            reason=reason,
+        ),
+        Answer(
+            quantity="force on the floor",
+            unit="N",
+            theory=-2 * weight,
+            measured=float(access.floor_force(engine)[2]),
+            tolerance=1e-6,
+            reason=reason,
+        ),
+    ]
+
+
+def stack_motion(access: EngineAccess, dt: float, *, time: float) -> tuple[Array, Array]:
+    """Two elastic balls on each other vibrate without parting.
+
+    Returns:
+        (2,) heights of both above where they rest, in the engine and in theory: a chain of two masses [m].
+    """
+    shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    squares, modes = eigh(shape, BALL_MASS * np.eye(2))
+    thrown = np.array([2e-3, -1e-3])  # m/s; overlaps stay above zero
+    # At rest all forces balance, so half a step before t = 0 velocities are the same to first order; not to second.
+    frequencies = np.sqrt(squares)
+    share = modes.T @ (BALL_MASS * thrown)
+    before = modes @ (share * np.cos(frequencies * dt / 2))
+    engine = two_high(access, ball_law(), dt=dt, velocities=before, sunk=True)
+    rest = engine.state().positions[:, 2]
+    engine.advance(round(time / dt))
+    return engine.state().positions[:, 2] - rest, modes @ (share * np.sin(frequencies * time) / frequencies)
+
+
+def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the heights of two elastic balls that vibrate on each other, after 20 ms [m]."""
+    found = [stack_motion(access, dt, time=0.02048) for dt in steps]
+    return [float(np.linalg.norm(one - exact)) for one, exact in found]

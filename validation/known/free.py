@@ -1,0 +1,255 @@
+"""Without contact: fall and spin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from validation.bench import Array, G, add, body_rotations, law_of, scene
+from validation.check import Answer
+from validation.engines import EngineAccess
+from validation.known.theory import free_rotation
+
+START = Rotation.from_rotvec([0.4, 0.2, -0.7])
+SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose three moments differ
+ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly about the axis of the middle moment
+
+
+def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
+    """A smarticle thrown upwards in free fall.
+
+    Args:
+        access: on the engine.
+        dt: time step [s].
+        time: of flight [s].
+        throw: speed upwards at t = 0 [m/s].
+        centred: whether its first velocity is that of half a step before t = 0, as the scheme takes it.
+
+    Returns:
+        (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
+        that it has turned [rad].
+    """
+    one = scene(access)
+    engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
+    add(engine, (0, 0, 0.1), START)
+    access.push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
+    engine.advance(round(time / dt))
+    state = engine.state()
+    turned = (Rotation.from_matrix(body_rotations(state)[0]) * START.inv()).magnitude()
+    return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
+
+
+def free_fall(access: EngineAccess) -> list[Answer]:
+    """The parabola."""
+    dt, time, throw = 5e-5, 0.1, 0.3
+    way, velocity, turned = fall(access, dt, time=time, throw=throw, centred=True)
+    reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
+    return [
+        Answer(
+            quantity="rise after 0.1 s",
+            unit="m",
+            theory=throw * time - G * time**2 / 2,
+            measured=float(way[2]),
+            tolerance=1e-11,
+            reason=reason,
+        ),
+        Answer(
+            quantity="velocity half a step before",
+            unit="m/s",
+            theory=throw - G * (time - dt / 2),
+            measured=velocity,
+            tolerance=1e-11,
+            reason=reason,
+        ),
+        Answer(
+            quantity="way across",
+            unit="m",
+            theory=0.0,
+            measured=float(np.hypot(*way[:2])),
+            tolerance=1e-11,
+            reason="nothing acts across",
+            scale=abs(throw * time - G * time**2 / 2),
+        ),
+        Answer(
+            quantity="turn",
+            unit="rad",
+            theory=0.0,
+            measured=turned,
+            tolerance=1e-11,
+            reason="nothing turns it",
+            scale=1.0,
+        ),
+    ]
+
+
+def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the height of a smarticle let go from rest, as the pour does it, after 0.1 s [m]."""
+    return [abs(fall(access, dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
+
+
+def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
+    """A smarticle spins freely.
+
+    Args:
+        access: on the engine.
+        dt: time step, a whole fraction of all times [s].
+        spin: (3,) laboratory frame [rad/s].
+        times: (n,) rising [s].
+
+    Returns:
+        Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].
+    """
+    one = scene(access)
+    engine = access.build(one.particle, law_of(one), dt=dt)
+    add(engine, (0, 0, 0.1), START)
+    access.push(engine, 0, spin=spin)
+    rows, spins = [], []
+    for time in times:
+        engine.advance(round(time / dt) - 1 - engine.steps)
+        before = Rotation.from_matrix(body_rotations(engine.state())[0])
+        engine.advance(1)
+        rows.append(Rotation.from_matrix(body_rotations(engine.state())[0]))
+        spins.append((rows[-1] * before.inv()).as_rotvec() / dt)
+    return Rotation.concatenate(rows), np.array(spins)
+
+
+def _misfit(found: Rotation, exact: Rotation) -> Array:
+    """(n, 3) rotation vectors from the exact orientations to those found [rad]."""
+    vectors: Array = (found * exact.inv()).as_rotvec()
+    return vectors
+
+
+def torque_free_spin(access: EngineAccess) -> list[Answer]:
+    """A U about no axis in particular: orientation, energy, angular momentum, in the limit of small steps."""
+    inertia = scene(access).smarticle.boxes.inertia
+    times, coarse = np.linspace(0.02, 0.2, 10), 2e-5
+    exact, _ = free_rotation(inertia=inertia, start=START, spin=SPIN, times=times)
+    momentum = START.apply(inertia * START.inv().apply(SPIN))
+    energy = momentum @ SPIN / 2
+    misfits, energies, momenta = [], [], []
+    for dt in (coarse, coarse / 2):
+        rotations, spins = spin_rotations(access, dt, spin=SPIN, times=times)
+        misfits.append(_misfit(rotations, exact))
+        # The spin is that of the middle of the step: so is the frame it is seen in.
+        middle = Rotation.from_rotvec(-spins * dt / 2) * rotations
+        body = middle.inv().apply(spins)
+        energies.append(float((inertia * body[-1] ** 2).sum() / 2))
+        momenta.append(middle.apply(inertia * body)[-1])
+    turned = float(np.linalg.norm(SPIN)) * times[-1]
+    limit = "what is left of second order after extrapolation from 20 and 10 µs; the step's own error is of first order"
+    return [
+        Answer(
+            quantity="orientation after 1.4 turns, dt → 0",
+            unit="rad",
+            theory=0.0,
+            measured=float(np.linalg.norm(2 * misfits[1] - misfits[0], axis=1).max()),
+            tolerance=2e-5,
+            reason=limit,
+            scale=turned,
+        ),
+        Answer(
+            quantity="orientation after 1.4 turns, dt = 20 µs",
+            unit="rad",
+            theory=0.0,
+            measured=float(np.linalg.norm(misfits[0], axis=1).max()),
+            tolerance=2e-3,
+            reason="YADE's rotation is of first order: some ω dt of the angle turned",
+            scale=turned,
+        ),
+        Answer(
+            quantity="kinetic energy, dt → 0",
+            unit="J",
+            theory=energy,
+            measured=2 * energies[1] - energies[0],
+            tolerance=1e-5,
+            reason=limit,
+        ),
+        Answer(
+            quantity="kinetic energy after 0.2 s, dt = 20 µs",
+            unit="J",
+            theory=energy,
+            measured=energies[0],
+            tolerance=0.25 * float(SPIN @ SPIN) * coarse * times[-1],
+            reason="grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a "
+            "second",
+        ),
+        Answer(
+            quantity="angular momentum, change of the vector, dt → 0",
+            unit="kg m²/s",
+            theory=0.0,
+            measured=float(np.linalg.norm(2 * momenta[1] - momenta[0] - momentum)),
+            tolerance=1e-5,
+            reason=limit,
+            scale=float(np.linalg.norm(momentum)),
+        ),
+    ]
+
+
+def spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the orientation after 1.4 turns about no axis in particular [rad]."""
+    times = np.array([0.2])
+    exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=SPIN, times=times)
+    return [
+        float(np.linalg.norm(_misfit(spin_rotations(access, dt, spin=SPIN, times=times)[0], exact))) for dt in steps
+    ]
+
+
+def planar_spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the orientation after 1.3 turns about the normal of the U's plane [rad]."""
+    times, spin = np.array([0.192]), START.apply([0.0, 0.0, 43.0])
+    exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=spin, times=times)
+    return [
+        float(np.linalg.norm(_misfit(spin_rotations(access, dt, spin=spin, times=times)[0], exact))) for dt in steps
+    ]
+
+
+FLIPS = np.linspace(2e-3, 0.5, 250)  # s; times that a U about its middle axis is looked at
+
+
+def _between_flips(access: EngineAccess, rotations: Rotation) -> float:
+    """Time between the first two flips [s]."""
+    # Angular momentum stands still, so its part along the body's y axis tells how the body turns under it.
+    momentum = START.apply(scene(access).smarticle.boxes.inertia * ABOUT_MIDDLE)
+    roots = CubicSpline(FLIPS, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
+    return float(roots[1] - roots[0])
+
+
+def _flip_times(access: EngineAccess, steps: Sequence[float]) -> tuple[list[float], float]:
+    """Times between the first two flips [s] at time steps [s], and in theory."""
+    inertia, spin = scene(access).smarticle.boxes.inertia, START.apply(ABOUT_MIDDLE)
+    exact, _ = free_rotation(inertia=inertia, start=START, spin=spin, times=FLIPS)
+    found = [_between_flips(access, spin_rotations(access, dt, spin=spin, times=FLIPS)[0]) for dt in steps]
+    return found, _between_flips(access, exact)
+
+
+def flips(access: EngineAccess) -> list[Answer]:
+    """The middle axis is unstable: the U flips over, again and again."""
+    (coarse, fine), exact = _flip_times(access, (2e-5, 1e-5))
+    return [
+        Answer(
+            quantity="time between two flips, dt → 0",
+            unit="s",
+            theory=exact,
+            measured=2 * fine - coarse,
+            tolerance=3e-3,
+            reason="what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %",
+        ),
+        Answer(
+            quantity="time between two flips, dt = 20 µs",
+            unit="s",
+            theory=exact,
+            measured=coarse,
+            tolerance=0.05,
+            reason="first order: energy grows by 0.2 ω² dt per second, and the time goes with the logarithm of what "
+            "little energy parts this motion from one that never flips",
+        ),
+    ]
+
+
+def flip_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the time between the first two flips [s]."""
+    found, exact = _flip_times(access, steps)
+    return [abs(time - exact) for time in found]

@@ -1,0 +1,359 @@
+"""Hinges of articulated smarticles: what they bear, how far they give way, how barbs swing on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
+
+from dem.engine.interface import Engine
+from dem.scene.scene import Scene
+from validation.bench import Array, G, add, drive, scene
+from validation.check import Answer
+from validation.engines import EngineAccess
+
+STRONG = 1.0  # N m; a limit that no torque here comes near
+VIBRATION = "the shaft has no damping: what a window over the vibration leaves of it"
+
+
+def hinged(
+    access: EngineAccess,
+    *,
+    aspect_ratio: float = 0.7,
+    fidelity: str = "draft",
+    angles: Sequence[float] = (90, 90),
+    **motor: float | str,
+) -> Scene:
+    """A scene of one smarticle whose shafts will be springs; angles in deg, `motor` as in a scene file."""
+    return scene(
+        access,
+        fidelity=fidelity,
+        phases=("shape-change",),
+        smarticle={"aspect_ratio": aspect_ratio, "angles_deg": list(angles)},
+        motor=access.spring_shafts() | motor,
+    )
+
+
+def upright(
+    access: EngineAccess, one: Scene, *, gravity: float, height: float = 0.05, dt: float | None = None
+) -> Engine:
+    """One articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
+    engine = access.build_hinged(one, gravity=gravity, dt=dt)
+    middle = Rotation.from_matrix(one.smarticle.boxes.link_rotations[1].T)
+    turned = Rotation.from_euler("x", -90, degrees=True) * middle
+    add(engine, np.array([0, 0, height]) - turned.apply(one.smarticle.boxes.link_centres[1]), turned)
+    engine.motors.articulate()
+    access.hold(engine)
+    return engine
+
+
+def _barb(one: Scene) -> tuple[float, float, float]:
+    """Mass [kg], moment of inertia about the own centre across the plane [kg m²], and lever to the hinge [m]."""
+    boxes = one.smarticle.boxes
+    return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
+
+
+def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
+    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays.
+
+    Args:
+        access: on the engine.
+        aspect_ratio: l/w [1].
+        fidelity: draft, standard or reference.
+        largest: gap over the sphere diameter that must not be passed [1].
+    """
+    one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
+    engine = access.build_hinged(one, gravity=0.0)
+    add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
+    engine.motors.articulate()
+    straight = engine.state().angles
+    along = engine.state().link_rotations[0, 1, :, 0]
+    force, gaps = 100 * one.smarticle.boxes.mass * G, []
+    for time in drive(engine, one, duration, lambda _: straight):
+        grown = min(1.0, 2 * time / duration) * force * along
+        for link, sign in ((0, -1), (2, 1)):
+            access.force(engine, 0, link, sign * grown)
+        gaps.append(engine.motors.gaps().max())
+    theory = force / access.pin_stiffness(one)
+    return [
+        Answer(
+            quantity="gap of a hinge, mean",
+            unit="m",
+            theory=theory,
+            measured=float(np.mean(gaps[-20:])),
+            tolerance=0.01,
+            reason="the links' masses swing on the pin for a while, by per cents",
+        ),
+        Answer(
+            quantity="gap of a hinge, largest",
+            unit="m",
+            theory=theory,
+            measured=float(max(gaps)),
+            tolerance=largest * one.sphere_diameter / theory - 1,
+            reason=f"at most {100 * largest:g} % of a sphere's diameter, as the fidelity promises",
+        ),
+    ]
+
+
+def droop(access: EngineAccess, *, aspect_ratio: float, fidelity: str) -> list[Answer]:
+    """Straight barbs under gravity, the middle link held: torques, angles and gaps."""
+    one = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0), torque_limit_N_m=STRONG)
+    # What bears a held link on links acts before the spring looks: (ω dt)²/4 of the sag, 2 % at the step of the scene.
+    dt = None if access.name == "yade" else one.fidelity.control_interval_s / 20
+    engine = upright(access, one, gravity=G, dt=dt)
+    begun = engine.state().angles
+    rows = [
+        (*access.torques(engine), *engine.motors.gaps()[0], *(engine.state().angles - begun)[0])
+        for _ in drive(engine, one, 0.2, lambda _: begun)
+    ]
+    # Barbs vibrate about where they hang. Hann's window takes the vibration out.
+    means = np.average(rows, axis=0, weights=np.hanning(len(rows))).reshape(3, 2).mean(axis=1)
+    mass, _, lever = _barb(one)
+    moment, gap = mass * G * lever, mass * G / access.pin_stiffness(one)
+    return [
+        Answer(
+            quantity="torque of a motor",
+            unit="N m",
+            theory=-moment,
+            measured=float(means[0]),
+            tolerance=0.01,
+            reason=VIBRATION,
+        ),
+        Answer(
+            quantity="sag of a barb",
+            unit="rad",
+            theory=moment / one.motor.stiffness_N_m_per_rad,
+            measured=float(means[2]),
+            tolerance=0.01,
+            reason=VIBRATION,
+        ),
+        Answer(
+            quantity="gap of a hinge",
+            unit="m",
+            theory=gap,
+            measured=float(means[1]),
+            tolerance=0.01 if gap else 1e-12,
+            reason=VIBRATION if gap else "rounding: hinges cannot part",
+            scale=gap or lever,
+        ),
+    ]
+
+
+def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
+    """Lying in the air, the middle link held, barbs sweep through 105° a number of times; then they hang out of plane.
+
+    Bonds add up their moments step by step and turn them with half of the twist: a tilt that were left to them would be
+    wrong by as much as itself after one sweep.
+    """
+    one = hinged(access)
+    engine = access.build_hinged(one, gravity=G)
+    add(engine, (0, 0, 0.05))
+    engine.motors.articulate()
+    access.hold(engine)
+    begun, goal, each = engine.state().angles[0], math.radians(-15), 0.35
+    for _ in drive(engine, one, each * sweeps, lambda t: begun + (goal - begun) * (1 - abs(t / each % 2 - 1))):
+        pass
+    readings, tilts = engine.motors.readings, []
+    assert readings is not None  # the scene actuates
+    last = readings.commands[0].copy()
+    for _ in drive(engine, one, 0.05, lambda _: last):
+        normals = engine.state().link_rotations[0, :, :, 2]
+        tilts.append(np.cross(normals[1], normals[[0, 2]]))
+    from dem.engine.yade.kind import hinge_law  # noqa: PLC0415 # shafts that tilt are YADE's
+
+    mass, _, lever = _barb(one)
+    along = engine.state().link_rotations[0, [0, 2], :, 0]
+    expected = np.cross(along * lever, [0, 0, -mass * G]) / hinge_law(one).tilt_stiffness
+    found = np.average(tilts, axis=0, weights=np.hanning(len(tilts)))
+    size = float(np.linalg.norm(expected[0]))
+    return [
+        Answer(
+            quantity="angle that was reached",
+            unit="rad",
+            theory=goal,
+            measured=float(engine.state().angles[0].mean()),
+            tolerance=0.03,
+            reason=VIBRATION,
+        ),
+        Answer(
+            quantity="tilt out of the plane, worst component",
+            unit="rad",
+            theory=size,
+            measured=size + float(np.abs(found - expected).max()),
+            tolerance=0.05,
+            reason=VIBRATION,
+        ),
+    ]
+
+
+# -- swinging ----------------------------------------------------------------------------------------------------------
+
+
+def crossings(time: Array, value: Array) -> Array:
+    """Times when a value passes zero [s]."""
+    (before,) = np.nonzero(np.diff(np.sign(value)))
+    found: Array = time[before] - value[before] * np.diff(time)[before] / np.diff(value)[before]
+    return found
+
+
+def pendulum(access: EngineAccess, *, aspect_ratio: float) -> list[Answer]:
+    """Barbs that hang from a held middle link, their motors as good as free, let go at a small angle."""
+    one = hinged(
+        access, aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG
+    )
+    engine = upright(access, one, gravity=G)
+    begun = engine.state().angles
+    times, angles = [], []
+    for time in drive(engine, one, 0.45, lambda _: begun):
+        times.append(time)
+        angles.append(engine.state().angles[0] - math.pi / 2)
+    mass, own, lever = _barb(one)
+    amplitude = math.radians(6)
+    period = 2 * math.pi * math.sqrt((own + mass * lever**2) / (mass * G * lever)) * (1 + amplitude**2 / 16)
+    checks = []
+    for barb, sign in ((0, 1), (1, -1)):
+        angle = sign * np.array(angles)[:, barb]
+        checks += [
+            Answer(
+                quantity=f"period, barb {barb + 1}",
+                unit="s",
+                theory=period,
+                measured=2 * float(np.diff(crossings(np.array(times), angle)).mean()),
+                tolerance=2e-3,
+                reason="the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for",
+            ),
+            Answer(
+                quantity=f"amplitude, barb {barb + 1}",
+                unit="rad",
+                theory=amplitude,
+                measured=float(np.abs(angle).max()),
+                tolerance=0.01,
+                reason="the first swing, from where it was let go",
+            ),
+        ]
+    return checks
+
+
+def _free_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
+    """Mass and stiffness matrices of a free U whose barbs turn the same way, (5, 5).
+
+    Coordinates: the middle link along itself and its turn, the barbs' turn, and how far barb 1 has come off its hinge
+    along and across the middle link (barb 2: the same along, the opposite across); these two where pins give way.
+    """
+    boxes = one.smarticle.boxes
+    middle, own_middle = float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2])
+    mass, own, lever = _barb(one)
+    half = boxes.middle_length / 2
+    along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
+    across = np.array([0.0, half, 0.0, 0.0, -1.0])
+    masses = np.diag([middle, own_middle, 2 * own, 0.0, 0.0])
+    masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
+    twist = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
+    if pin == math.inf:
+        masses, twist, pins = masses[:3, :3], twist[:3], np.zeros(3)
+    else:
+        pins = np.array([0, 0, 0, 2 * pin, 2 * pin])
+    return masses, 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist) + np.diag(pins)
+
+
+def _held_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
+    """The same of a barb on a held middle link, (2, 2): its turn, and how far it has come off the hinge across it."""
+    mass, own, lever = _barb(one)
+    shaft = one.motor.stiffness_N_m_per_rad
+    if pin == math.inf:
+        return np.array([[own + mass * lever**2]]), np.array([[shaft]])
+    return np.array([[own + mass * lever**2, mass * lever], [mass * lever, mass]]), np.diag([shaft, pin])
+
+
+def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
+    """Vibration of the barbs on their shafts, above the rigid motions and below the vibrations of the pins.
+
+    Returns:
+        Angular frequency [rad/s], and its shape in the coordinates of the matrices, all five or two of them, for a
+        twist of 1 rad.
+    """
+    masses, stiffness = (_held_matrices if held else _free_matrices)(one, pin)
+    squares, shapes = eigh(stiffness, masses)
+    pins = 0 if pin == math.inf else 1 if held else 2
+    place = len(squares) - 1 - pins
+    shape = np.zeros(2 if held else 5)
+    shape[: len(squares)] = shapes[:, place]
+    return math.sqrt(squares[place]), shape / (shape[0] if held else shape[2] - shape[1])
+
+
+def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
+    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad.
+
+    Args:
+        access: on the engine.
+        one: the scene.
+        held: whether the middle link is held; otherwise all links are free, and the barbs turn the same way.
+        dt: time step [s]; None: that of the scene.
+    """
+    engine = access.build_hinged(one, gravity=0.0, dt=dt)
+    add(engine, (0, 0, 0.05))
+    engine.motors.articulate()
+    frequency, shape = shaft_mode(one, access.pin_stiffness(one), held=held)
+    rates = 0.01 * frequency * shape
+    if held:
+        access.hold(engine)
+        along, across, middle = -(_barb(one)[2] * rates[0] + rates[1]), 0.0, (0.0, 0.0)
+        turn = rates[0]
+    else:
+        lever, half = _barb(one)[2], one.smarticle.middle_length_m / 2
+        along, across = rates[0] - lever * rates[2] + rates[3], half * rates[1] - rates[4]
+        middle, turn = (rates[0], rates[1]), rates[2]
+    access.swing(engine, ((along, -across, turn), (middle[0], 0.0, middle[1]), (along, across, turn)))
+    return engine
+
+
+def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
+    """Frequency √(k/I) of barbs on their shafts, against a held middle link and against a free one."""
+    one = hinged(access, fidelity="standard", torque_limit_N_m=STRONG)
+    engine = floating(access, one, held=held)
+    begun = engine.state().angles
+    log: list[Array] = []
+    for _ in drive(engine, one, 0.04, lambda _: begun, each=lambda: log.append(engine.state().angles[0])):
+        pass
+    turned = np.array(log)[:, 0] - begun[0, 0]
+    time: Array = engine.time_step * np.arange(1, len(turned) + 1, dtype=np.float64)
+    frequency, _ = shaft_mode(one, access.pin_stiffness(one), held=held)
+    return [
+        Answer(
+            quantity="frequency",
+            unit="Hz",
+            theory=frequency / (2 * math.pi),
+            measured=0.5 / float(np.diff(crossings(time, turned)).mean()),
+            tolerance=3e-3,
+            reason="the damper beside the pin, which theory leaves out, is a quarter as stiff",
+        ),
+        Answer(
+            quantity="amplitude",
+            unit="rad",
+            theory=0.01,
+            measured=float(np.abs(turned).max()),
+            tolerance=0.02,
+            reason="the pins' own vibration, which is set going a little",
+        ),
+    ]
+
+
+def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
+    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad].
+
+    Args:
+        access: on the engine.
+        steps: whole fractions of the control period [s].
+    """
+    one = hinged(access, torque_limit_N_m=STRONG)
+
+    def path(dt: float) -> Array:
+        engine = floating(access, one, held=False, dt=dt)
+        begun = engine.state().angles
+        return np.array([engine.state().angles[0, 0] for _ in drive(engine, one, 0.01, lambda _: begun)])
+
+    reference = path(min(steps) / 8)
+    return [float(np.sqrt(np.mean((path(dt) - reference) ** 2))) for dt in steps]

@@ -1,0 +1,140 @@
+"""Answers that have no closed form, integrated by SciPy independently of the engine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from validation.bench import Array
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A body on a spring and dashpot that never pulls, thrown at them.
+
+    Args:
+        restitution: speed after over speed before [1].
+        duration: from first touch until the force is zero [s].
+    """
+
+    restitution: float
+    duration: float
+
+
+def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
+    """Impact of m x'' = −k x − c x' from first touch until the force would pull.
+
+    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007); integrated here.
+    """
+    omega = math.sqrt(stiffness / mass)
+    zeta = damping / (2 * mass * omega)
+
+    def pull(_: float, y: Array) -> float:
+        return float(y[0] + 2 * zeta * y[1])
+
+    pull.terminal, pull.direction = True, -1  # type: ignore[attr-defined]
+    solution = solve_ivp(
+        lambda _, y: [y[1], -y[0] - 2 * zeta * y[1]], (0, 10), [0.0, 1.0], events=pull, rtol=1e-10, atol=1e-12
+    )
+    return Impact(float(-solution.y_events[0][0][1]), float(solution.t_events[0][0]) / omega)
+
+
+def bounced(
+    *, gap: float, speed: float, time: float, stiffness: float, damping: float, mass: float, gravity: float
+) -> float:
+    """Height over that of first touch [m] of a body that falls on a spring and dashpot that never pulls, and bounces.
+
+    Args:
+        gap: free way at t = 0 [m].
+        speed: downwards at t = 0 [m/s].
+        time: after which the body has bounced once [s].
+        stiffness: [N/m].
+        damping: [N s/m].
+        mass: [kg].
+        gravity: [m/s²].
+    """
+    met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
+
+    def push(y: Array) -> float:
+        return float(-stiffness * y[0] - damping * y[1])
+
+    def parts(_: float, y: Array) -> float:
+        return push(y)
+
+    parts.terminal, parts.direction = True, -1  # type: ignore[attr-defined]
+    contact = solve_ivp(
+        lambda _, y: [y[1], push(y) / mass - gravity],
+        (met, time),
+        # A little below, so that an elastic contact does not end where it begins.
+        [-1e-12, -speed - gravity * met],
+        method="DOP853",
+        events=parts,
+        rtol=1e-12,
+        atol=1e-15,
+    )
+    left, (height, velocity) = float(contact.t_events[0][0]), contact.y_events[0][0]
+    flight = time - left
+    return float(height + velocity * flight - gravity * flight**2 / 2)
+
+
+def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array) -> tuple[Rotation, Array]:
+    """Euler's equations of a rigid body without torque.
+
+    Args:
+        inertia: (3,) principal moments [kg m²].
+        start: body frame to laboratory frame at t = 0.
+        spin: (3,) angular velocity at t = 0, laboratory frame [rad/s].
+        times: (n,) rising, from above 0 [s].
+
+    Returns:
+        Rotations at these times, and angular velocities in the body frame (n, 3) [rad/s].
+    """
+
+    def slope(_: float, y: Array) -> Array:
+        vector, scalar, omega = y[:3], y[3], y[4:]
+        rate = 0.5 * np.array([*(scalar * omega + np.cross(vector, omega)), -vector @ omega])
+        return np.array([*rate, *(np.cross(inertia * omega, omega) / inertia)])
+
+    first = [*start.as_quat(), *start.inv().apply(spin)]
+    solution = solve_ivp(slope, (0, times[-1]), first, t_eval=times, method="DOP853", rtol=1e-12, atol=1e-12)
+    return Rotation.from_quat(solution.y[:4].T), solution.y[4:].T
+
+
+def falling_on_springs(
+    points: Array, *, stiffness: float, damping: float, mass: float, inertia: NDArray[np.float64], speed: float
+) -> tuple[Array, float]:
+    """A flat rigid body that falls flat on springs and dashpots under its points; small tilts.
+
+    Args:
+        points: (n, 2) x and y of the contacts from the centre of mass [m].
+        stiffness: of one contact [N/m].
+        damping: of one contact [N s/m].
+        mass: [kg].
+        inertia: (2,) about x and y [kg m²].
+        speed: downwards, at first touch [m/s].
+
+    Returns:
+        Velocity upwards and spins about x and y afterwards (3,) [m/s, rad/s], and the time from the first touch to the
+        end of the last contact [s].
+    """
+    lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)  # heights of the points
+    masses = np.array([mass, *inertia])
+    omega = math.sqrt(len(points) * stiffness / mass)
+
+    def forces(y: Array) -> Array:
+        gap, rate = lift @ y[:3], lift @ y[3:]
+        found: Array = np.where(gap < 0, np.maximum(-stiffness * gap - damping * rate, 0.0), 0.0)
+        return found
+
+    def slope(_: float, y: Array) -> Array:
+        return np.concatenate([y[3:], lift.T @ forces(y) / masses])
+
+    # Long enough for the slowest tilt; steps short against the contact, whose force jumps at first touch.
+    solution = solve_ivp(slope, (0, 12 / omega), [0, 0, 0, -speed, 0, 0], max_step=0.005 / omega, rtol=1e-8, atol=1e-14)
+    pressed = [bool(forces(y).any()) for y in solution.y.T]
+    return solution.y[3:, -1], float(solution.t[max(k for k, on in enumerate(pressed) if on)])

@@ -1,0 +1,105 @@
+"""The catalogue of known answers: what can be asked of it without YADE."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem.physics.contact import damping_ratio, restitution_of
+from validation.check import Answer
+from validation.engines import BALL_MASS, BALL_RADIUS, ENGINES, engine_access
+from validation.hard.cases import CASES as HARD
+from validation.known.cases import CASES, LADDERS
+from validation.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
+from validation.yade_access import ball
+
+
+def test_names_are_unique() -> None:
+    for entries in (CASES, LADDERS):
+        assert len({entry.name for entry in entries}) == len(entries)
+
+
+def test_both_orders_are_there_and_steps_fall() -> None:
+    for engine in ENGINES:
+        assert {ladder.scheme[engine][0] for ladder in LADDERS} == {1, 2}
+    for ladder in LADDERS:
+        assert len(ladder.steps) >= 3
+        assert all(np.diff(ladder.steps) < 0)
+
+
+@pytest.mark.parametrize(("measured", "ok"), [(1.009, True), (1.011, False), (0.0, False), (math.nan, False)])
+def test_a_check_passes_within_its_tolerance_only(measured: float, ok: bool) -> None:
+    check = Answer(quantity="q", unit="m", theory=1.0, measured=measured, tolerance=0.01, reason="")
+    assert check.good is ok
+
+
+def test_an_error_is_relative_to_the_scale_where_theory_is_zero() -> None:
+    check = Answer(quantity="q", unit="m", theory=0.0, measured=0.02, tolerance=0.01, reason="", scale=2.0)
+    assert check.error == 0.01
+
+
+def test_ball_has_one_sphere_and_the_inertia_of_a_solid_one() -> None:
+    one = ball()
+    assert one.centres == pytest.approx(np.zeros((1, 3)))
+    assert one.radius == BALL_RADIUS
+    assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
+    assert one.boxes.inertia == pytest.approx(np.full(3, 0.4 * BALL_MASS * BALL_RADIUS**2), rel=1e-12)
+
+
+def test_what_is_left_out_says_why() -> None:
+    for case in (*CASES, *HARD.values()):
+        assert set(case.absent) < set(ENGINES)  # on one of them at least
+        assert all(len(why) > 20 for why in case.absent.values())
+
+
+def test_stub_and_roller_stand_for_the_ball() -> None:
+    access = engine_access("links")
+    stub, roller = access.ball(), access.roller()
+    for one in (stub, roller):
+        assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
+    assert access.ball_turn.apply(access.ends(stub))[:, 2].min() - stub.radius == pytest.approx(-BALL_RADIUS)
+    assert roller.boxes.inertia[0] == pytest.approx(0.4 * BALL_MASS * BALL_RADIUS**2, rel=1e-12)
+    assert roller.radius == BALL_RADIUS
+
+
+# -- the theory itself -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
+def test_integrated_impact_is_schwagers_and_poeschels(restitution: float) -> None:
+    zeta = damping_ratio(restitution)
+    impact = dashpot_impact(stiffness=500.0, damping=2 * zeta * math.sqrt(500.0 * 2e-4), mass=2e-4)
+    assert impact.restitution == pytest.approx(restitution_of(zeta), rel=1e-6)
+    if restitution == 1:
+        assert impact.duration == pytest.approx(math.pi * math.sqrt(2e-4 / 500), rel=1e-6)
+
+
+def test_bounce_keeps_energy_where_nothing_damps() -> None:
+    way = {"gap": 1e-4, "speed": 0.2, "stiffness": 500.0, "damping": 0.0, "mass": 2.6e-4, "gravity": 9.81}
+    top = 1e-4 + 0.2**2 / (2 * 9.81)
+    heights = [bounced(time=time, **way) for time in np.linspace(0.02, 0.03, 400)]
+    assert max(heights) == pytest.approx(top, rel=1e-5)
+
+
+def test_free_rotation_about_a_principal_axis_is_uniform() -> None:
+    rotations, spins = free_rotation(
+        inertia=np.array([1.0, 2.0, 3.0]),
+        start=Rotation.identity(),
+        spin=np.array([0, 0, 2.0]),
+        times=np.array([0.5, 1.0]),
+    )
+    assert rotations.as_rotvec() == pytest.approx(np.array([[0, 0, 1.0], [0, 0, 2.0]]), abs=1e-9)
+    assert spins == pytest.approx(np.tile([0, 0, 2.0], (2, 1)))
+
+
+def test_springs_about_the_centre_are_one_spring_of_their_sum() -> None:
+    points = np.array([[1e-3, 0], [-1e-3, 0], [0, 2e-3], [0, -2e-3]])
+    after, lasts = falling_on_springs(
+        points, stiffness=100.0, damping=0.02, mass=1e-4, inertia=np.array([1e-10, 1e-10]), speed=0.1
+    )
+    one = dashpot_impact(stiffness=400.0, damping=0.08, mass=1e-4)
+    assert after == pytest.approx([0.1 * one.restitution, 0, 0], rel=2e-3, abs=1e-9)
+    assert lasts == pytest.approx(one.duration, rel=0.01)
