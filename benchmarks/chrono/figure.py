@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from benchmarks.chrono.cases import FIRST, INTERNAL, RULES, SHAPE, Case
 from dem.record.manifest import read_run
 from postprocess.report import figures
-from studies.base.activity import height_history
+from studies.framework.activity import height_history
 
 Array = NDArray[np.float64]
 

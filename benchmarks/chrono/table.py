@@ -14,8 +14,17 @@ from dem.record.manifest import read_run
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.activity import ENERGY, HEIGHT, LOWEST, PHI_ACTIVE, SAMPLED, STRAIGHT, height_history, procedure_row
-from studies.base.procedures import CROSSINGS, PHI, STATIC
+from studies.framework.activity import (
+    ENERGY,
+    HEIGHT,
+    LOWEST,
+    PHI_ACTIVE,
+    SAMPLED,
+    STRAIGHT,
+    height_history,
+    procedure_row,
+)
+from studies.framework.procedures import CROSSINGS, PHI, STATIC
 
 HIGHEST = "highest com height over h0 [-]"
 STATIC_PHI, STATIC_CROSSINGS = f"{STATIC} {PHI}", f"{STATIC} {CROSSINGS}"

@@ -42,7 +42,7 @@ DIR/links do. Exit status 1 if an answer is not as it must be.""",
 
 def run_verify(arguments: argparse.Namespace) -> int:
     """`smarticles verify`."""
-    from studies.base.origin import make_folder  # noqa: PLC0415
+    from studies.framework.provenance import make_folder  # noqa: PLC0415
 
     both = arguments.engine == "both"
     failed = [

@@ -13,7 +13,7 @@ import pandas as pd
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
 from smarticles.verification.hard.onset import onsets
-from studies.base.figures import finished
+from studies.framework.plots import finished
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis

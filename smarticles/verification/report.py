@@ -16,7 +16,7 @@ from dem.errors import InputError
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.convergence import observed_order
 from smarticles.verification import figures as verification_figures
-from studies.base.origin import markdown_ending, write_tables, write_text
+from studies.framework.provenance import markdown_ending, write_tables, write_text
 
 BAND = 0.3
 """An observed order passes within this of the scheme's [1]: no order in between the first and the second does."""

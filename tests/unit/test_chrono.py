@@ -27,8 +27,8 @@ from dem.record.manifest import read_run
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from postprocess.measures.motors import SAMPLED_WORK
-from studies.base.activity import ENERGY, HEIGHT, SAMPLED
-from studies.base.procedures import PHI
+from studies.framework.activity import ENERGY, HEIGHT, SAMPLED
+from studies.framework.procedures import PHI
 
 COUNT = 3
 LOOK = 0.005
