@@ -67,8 +67,8 @@ _SHOWN = {
     PHI_ACTIVE: ("φ_f", ".4f", "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]", 1.0),
     PHI: ("φ at rest again", ".4f", "", 1.0),
     CROSSINGS: ("⟨N⟩", ".2f", CROSSINGS_LABEL, 1.0),
-    ENERGY: ("energy [J]", ".2e", "energy per smarticle, every step [µJ]", 1e6),
-    SAMPLED: ("", ".2e", f"energy per smarticle, summed every {APART:g} s [µJ]", 1e6),
+    ENERGY: ("energy [J]", ".2e", "energy per smarticle,\nevery step [µJ]", 1e6),
+    SAMPLED: ("", ".2e", f"energy per smarticle,\nsummed every {APART:g} s [µJ]", 1e6),
     HEIGHT: ("h/h0", ".3f", r"height over $h_0$ [-]", 1.0),
 }
 COLUMNS = {

@@ -104,31 +104,29 @@ def _scripts() -> list[Script]:
     return found
 
 
+_FOLDERS: tuple[Shipped, ...] = (
+    gravish.SHIPPED,
+    friction.SHIPPED,
+    friction.CONTACTS,
+    friction.COMPACTION,
+    sensitivity.SHIPPED,
+    sensitivity.SECTION,
+    fracture.SHIPPED,
+    fracture.CODE,
+    landscape.SHIPPED,
+    finite_size.SHIPPED,
+    melting.SHIPPED,
+    melting.CODE,
+    casting.SHIPPED,
+    casting.CODE,
+    collapse.SHIPPED,
+    chain.SHIPPED,
+    chain.BODIES,
+    engines.SHIPPED,
+)
+
 STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(
-    {
-        study.name: study
-        for study in (
-            *_scripts(),
-            gravish.SHIPPED,
-            friction.SHIPPED,
-            friction.CONTACTS,
-            friction.COMPACTION,
-            sensitivity.SHIPPED,
-            sensitivity.SECTION,
-            fracture.SHIPPED,
-            fracture.CODE,
-            landscape.SHIPPED,
-            finite_size.SHIPPED,
-            melting.SHIPPED,
-            melting.CODE,
-            casting.SHIPPED,
-            casting.CODE,
-            collapse.SHIPPED,
-            chain.SHIPPED,
-            chain.BODIES,
-            engines.SHIPPED,
-        )
-    }
+    {**{study.name: study for study in _scripts()}, **{study.name: study for study in _FOLDERS}}
 )
 """By name."""
 

@@ -419,6 +419,7 @@ FIGURES = (
         x=UPPER,
         x_scale=1e3,
         x_label="hook above the floor [mm]",
+        ticks=True,
         split=by_procedure(_LABELS, apart=0.3, line=False),
     ),
     Scatter(

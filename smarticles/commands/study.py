@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from smarticles.layout import columns, told_results
@@ -18,7 +18,7 @@ from studies import registry
 
 if TYPE_CHECKING:
     from studies.framework.runs import MeasuredRun
-    from studies.framework.study import Report, Study
+    from studies.framework.study import Report
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
 
@@ -86,7 +86,7 @@ def run_study(arguments: argparse.Namespace) -> int:
 def compute_and_analyse(
     folder: Folder,
     arguments: argparse.Namespace,
-    load: Callable[[], Study],
+    load: Callable[[], Any],
     *,
     note: str,
     pictured: Mapping[str, object],
@@ -126,7 +126,7 @@ def compute_and_analyse(
     return 0
 
 
-def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study]) -> Mapping[str, MeasuredRun]:
+def _earlier(results: Path | None, folder: Folder, load: Callable[[], Any]) -> Mapping[str, MeasuredRun]:
     """The runs of a sweep that an earlier analysis measured.
 
     Raises:

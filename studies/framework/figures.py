@@ -91,6 +91,7 @@ class Means:
         x_scale: Factor of x.
         log: Whether y is logarithmic where all means are above 0.
         marks: Values of x with a vertical line.
+        ticks: Whether the axis has ticks at the values of x alone.
         share_y: Whether panels have one y axis.
         told: Lines for the footer.
     """
@@ -103,6 +104,7 @@ class Means:
     x_scale: float = 1.0
     log: bool = False
     marks: Sequence[float] = ()
+    ticks: bool = False
     share_y: bool = False
     told: Sequence[str] = ()
 
@@ -119,6 +121,9 @@ class Means:
             self._panel(axes, quantity, analysis.tables["points"])
         for axes in grid[-1]:
             axes.set_xlabel(self.x_label)
+            if self.ticks:
+                values = self.x_scale * np.unique(analysis.points[self.x].dropna())
+                axes.set_xticks(values, labels=[f"{value:g}" for value in values])
         if columns == 1:
             plots.legend_above(grid[0, 0])
         else:

@@ -221,7 +221,7 @@ def above(
 
     def outcome(table: pd.DataFrame) -> Outcome:
         bounded = {name: bounds is not None and bool(of(table, name)[bounds].any()) for name in (one, *others)}
-        effects = []
+        effects: list[Effect] = []
         for other, judged in [*((name, sign) for name in others), *((name, 0) for name in beside)]:
             column = quantity if judged else beside_quantity or quantity
             both = pairs(of(table, one), of(table, other), column)

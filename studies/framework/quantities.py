@@ -65,6 +65,10 @@ class Key:
             return str(value)
         return "" if math.isnan(value) else f"{self.scale * value:{self.form}}{self.unit}"
 
+    def cell(self, point: Mapping[str, object]) -> str:
+        """Format the value of a point."""
+        return self.text(point[self.column])
+
 
 def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) -> pd.DataFrame:
     """Sort rows by columns; a key with an order of its own is sorted by that."""
@@ -79,7 +83,7 @@ def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) 
 
 def cells_of(keys: Sequence[Key]) -> Mapping[str, Callable[[pd.Series], str]]:
     """Header and cell of each key, for tables."""
-    return {key.label: lambda point, key=key: key.text(point[key.column]) for key in keys}
+    return {key.label: key.cell for key in keys}
 
 
 def short_table(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -184,11 +185,7 @@ class Study:
             found.refuse_mixture("engine", lambda run: run.manifest.engine)
         found.refuse_mixed_counts()
         for column, within in self.constant.items():
-            found.refuse_mixture(
-                column,
-                lambda run, column=column: f"{run.row[column]:.3g}",
-                within=lambda run, within=within: tuple(run.row[name] for name in within),
-            )
+            found.refuse_mixture(column, partial(_value, column=column), within=partial(_values, columns=within))
         found.refuse_repeats("point", self.point_of)
 
     def point_of(self, run: MeasuredRun) -> str:
@@ -289,6 +286,14 @@ class Study:
             column, word = self.bounds
             bounded = f"; {word}: {int((runs[column] > 0).sum())} of {len(runs)} runs, whose numbers are lower bounds"
         return f"{told_seeds(runs, counts, 'point')}{bounded}"
+
+
+def _value(run: MeasuredRun, *, column: str) -> str:
+    return f"{run.row[column]:.3g}"
+
+
+def _values(run: MeasuredRun, *, columns: Sequence[str]) -> tuple[object, ...]:
+    return tuple(run.row[name] for name in columns)
 
 
 def read_runs(results: Path, name: str = "runs.csv") -> pd.DataFrame:
