@@ -45,7 +45,6 @@ bench: setup ## measure speed, what each effect costs, and rivals that are insta
 	$(BIN)/python -m benchmarks.scaling
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.effects
-	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.twins
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.rivals
 
 rivals: setup ## install the engines that make bench compares with, into .venv (a minute); nothing else needs them

@@ -101,7 +101,10 @@ def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, 
     if not many and ranks is not None:
         msg = f"--ranks {ranks}: engine: {scene.engine} is one process; use --threads, or engine: lammps"
         raise InputError(msg)
-    wanted = ranks if many else threads
+    if scene.engine == "links" and threads is not None and threads > 1:
+        msg = f"--threads {threads}: engine: links has one thread; leave it out, and run several seeds side by side"
+        raise InputError(msg)
+    wanted = 1 if scene.engine == "links" else ranks if many else threads
     if wanted is None:
         wanted = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
     if many:

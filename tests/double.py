@@ -393,7 +393,6 @@ class KindDouble:
     workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
-    threads_pay_from = 0
     built: list[EngineDouble]
 
     def __init__(self) -> None:

@@ -20,7 +20,6 @@ LOOKS: Mapping[str, tuple[str, str]] = {
     "links": ("o", figures.BLUE),
     "YADE": ("s", figures.SKY),
     "LAMMPS": ("D", figures.GREEN),
-    "LIGGGHTS": ("X", figures.GREEN),
     "MuJoCo": ("^", figures.ORANGE),
     "Bullet": ("v", figures.BLACK),
     "Rapier": ("P", figures.GREY),

@@ -74,7 +74,6 @@ ENGINES: Mapping[str, Peer] = {
     "links": Peer(title="links", module="ours", needs="numba"),
     "yade": Peer(title="YADE", module="ours", needs="dem"),
     "lammps": Peer(title="LAMMPS", module="lammps", needs="lmp", package="lammps"),
-    "liggghts": Peer(title="LIGGGHTS", module="liggghts", needs="liggghts", package="liggghts"),
     "mujoco": Peer(title="MuJoCo", module="mujoco_boxes", needs="mujoco"),
     "bullet": Peer(title="Bullet", module="bullet", needs="pybullet"),
     "rapier": Peer(title="Rapier", module="rapier", needs="rapier3d"),
@@ -107,7 +106,6 @@ def _ours() -> Iterator[Setting]:
         yield Setting(engine="yade", name=name, shape="spheres", scene=told, costly=name == "reference")
     told = {"engine": "yade", "fidelity": "standard"}
     yield Setting(engine="lammps", name="standard", shape="spheres", scene=told, costly=True)
-    yield Setting(engine="liggghts", name="standard", shape="spheres", scene=told, costly=True)
 
 
 def _mujoco(time_step: float, contact: float) -> Mapping[str, Any]:

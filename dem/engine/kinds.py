@@ -27,10 +27,6 @@ class EngineKind(Protocol):
     def idle_knobs(self) -> tuple[str, ...]:
         """Knobs of the fidelity that have no meaning on it."""
 
-    @property
-    def threads_pay_from(self) -> int:
-        """Smarticles from which on a second thread, or rank, makes a run clearly faster, about."""
-
     def version(self) -> str:
         """Version of what results depend on.
 

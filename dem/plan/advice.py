@@ -20,18 +20,6 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene))
 
 
-def thread_warnings(scene: Scene, threads: int) -> tuple[str, ...]:
-    """Threads, or ranks, that a scene has no use for, in one line."""
-    kind = engine_kind(scene.engine)
-    pays, worker = kind.threads_pay_from, kind.workers.removesuffix("s")
-    if threads == 1 or scene.count >= pays:
-        return ()
-    return (
-        f"--{kind.workers} {threads}: {scene.count} smarticles gain little by more than one {worker}, from about "
-        f"{pays} on they do; for many small runs use a sweep with one {worker} each",
-    )
-
-
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
     """Knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
     fidelity = scene.fidelity

@@ -19,7 +19,7 @@ import numpy as np
 
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
-from dem.plan.advice import thread_warnings, warnings_of
+from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.files import write_text
 from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, read_run, write_manifest
@@ -156,7 +156,7 @@ def _run(
             made_by=made_by,
             time_steps=steps,
         )
-        for warning in (*warnings_of(scene), *thread_warnings(scene, threads)):
+        for warning in warnings_of(scene):
             simulation.warn(warning)
         if resume:
             _restore(simulation, scene, out, log, threads)

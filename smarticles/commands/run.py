@@ -42,9 +42,8 @@ directory that holds something else is never touched.""",
         "--threads",
         type=positive_int,
         metavar="N",
-        help="threads of the engine; default 1, whatever OMP_NUM_THREADS says, or what the run to be resumed began "
-        "with. Results depend on their number in the last bits: the same number gives the same bits on links, not on "
-        "YADE. They pay from about 1000 smarticles on; threads that find no free core make a run slower",
+        help="threads of YADE; default 1, whatever OMP_NUM_THREADS says, or what the run to be resumed began with. "
+        "Results on several threads differ in the last bits. links has one thread, lammps has --ranks",
     )
     add_ranks(run, "1, or what the run to be resumed began with")
 

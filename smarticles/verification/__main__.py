@@ -20,7 +20,7 @@ from smarticles.verification.hands.kinds import ENGINES
 
 STABILITY = {"yade": Path("results/stability"), "links": Path("results/stability/links")}
 # On YADE bits are the same on one thread only.
-THREADS = {"yade": (1,), "links": (1, 2)}
+THREADS = {"yade": (1,), "links": (1,)}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

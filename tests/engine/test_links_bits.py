@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
-import signal
 import time
 from pathlib import Path
 
 import pytest
-from processes import complete, differing, finish, gate, results, start
+from processes import complete, differing, finish, results, start
 from test_restart import INTERVAL_S, kill_often, log_of
 
 from smarticles.verification.hard.kills import SAME, kills
@@ -54,30 +52,8 @@ def test_a_run_killed_four_times_gives_the_same_bits(tmp_path: Path) -> None:
     assert max(tally.lost_s, default=0.0) <= INTERVAL_S + 1e-6
 
 
-COMPILING_S = 1800.0  # of wall time, for what takes 75 s of a processor's on two threads for the first time
-
-
-@pytest.mark.validation  # in seconds on free cores, in minutes where threads have to wait for one
-def test_a_run_on_two_threads_killed_and_resumed_gives_the_same_bits(scene: Path, tmp_path: Path) -> None:
-    threads = ("--threads", "2")
-    for name in ("whole", "killed", "other"):
-        kill = {} if name == "whole" else gate("checkpoint.zip", 4, "SIGKILL")
-        status, said = finish(start(scene, tmp_path / name, kill, *threads), COMPILING_S)
-        assert status == (0 if name == "whole" else -signal.SIGKILL), said
-        assert "12 smarticles gain little by more than one thread" in said
-    assert json.loads((tmp_path / "whole/run.json").read_text())["threads"] == 2
-    # Resumed with as many threads as it began with, unless told.
-    status, said = finish(start(scene, tmp_path / "killed"))
-    assert (status, "the run began with" in said) == (0, False), said
-    assert differing(results(tmp_path / "whole"), results(tmp_path / "killed")) == []
-    status, said = finish(start(scene, tmp_path / "other", {}, "--threads", "1"))
-    assert status == 0
-    assert "--threads 1: the run began with 2" in said
-
-
-@pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.validation)])
-def test_kills_at_random_moments_change_no_bit(tmp_path: Path, threads: int) -> None:
-    rows = kills("links", threads, 2, tmp_path, seed=1)
+def test_kills_at_random_moments_change_no_bit(tmp_path: Path) -> None:
+    rows = kills("links", 1, 2, tmp_path, seed=1)
     assert [row[SAME] for row in rows] == ["yes", "yes"]
     assert all(row["files [1]"] > 20 for row in rows)
 

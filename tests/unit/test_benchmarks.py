@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 import pytest
 
-from benchmarks import effects, scaling, twins
+from benchmarks import effects, scaling
 from dem.plan.effects import EFFECTS, decide
 from dem.plan.steps import time_step
 from dem.scene.reading import parse_scene
@@ -43,16 +42,6 @@ def test_every_effect_that_costs_anything_is_measured_in_a_pair() -> None:
     left_out = {"contact", "gravity", "friction", "restitution", "wall removal", "container", "plane", "strings"}
     assert {effect.name for effect in EFFECTS} - left_out <= named
     assert {"hooks", "energies", "energy account", "sphere glyphs", "checkpoints", "motors"} <= switched
-
-
-@pytest.mark.parametrize("kind", twins.twins(0.5))
-def test_twins_are_valid(kind: str) -> None:
-    def scene(changes: Mapping[str, Any]) -> dict[str, Any]:
-        return twins.scene_data(1, *changes["phases"], **{k: v for k, v in changes.items() if k != "phases"})
-
-    one, other = (parse_scene(scene(changes), source="benchmarks") for changes in twins.twins(0.5)[kind])
-    assert one != other
-    assert time_step(one) == time_step(other)
 
 
 @pytest.mark.parametrize("count", scaling.COUNTS)

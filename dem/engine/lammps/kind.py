@@ -33,7 +33,6 @@ class LammpsKind:
     workers = "ranks"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("wall_facets", "hinge_stiffness_N_per_m", "control_interval_s")
-    threads_pay_from = 0
 
     def version(self) -> str:
         """See the interface."""

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-import numba.extending
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, _CacheLocator
 from numba.core.caching import FunctionCache as NumbaCache
@@ -53,18 +52,6 @@ def kernel(function: F) -> F:
     compiled = numba.njit(**OPTIONS)(function)
     compiled._cache = _Cache(compiled.py_func)
     return compiled  # type: ignore[no-any-return]
-
-
-def released(function: F) -> F:
-    """The same for a kernel that several threads run at once: the interpreter is free meanwhile."""
-    compiled = numba.njit(nogil=True, **OPTIONS)(function)
-    compiled._cache = _Cache(compiled.py_func)
-    return compiled  # type: ignore[no-any-return]
-
-
-def intrinsic(function: Callable[..., Any]) -> Any:
-    """A function that writes the code of a call itself, for what Numba has no words for."""
-    return numba.extending.intrinsic(function)
 
 
 @cache

@@ -56,7 +56,6 @@ class LinksEngine:
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
-        threads: that make the steps.
     """
 
     def __init__(
@@ -73,7 +72,6 @@ class LinksEngine:
         hooks: tuple[Cross, Cross] | None = None,
         channel: Channel | None = None,
         strengths: Array | None = None,
-        threads: int = 1,
     ) -> None:
         self.particle = particle
         """See the interface."""
@@ -90,7 +88,6 @@ class LinksEngine:
             gravity=gravity,
             planar=channel is not None,
             account=account,
-            threads=threads,
         )
         self._world.rims = tier_rims(cylinder, channel)
         if hooks is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 
 import numba
@@ -26,18 +25,14 @@ class LinksKind:
     workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
-    # Two threads against one, piles at equal height, least of eight, 2026-11-22: 1.06 times as fast at 270, 1.56 at
-    # 1000. A line through both, 28 us a step and 0.18 us per smarticle, makes it 1.35 at 500, where it was not run.
-    threads_pay_from = 500
 
     def version(self) -> str:
         """See the interface: the sources' own hash, and the compiler."""
         return f"{stamp()} (Numba {numba.__version__})"
 
     def threads(self) -> int:
-        """See the interface: OMP_NUM_THREADS, or 1 where nobody set it to a number."""
-        given = os.environ.get("OMP_NUM_THREADS", "")
-        return max(1, int(given)) if given.isdecimal() else 1
+        """Return 1: the engine has one thread."""
+        return 1
 
     def adds(self, effect: EffectName) -> Adds:
         """See the interface."""
@@ -84,7 +79,6 @@ class LinksKind:
             hooks=None if scene.hooks is None else scene.hooks.crosses,
             channel=scene.channel,
             strengths=scene.motor_strengths,
-            threads=self.threads(),
         )
 
 

@@ -38,7 +38,6 @@ from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
 from dem.engine.links.stepping import advance
-from dem.engine.links.team.team import Team
 from dem.errors import refuse
 from dem.physics.contact import ContactLaw
 from dem.setting.hooks import Bar
@@ -84,7 +83,6 @@ class World:
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to the plane z = 0.
         account: whether to add up what contacts dissipate.
-        threads: that make the steps; results depend on their number in the last bits.
     """
 
     particle: Particle
@@ -93,7 +91,6 @@ class World:
     gravity: float
     planar: bool
     account: bool
-    threads: int = 1
     steps: int = 0
     time_step: float = math.nan
     motors: Motoring | None = None
@@ -110,7 +107,6 @@ class World:
 
     def __post_init__(self) -> None:
         law = self.contact
-        self.team = Team(self.threads) if self.threads > 1 else None
         self.shape = shape_of(self.particle)
         self.laws = tuple(
             Law(law.normal_stiffness, law.tangential_stiffness, damping, damping * law.tangential_damping, friction)
@@ -244,8 +240,7 @@ class World:
                 self.make_room(int(GROWTH * len(self.pairs.first)))
 
     def _call(self, steps: int) -> int:
-        make = advance if self.team is None else self.team.advance
-        made: int = make(
+        made: int = advance(
             steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
             self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
             self.hooks, self.rims, self.channel, self.cords, self.ledger, self.out, self.row, self.totals,

@@ -31,7 +31,6 @@ class YadeKind:
     workers = "threads"
     damps_once_per_look = True
     idle_knobs: tuple[str, ...] = ()
-    threads_pay_from = 0  # not measured
 
     def version(self) -> str:
         """See the interface."""

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 from scenes import small
 
-from dem.engine.kinds import engine_kind
-from dem.plan.advice import thread_warnings, warnings_of
+from dem.plan.advice import warnings_of
 from dem.plan.outlook import plan
 
 DEPOSIT, RELAX, PULL = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}, {"type": "pull-hook"}
@@ -119,23 +118,3 @@ def test_a_plan_says_what_is_different_on_links() -> None:
     assert lines[1] == (
         "engine links: fidelity.rows are strands; pitch, wall_facets, hinge_stiffness_N_per_m have no meaning here"
     )
-
-
-def test_threads_that_do_not_pay_are_told() -> None:
-    few, many = small({"engine": "links"}), small({"engine": "links", "count": 2000})
-    assert thread_warnings(few, 1) == ()
-    assert thread_warnings(many, 2) == ()
-    (told,) = thread_warnings(few, 2)
-    assert told.startswith("--threads 2: 10 smarticles gain little by more than one thread, from about 500 on they do")
-
-
-@pytest.mark.parametrize(("said", "threads"), [(None, 1), ("", 1), ("3", 3), ("0", 1), ("4,2", 1)])
-def test_links_runs_with_the_threads_that_the_command_sets(
-    monkeypatch: pytest.MonkeyPatch, said: str | None, threads: int
-) -> None:
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    if said is not None:
-        monkeypatch.setenv("OMP_NUM_THREADS", said)
-    kind, scene = engine_kind("links"), small({"engine": "links"})
-    assert kind.threads() == threads
-    assert kind.build(scene, 1e-4)._world.threads == threads  # type: ignore[attr-defined]

@@ -10,11 +10,7 @@ from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.law import resist
 from dem.engine.links.contact.meeting import BARE, POINTS, meet_at, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest
-from dem.engine.links.memory import fetch
 from dem.engine.links.shape import Shape
-
-FEW = 500  # smarticles, which a processor has in its cache
-AHEAD = 6  # contacts
 
 
 @inlined
@@ -144,10 +140,8 @@ def push_touching(
     segments, owner, kind = bodies.segments, pairs.owner, pairs.kind
     diameter, inverses = 2 * shape.radius, shape.inverses
     reach = diameter * diameter
-    lost, many = 0.0, bodies.position.shape[0] > FEW
+    lost = 0.0
     for k in range(begin, stop):
-        if many:
-            _fetch_contact(bodies, pairs, hinged, pairs.touching[min(k + AHEAD, stop - 1)])
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
@@ -267,29 +261,6 @@ def motion_at(
         motion[row_i, 2] + ax * ry - ay * rx - (motion[row_j, 2] + bx * gy - by * gx),
         (ax + bx) * nx + (ay + by) * ny + (az + bz) * nz,
     )
-
-
-@inlined
-def _fetch_contact(bodies: Bodies, pairs: Pairs, hinged: Any, pair: int) -> None:
-    """Have the memory that a contact needs brought near: all that many smarticles have does not fit into a cache."""
-    p, q = pairs.first[pair], pairs.second[pair]
-    i, j = pairs.owner[p], pairs.owner[q]
-    fetch(pairs.slip, pair, 2)
-    fetch(bodies.segments, p, 1)
-    fetch(bodies.segments, q, 1)
-    fetch(bodies.position, i, 1)
-    fetch(bodies.position, j, 1)
-    if hinged is None:
-        fetch(bodies.motion, i, 1)
-        fetch(bodies.motion, j, 1)
-        fetch(bodies.load, i, 1)
-        fetch(bodies.load, j, 1)
-    else:
-        row, other = 3 * i + pairs.kind[p], 3 * j + pairs.kind[q]
-        fetch(bodies.motion, row, 1)
-        fetch(bodies.motion, other, 1)
-        fetch(bodies.shares, row, 1)
-        fetch(bodies.shares, other, 1)
 
 
 @inlined

@@ -1,1 +1,0 @@
-"""The same steps on several threads: kernels that threads run together, and what starts them."""
