@@ -1,10 +1,21 @@
-"""The shipped studies; a new one is a folder, and a line here."""
+"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it, and folders that are still to become such a pair.
+
+A variant of the sweep is a study of its own, `strength-code` of `strength.yaml@code`, but for `quick`, which is the
+quick variant of them all. Nothing large is imported before a study is loaded.
+"""
 
 from __future__ import annotations
 
+import ast
+import importlib
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import yaml
 
 from dem.errors import InputError, nearest
 from studies import (
@@ -18,47 +29,109 @@ from studies import (
     gravish,
     landscape,
     melting,
-    procedures,
     sensitivity,
-    strength,
 )
 from studies.base.shipped import Shipped
 
-STUDIES: Mapping[str, Shipped] = MappingProxyType(
-    {
-        study.name: study
-        for study in (
-            gravish.SHIPPED,
-            friction.SHIPPED,
-            friction.CONTACTS,
-            friction.COMPACTION,
-            sensitivity.SHIPPED,
-            sensitivity.SECTION,
-            procedures.SHIPPED,
-            procedures.CODE,
-            procedures.CODE_ON_YADE,
-            procedures.FACTORS,
-            fracture.SHIPPED,
-            fracture.CODE,
-            strength.SHIPPED,
-            strength.CODE,
-            landscape.SHIPPED,
-            finite_size.SHIPPED,
-            melting.SHIPPED,
-            melting.CODE,
-            casting.SHIPPED,
-            casting.CODE,
-            collapse.SHIPPED,
-            chain.SHIPPED,
-            chain.BODIES,
-            engines.SHIPPED,
-        )
-    }
+if TYPE_CHECKING:
+    from studies.framework.study import Study
+
+FOLDER = Path(__file__).parent
+QUICK = "quick"
+
+
+@dataclass(frozen=True)
+class Script:
+    """A study that is a script and a sweep file.
+
+    Attributes:
+        name: For the command line.
+        module: Name of the script.
+        variants: Of the sweep, all but `quick` where there is a quick variant.
+        quick: Whether there is a quick variant.
+    """
+
+    name: str
+    module: str
+    variants: tuple[str, ...] = ()
+    quick: bool = True
+
+    @cached_property
+    def about(self) -> str:
+        """First paragraph of the script, for `--help`."""
+        text = ast.get_docstring(ast.parse((FOLDER / f"{self.module}.py").read_text(encoding="utf-8"))) or ""
+        return f"variant {' '.join(self.variants)} of {self.module}" if self.variants else text.split("\n\n")[0]
+
+    @property
+    def pictured(self) -> Mapping[str, object]:
+        """Values of the run that a picture is drawn of."""
+        return self.load().pictured
+
+    def load(self, *, quick: bool = False) -> Study:
+        """Import the study."""
+        study: Study = importlib.import_module(f"studies.{self.module}").STUDY
+        return replace(study, name=self.name)
+
+    def sweep_file(self, *, quick: bool = False) -> Path:
+        """Name the sweep file with its variants, as `load_sweep` reads it.
+
+        Raises:
+            InputError: There is no quick variant.
+        """
+        if quick and not self.quick:
+            msg = f"study {self.name} has no quick variant; leave --quick out"
+            raise InputError(msg)
+        variants = [*self.variants, *([QUICK] if quick else [])]
+        return FOLDER / (f"{self.module}.yaml" + (f"@{','.join(variants)}" if variants else ""))
+
+
+def _scripts() -> list[Script]:
+    found = []
+    for file in sorted(FOLDER.glob("*.yaml")):
+        if not file.with_suffix(".py").is_file():
+            continue
+        sweep = yaml.load(file.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        variants = sweep.get("variants") or {}
+        name, quick = file.stem.replace("_", "-"), QUICK in variants
+        found.append(Script(name=name, module=file.stem, quick=quick))
+        found += [
+            Script(
+                name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and "yade" not in variant
+            )
+            for variant in variants
+            if variant != QUICK
+        ]
+    return found
+
+
+_FOLDERS: tuple[Shipped, ...] = (
+    gravish.SHIPPED,
+    friction.SHIPPED,
+    friction.CONTACTS,
+    friction.COMPACTION,
+    sensitivity.SHIPPED,
+    sensitivity.SECTION,
+    fracture.SHIPPED,
+    fracture.CODE,
+    landscape.SHIPPED,
+    finite_size.SHIPPED,
+    melting.SHIPPED,
+    melting.CODE,
+    casting.SHIPPED,
+    casting.CODE,
+    collapse.SHIPPED,
+    chain.SHIPPED,
+    chain.BODIES,
+    engines.SHIPPED,
 )
-"""By name, in the order in which they are told."""
+
+STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(
+    {**{study.name: study for study in _scripts()}, **{study.name: study for study in _FOLDERS}}
+)
+"""By name."""
 
 
-def shipped(name: str) -> Shipped:
+def shipped(name: str) -> Shipped | Script:
     """A shipped study.
 
     Raises:

@@ -17,9 +17,8 @@ from smarticles.sweeps import changed_sweep, compute, make_folder, refuse_failur
 from studies import registry
 
 if TYPE_CHECKING:
-    from studies.base.report import Report
-    from studies.base.runs import MeasuredRun
-    from studies.base.study import Study
+    from studies.framework.runs import MeasuredRun
+    from studies.framework.study import Report
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
 
@@ -87,7 +86,7 @@ def run_study(arguments: argparse.Namespace) -> int:
 def compute_and_analyse(
     folder: Folder,
     arguments: argparse.Namespace,
-    load: Callable[[], Study[Any]],
+    load: Callable[[], Any],
     *,
     note: str,
     pictured: Mapping[str, object],
@@ -127,7 +126,7 @@ def compute_and_analyse(
     return 0
 
 
-def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study[Any]]) -> Mapping[str, MeasuredRun]:
+def _earlier(results: Path | None, folder: Folder, load: Callable[[], Any]) -> Mapping[str, MeasuredRun]:
     """The runs of a sweep that an earlier analysis measured.
 
     Raises:
@@ -136,10 +135,10 @@ def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study[Any]
     if results is None:
         return {}
     study = load()
-    if not study.told_by_tables:
+    if not getattr(study, "from_tables", getattr(study, "told_by_tables", False)):
         msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
         raise InputError(msg)
-    from studies.base.earlier import Wanted, earlier_runs  # noqa: PLC0415
+    from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
 
     wanted = {
         entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
@@ -147,7 +146,7 @@ def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study[Any]
     return earlier_runs(results, wanted)
 
 
-def told_report(report: Report[Any]) -> str:
+def told_report(report: Report) -> str:
     """What a study says at the terminal."""
     return told_results(columns(report.header, report.rows), report.told, report.files, report.output)
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from postprocess.report import figures
 from postprocess.statistics.points import marked
 from studies.accuracy.measure import COST, IS_REFERENCE, KNOB, VERDICT, measured
-from studies.base.figures import draw_means, finished, marker
+from studies.framework.plots import draw_means, finished, marker
 
 if TYPE_CHECKING:
     import pandas as pd

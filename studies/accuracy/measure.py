@@ -22,8 +22,8 @@ from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import Scatter, SeedMean, mean_over_seeds, pooled_scatter, relative_difference
 from studies.accuracy.rung import ACTIVITIES, BASE, Rung
-from studies.base.runs import DEFINITION, ENGINE, duration
 from studies.base.variants import VARIANT, variant_of
+from studies.framework.runs import DEFINITION, ENGINE, duration
 
 KNOB, VALUE, UNIT, REFERENCE, VERDICT = "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"

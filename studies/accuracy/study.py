@@ -32,10 +32,10 @@ from studies.accuracy.measure import (
     work_precision,
 )
 from studies.accuracy.rung import Rung
-from studies.base.references import Reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.study import Analysis, Study, Tables
 from studies.base.variants import VARIANT
+from studies.framework.provenance import Reference
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 
 TABLE = "work_precision"
 """Name of the table, without suffix."""

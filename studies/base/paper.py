@@ -10,9 +10,9 @@ import pandas as pd
 from postprocess.report.markdown import findings_lines, meaning_lines, table_lines
 from postprocess.statistics.findings import CRITERION, Finding, findings_table
 from postprocess.statistics.points import ToldTable, told_means
-from studies.base.engines import engine_lines, told_by_engine
-from studies.base.references import SAVOIE, Reference
 from studies.base.study import Analysis, Study, Tables
+from studies.framework.engines import engine_lines, told_by_engine
+from studies.framework.provenance import SAVOIE, Reference
 
 
 class PaperStudy(Study[Finding]):

@@ -19,7 +19,7 @@ from postprocess.statistics.findings import Verdict
 from postprocess.statistics.pairs import compared, mean_difference
 from postprocess.statistics.points import averaged, ordered, seeds_of, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
+from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 
 ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 """Procedures in the order of tables and pictures."""

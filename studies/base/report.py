@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 import pandas as pd
 
-from studies.base.runs import MissingRun
+from studies.framework.runs import MissingRun
 
 Judgement = TypeVar("Judgement")
 """What a study says in the end: a finding of a paper with its verdict, an answer, an advice."""

@@ -14,8 +14,8 @@ from dem.record.series import read_series
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.figures import History
-from studies.base.runs import DEFINITION, duration
+from studies.framework.plots import History
+from studies.framework.runs import DEFINITION, duration
 
 SHAKEN = "time shaken [s]"
 

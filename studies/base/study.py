@@ -12,10 +12,9 @@ from typing import Generic
 import pandas as pd
 
 from dem.record.manifest import RunManifest
-from studies.base.origin import Origin, make_folder
-from studies.base.references import Reference
 from studies.base.report import Judgement, Report
-from studies.base.runs import Collected, MeasuredRun, collect_runs
+from studies.framework.provenance import Origin, Reference, make_folder
+from studies.framework.runs import Collected, MeasuredRun, collect_runs
 
 Tables = Mapping[str, pd.DataFrame]
 """Tables by name, which is that of their file without suffix; `runs` is always among them."""

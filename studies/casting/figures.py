@@ -13,8 +13,6 @@ from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import marked
-from studies.base.figures import draw_means, finished, legend_above, procedure_marker
-from studies.base.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
 from studies.casting.measure import (
     AFTER,
@@ -29,6 +27,8 @@ from studies.casting.measure import (
     WHOLE_AFTER,
     WHOLE_KEPT,
 )
+from studies.framework.plots import draw_means, finished, legend_above, procedure_marker
+from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,6 @@ import pandas as pd
 
 from postprocess.statistics.findings import Finding, all_of, judge, negative, told
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.procedures import INTERNAL, SHAPE, STATIC
 from studies.base.release import by_procedure, compared_with, of, paired
 from studies.casting.measure import (
     FILLED,
@@ -23,6 +22,7 @@ from studies.casting.measure import (
     WHOLE,
     WHOLE_KEPT,
 )
+from studies.framework.procedures import INTERNAL, SHAPE, STATIC
 
 FULL = 0.7
 """A tier is filled if the pile has more than this share of its volume [-].

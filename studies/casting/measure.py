@@ -16,7 +16,7 @@ from postprocess.geometry.region import Region
 from postprocess.measures.heights import heights
 from postprocess.measures.mould import cast, read_tiers
 from studies.base.release import around, labels, removal
-from studies.base.runs import duration
+from studies.framework.runs import duration
 
 AFTER = 1.0
 """When the pile is measured after the walls went, as in the paper [s]."""

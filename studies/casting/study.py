@@ -13,11 +13,8 @@ from dem.record.manifest import RunManifest
 from postprocess.geometry.outline import BALL
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from studies.base.engines import judging, tables_of, told_engines
 from studies.base.paper import PaperStudy
-from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
-from studies.base.runs import Collected, MeasuredRun, told_bars, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.casting import figures
 from studies.casting.findings import findings
@@ -36,6 +33,9 @@ from studies.casting.measure import (
     casting_row,
     mould,
 )
+from studies.framework.engines import judging, tables_of, told_engines
+from studies.framework.procedures import PROCEDURE
+from studies.framework.runs import Collected, MeasuredRun, told_bars, told_seeds
 
 
 class Casting(PaperStudy):

@@ -17,9 +17,9 @@ from postprocess.measures.strain import (
 )
 from postprocess.report import figures
 from postprocess.statistics.points import marked
-from studies.base.figures import draw_means, finished, marker
 from studies.chain.findings import COUNTS, RANGE
 from studies.chain.measure import BASELINE, CONFINEMENT, COUNT, VARIANT
+from studies.framework.plots import draw_means, finished, marker
 
 if TYPE_CHECKING:
     import pandas as pd

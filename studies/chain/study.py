@@ -31,11 +31,11 @@ from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import told_number
 from studies.base.paper import PaperStudy
-from studies.base.runs import Collected, MeasuredRun, told_range
 from studies.base.study import Analysis, Tables
 from studies.chain import figures
 from studies.chain.findings import findings, sensitivity
 from studies.chain.measure import CONFINEMENT, COUNT, PAPER_WIDTH, SPEED, START, VARIANT, chain_row, points
+from studies.framework.runs import Collected, MeasuredRun, told_range
 
 
 class Chain(PaperStudy):

@@ -209,14 +209,16 @@ class _Tables:
 
 
 def _read(folder: Path) -> dict[str, Sequence[str]]:
-    """Numbers, verdict and criterion by finding; a study of questions has no criterion but the question."""
-    for name, order in (("findings.csv", (1, 2, 3, 4)), ("verdicts.csv", (2, 1, 0))):
+    """Numbers, verdict and criterion by id of the finding, and by its sentence in tables without ids."""
+    for name, order in (("findings.csv", ("ours", "verdict", "criterion", "needed")), ("verdicts.csv", None)):
         path = folder / name
         if path.is_file():
             with path.open(encoding="utf-8", newline="") as file:
-                rows = [row for row in csv.reader(file) if not row[0].startswith("# ")][1:]
-            # Results of before it was told lack what a verdict would need.
-            return {row[0]: [row[column] for column in order if column < len(row)] for row in rows}
+                header, *rows = [row for row in csv.reader(file) if not row[0].startswith("# ")]
+            key = header.index("id") if "id" in header else 0
+            # Absent in tables written before the column `needed` was added.
+            columns = [2, 1, 0] if order is None else [header.index(one) for one in order if one in header]
+            return {row[key]: [row[column] for column in columns] for row in rows}
     msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
     raise InputError(msg)
 

@@ -12,7 +12,10 @@ import numpy as np
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from studies.base.collapse.column import COM, CORE, REMAINING, column_history, vibration
-from studies.base.figures import (
+from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
+from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
+from studies.collapse.reference import ACCELERATIONS, read_collapse_reference, told_points
+from studies.framework.plots import (
     ASPECT_LABEL,
     BAND,
     History,
@@ -23,9 +26,6 @@ from studies.base.figures import (
     finished,
     marker,
 )
-from studies.collapse.law import ACTIVATION, AT_LEAST, CENSORED, HALF_WIDTH, LOG_HALF_WIDTH
-from studies.collapse.measure import DEFINITION, GAMMA, LOG, WATCHED
-from studies.collapse.reference import ACCELERATIONS, read_collapse_reference, told_points
 
 if TYPE_CHECKING:
     import pandas as pd

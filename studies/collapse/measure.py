@@ -21,7 +21,7 @@ from studies.base.collapse.column import (
     height_with_the_wall,
     vibration,
 )
-from studies.base.runs import duration
+from studies.framework.runs import duration
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, HEIGHT_BEFORE = "container radius [m]", "com height before vibration [m]"

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from studies.base.references import Reference, told_gaps
+from studies.framework.provenance import Reference, told_gaps
 
 _FILE = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 

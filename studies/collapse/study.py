@@ -21,7 +21,6 @@ from postprocess.statistics.points import ToldTable, told_number
 from studies.base.collapse.collapse_time import LEAST_FALL, WORST_ERROR
 from studies.base.collapse.column import DEFINITIONS, REMAINING, REST
 from studies.base.paper import PaperStudy
-from studies.base.runs import Collected, MeasuredRun, told_bars, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.collapse import figures
 from studies.collapse.findings import findings, told_delta
@@ -38,6 +37,7 @@ from studies.collapse.measure import (
     collapse_rows,
 )
 from studies.collapse.reference import COLLAPSE
+from studies.framework.runs import Collected, MeasuredRun, told_bars, told_seeds
 
 
 class Collapse(PaperStudy):

@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from postprocess.report import figures
-from studies.base.figures import draw_means, finished, marker
 from studies.engines.findings import PITCH, REFINED, Equivalence, Verdict
+from studies.framework.plots import draw_means, finished, marker
 
 if TYPE_CHECKING:
     import pandas as pd

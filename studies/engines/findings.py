@@ -17,8 +17,6 @@ import pandas as pd
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import mean_columns
 from postprocess.statistics.seeds import difference, mean_over_seeds
-from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE
 from studies.engines.measure import (
     ACTIVE,
     CASE,
@@ -32,6 +30,8 @@ from studies.engines.measure import (
     TAU,
     VARIANT,
 )
+from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE
+from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE
 
 LINKS, YADE = "links", "yade"
 Verdict = Literal["equivalent", "different", "not resolved", "no data"]

@@ -15,10 +15,10 @@ from dem.record.series import read_series
 from postprocess.measures import strain
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
 from studies.base.collapse.column import REMAINING, collapse_of, column_history, vibration
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
-from studies.base.runs import ENGINE
+from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
+from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
+from studies.framework.runs import ENGINE
 
 CASE, VARIANT = "case", "variant"
 HOOK, COLLAPSE, CHAIN = "hook", "collapse", "chain"

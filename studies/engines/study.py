@@ -13,12 +13,12 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import told_number
-from studies.base.references import Reference
-from studies.base.runs import Collected, MeasuredRun, told_numbers
 from studies.base.study import Analysis, Study, Tables
 from studies.engines import figures
 from studies.engines.findings import CRITERION, PITCH, Equivalence, equivalence_table, judged, refinement
 from studies.engines.measure import CASE, CASES, COLUMNS, VARIANT, engines_row
+from studies.framework.provenance import Reference
+from studies.framework.runs import Collected, MeasuredRun, told_numbers
 
 _HEADER = ("quantity", "pairs", "links", "YADE", "difference ± 95 %", "margin", "verdict")
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
-from studies.base.figures import CROSSINGS_LABEL, draw_means, finished, marker
 from studies.finite_size.findings import PAPER_ASPECT, PAPER_COUNT
 from studies.finite_size.measure import AFTER, BEFORE, COUNT, STAGES, crossings, phi, share, spans
 from studies.finite_size.percolation import near
 from studies.finite_size.scaling import POWER, fitted
+from studies.framework.plots import CROSSINGS_LABEL, draw_means, finished, marker
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,7 @@ from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.runs import DEFINITION, duration
+from studies.framework.runs import DEFINITION, duration
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"

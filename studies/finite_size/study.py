@@ -17,8 +17,6 @@ from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.references import NOTHING, Reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.finite_size import figures
 from studies.finite_size.findings import PAPER_ASPECT, PAPER_COUNT, answers
@@ -38,6 +36,8 @@ from studies.finite_size.scaling import (
     SLOPE_BAR,
     scalings,
 )
+from studies.framework.provenance import NOTHING, Reference
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 
 _SHOWN = {
     phi(BEFORE): ("φ_0", ".4f"),

@@ -12,7 +12,9 @@ from postprocess.measures.pull import WINDOW
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
-from studies.base.figures import (
+from studies.fracture.findings import SHOWN_ASPECT, at_shown_aspect
+from studies.fracture.measure import HELD_FAST, PEAK, force_history
+from studies.framework.plots import (
     ASPECT_LABEL,
     BAND,
     COLOURS,
@@ -28,7 +30,7 @@ from studies.base.figures import (
     marker,
     procedure_marker,
 )
-from studies.base.procedures import (
+from studies.framework.procedures import (
     AMPLITUDE,
     CROSSINGS,
     EXTERNAL,
@@ -39,8 +41,6 @@ from studies.base.procedures import (
     THETA,
     of_procedure,
 )
-from studies.fracture.findings import SHOWN_ASPECT, at_shown_aspect
-from studies.fracture.measure import HELD_FAST, PEAK, force_history
 
 if TYPE_CHECKING:
     import pandas as pd

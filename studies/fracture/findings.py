@@ -21,7 +21,8 @@ from postprocess.statistics.bounded import above, goes_with
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import told_less
-from studies.base.procedures import (
+from studies.fracture.measure import HELD_FAST, NET, PEAK, PEAK_RAISED
+from studies.framework.procedures import (
     AMPLITUDE,
     BY_RANKS,
     CROSSINGS,
@@ -34,7 +35,6 @@ from studies.base.procedures import (
     of_procedure,
     paired,
 )
-from studies.fracture.measure import HELD_FAST, NET, PEAK, PEAK_RAISED
 
 SHOWN_ASPECT = 0.7
 """Aspect ratio at which procedures and amplitudes are compared, as in the paper [-]."""

@@ -33,8 +33,8 @@ from postprocess.measures.pull import (
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import PhaseSettings, read_phases
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, STATIC, THETA, prepared_by
-from studies.base.runs import DEFINITION, duration
+from studies.framework.procedures import ACTIVE, CROSSINGS, INTERNAL, PHI, PROCEDURE, STATIC, THETA, prepared_by
+from studies.framework.runs import DEFINITION, duration
 
 PEAK, PEAK_TIME, PEAK_RAISED = "peak force over n W_s [-]", "time of the peak [s]", "hook raised at the peak [m]"
 WINDOWS: Mapping[float, str] = MappingProxyType(

@@ -18,10 +18,7 @@ from postprocess.measures.pull import END, FREE, WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
 from postprocess.statistics.points import ToldTable, marked, told_means
-from studies.base.engines import judging, tables_of, told_by_engine, told_engines
 from studies.base.paper import PaperStudy
-from studies.base.procedures import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
-from studies.base.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
 from studies.base.study import Analysis, Tables
 from studies.fracture import figures
 from studies.fracture.findings import findings
@@ -41,6 +38,9 @@ from studies.fracture.measure import (
     WORK,
     fracture_row,
 )
+from studies.framework.engines import judging, tables_of, told_by_engine, told_engines
+from studies.framework.procedures import ACTIVE, CROSSINGS, NAMED, PROCEDURE, STATIC, THETA, points, refuse_unlike
+from studies.framework.runs import Collected, MeasuredRun, runs_table, told_bars, told_range, told_seeds
 
 
 class Fracture(PaperStudy):

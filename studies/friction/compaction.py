@@ -17,9 +17,9 @@ from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.questions import Question, QuestionStudy, above_zero, questions_lines
-from studies.base.references import GRAVISH, SHAKE_TIME, Reference
-from studies.base.runs import Collected, MeasuredRun, runs_table
 from studies.base.study import Analysis, Tables
+from studies.framework.provenance import GRAVISH, SHAKE_TIME, Reference
+from studies.framework.runs import Collected, MeasuredRun, runs_table
 from studies.friction import compaction_figures
 from studies.friction.laws import FIRST, INTERVALS, LAWS, LOGARITHMIC, STRETCHED, fit, spread_out
 from studies.friction.measure import FRICTION, friction_run, history_of, refuse_repeats, told_piles, while_shaken

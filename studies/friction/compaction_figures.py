@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from postprocess.report import figures
-from studies.base.figures import BAND, finished
-from studies.base.references import SHAKE_TIME
-from studies.base.runs import MeasuredRun
+from studies.framework.plots import BAND, finished
+from studies.framework.provenance import SHAKE_TIME
+from studies.framework.runs import MeasuredRun
 from studies.friction.laws import LOGARITHMIC, STRETCHED, fit, spread_out
 from studies.friction.measure import FRICTION, while_shaken
 

@@ -22,7 +22,7 @@ from postprocess.statistics.factorial import paired_differences
 from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.base.questions import Question, YesNo, above_zero
-from studies.base.references import DIGITISING_ERROR, read_reference, reference_at
+from studies.framework.provenance import DIGITISING_ERROR, read_reference, reference_at
 from studies.friction.measure import FRICTION, WINDOW, column
 from studies.friction.tables import MARGIN
 

@@ -14,12 +14,12 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
-from studies.base.figures import draw_combinations
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.references import GRAVISH, Reference, told_reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table
 from studies.base.shaken import WHEN
 from studies.base.study import Analysis, Tables
+from studies.framework.plots import draw_combinations
+from studies.framework.provenance import GRAVISH, Reference, told_reference
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table
 from studies.friction.contact_effects import (
     CALLED,
     DEVIATION,

@@ -18,7 +18,7 @@ from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import Scatter, pooled_scatter
 from studies.base.questions import YesNo
-from studies.base.references import DIGITISING_ERROR, reference_at
+from studies.framework.provenance import DIGITISING_ERROR, reference_at
 from studies.friction.curve import Curve
 from studies.friction.measure import COMPARED, FRICTION, TIMES, at_time, column
 from studies.friction.scatter import half_widths_of

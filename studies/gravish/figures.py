@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from postprocess.report import figures
-from studies.base.engines import TOLD, engines_of, judging, of_engine
-from studies.base.figures import (
+from studies.base.shaken import SHAKEN, packing_history
+from studies.framework.engines import TOLD, engines_of, judging, of_engine
+from studies.framework.plots import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,
     History,
@@ -23,9 +24,8 @@ from studies.base.figures import (
     marker,
     told_histories,
 )
-from studies.base.references import told_reference
-from studies.base.runs import ENGINES
-from studies.base.shaken import SHAKEN, packing_history
+from studies.framework.provenance import told_reference
+from studies.framework.runs import ENGINES
 
 if TYPE_CHECKING:
     import pandas as pd

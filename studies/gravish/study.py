@@ -19,7 +19,10 @@ from postprocess.measures.packing import DEFINITIONS
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import told_number
-from studies.base.engines import (
+from studies.base.questions import Question, QuestionStudy
+from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
+from studies.base.study import Analysis, Tables
+from studies.framework.engines import (
     TOLD,
     by_engine,
     compared_engines,
@@ -29,11 +32,8 @@ from studies.base.engines import (
     of_engine,
     told_engines,
 )
-from studies.base.questions import Question, QuestionStudy
-from studies.base.references import GRAVISH, SHAKE_TIME, Reference, read_reference
-from studies.base.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
-from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
-from studies.base.study import Analysis, Tables
+from studies.framework.provenance import GRAVISH, SHAKE_TIME, Reference, read_reference
+from studies.framework.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.gravish import figures
 from studies.gravish.findings import (
     answers,

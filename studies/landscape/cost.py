@@ -16,7 +16,7 @@ from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import mean_columns
 from postprocess.statistics.ranks import Interval, interval, resampled
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.procedures import PROCEDURE, STATIC, THETA
+from studies.framework.procedures import PROCEDURE, STATIC, THETA
 from studies.landscape.measure import ENERGY, LIFTS, PEAK, PLANNED
 from studies.landscape.predictors import DRAW, RESAMPLES, SCOPE
 

@@ -16,8 +16,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
-from studies.base.figures import ASPECT_LABEL, CROSSINGS_LABEL, draw_means, finished, procedure_marker
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, draw_means, finished, procedure_marker
+from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.landscape.cost import COMMON, GAIN
 from studies.landscape.measure import (
     ABOVE,

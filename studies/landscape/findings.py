@@ -12,8 +12,8 @@ from postprocess.statistics.findings import judge, told
 from postprocess.statistics.points import told_number
 from postprocess.statistics.ranks import Interval
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, THETA
 from studies.base.questions import Question, YesNo
+from studies.framework.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, THETA
 from studies.landscape.cost import COMMON, GAIN, YIELD, at_point, best_points, common_aspects, gains, yields_compared
 from studies.landscape.measure import BEYOND, CALLED, ENERGY, LIFTS, LINKING, PEAK, PLANNED
 from studies.landscape.predictors import (

@@ -30,7 +30,7 @@ from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, 
 from postprocess.measures.table import summarise_run
 from postprocess.scene_file import read_phases, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import (
+from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,
     EXTERNAL,
@@ -42,7 +42,7 @@ from studies.base.procedures import (
     THETA,
     prepared_by,
 )
-from studies.base.runs import DEFINITION, duration
+from studies.framework.runs import DEFINITION, duration
 
 PLANNED = "time planned [s]"
 LINKING, CONTACTS = "linking number per smarticle [-]", "contacts per smarticle [-]"

@@ -24,7 +24,7 @@ from postprocess.statistics.ranks import (
     rank_correlations,
     resampled,
 )
-from studies.base.procedures import INTERNAL, PROCEDURE, STATIC
+from studies.framework.procedures import INTERNAL, PROCEDURE, STATIC
 from studies.landscape.measure import HELD_FAST, PREDICTORS, STRENGTHS, trajectories
 
 RESAMPLES, DRAW = 1000, 17

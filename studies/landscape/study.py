@@ -17,11 +17,11 @@ from postprocess.measures.pull import WINDOW
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import averaged, marked, seeds_of, told_number
-from studies.base.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.references import NOTHING, Reference
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.base.study import Analysis, Tables
+from studies.framework.procedures import CROSSINGS, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.framework.provenance import NOTHING, Reference
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
 from studies.landscape import figures
 from studies.landscape.cost import COMMON, FRONTIER, GAIN, HIGH, LOW, PAIRS, YIELD, common_aspects, costs
 from studies.landscape.findings import SHORT, answers, named_point, told_interval

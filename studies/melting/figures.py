@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from postprocess.pictures.strip import Row, draw_strip
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.figures import BAND, COLOURS, History, bin_width, draw_history, finished
-from studies.base.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
 from studies.base.release import ORDER, around, removal
-from studies.base.runs import MeasuredRun
+from studies.framework.plots import BAND, COLOURS, History, bin_width, draw_history, finished
+from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC
+from studies.framework.runs import MeasuredRun
 from studies.melting.measure import CONTACT, ENTANGLED, HEIGHT, LIFT, SINCE, SLOUGHED, SPREAD, TILT
 
 if TYPE_CHECKING:

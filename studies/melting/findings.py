@@ -9,8 +9,8 @@ import pandas as pd
 from postprocess.statistics.findings import Finding, Verdict, all_of, judge, negative, told
 from postprocess.statistics.pairs import mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.base.procedures import INTERNAL, SHAPE, STATIC
 from studies.base.release import by_procedure, compared_with, of, paired
+from studies.framework.procedures import INTERNAL, SHAPE, STATIC
 from studies.melting.measure import (
     BASE,
     CENTRE,

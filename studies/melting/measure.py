@@ -12,7 +12,7 @@ from postprocess.measures.heights import heights
 from postprocess.measures.spread import centre_of_mass, free_pile, has_toppled
 from postprocess.scene_file import read_phases
 from studies.base.release import around, labels, removal
-from studies.base.runs import MeasuredRun, duration
+from studies.framework.runs import MeasuredRun, duration
 
 LIFT, SINCE = "lift speed [m/s]", "time since the wall began to go [s]"
 BASE, TOP, CENTRE = "radius of 95 % before [m]", "height of 95 % before [m]", "com height before [m]"

@@ -15,12 +15,12 @@ from dem.record.manifest import RunManifest
 from postprocess.measures.spread import OUTSIDE, TOUCHING
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.findings import Finding
-from studies.base.engines import judging, tables_of, told_engines
 from studies.base.paper import PaperStudy
-from studies.base.procedures import PROCEDURE
 from studies.base.release import in_order, means
-from studies.base.runs import Collected, MeasuredRun, told_bars, told_seeds
 from studies.base.study import Analysis, Tables
+from studies.framework.engines import judging, tables_of, told_engines
+from studies.framework.procedures import PROCEDURE
+from studies.framework.runs import Collected, MeasuredRun, told_bars, told_seeds
 from studies.melting import figures
 from studies.melting.findings import findings
 from studies.melting.measure import (

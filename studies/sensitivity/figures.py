@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from postprocess.report import figures
-from studies.base.figures import draw_means, finished, marker
-from studies.base.references import DIGITISING_ERROR, told_reference
-from studies.base.runs import DEFINITION
 from studies.base.shaken import STAGES
+from studies.framework.plots import draw_means, finished, marker
+from studies.framework.provenance import DIGITISING_ERROR, told_reference
+from studies.framework.runs import DEFINITION
 
 if TYPE_CHECKING:
     import pandas as pd

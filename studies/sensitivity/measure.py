@@ -11,9 +11,9 @@ import pandas as pd
 from dem.record.manifest import RunManifest
 from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds, relative_difference
-from studies.base.runs import DEFINITION, Row
 from studies.base.shaken import measured_row
 from studies.base.variants import VARIANT, variant_of
+from studies.framework.runs import DEFINITION, Row
 
 COMPARED: Mapping[str, str] = MappingProxyType(
     {

@@ -17,11 +17,11 @@ from dem.record.manifest import RunManifest
 from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import told_number
-from studies.base.references import GRAVISH, Reference, read_reference, reference_at
-from studies.base.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.base.shaken import WHEN, told_shaken
 from studies.base.study import Analysis, Study, Tables
 from studies.base.variants import VARIANT, variants_of
+from studies.framework.provenance import GRAVISH, Reference, read_reference, reference_at
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_bars, told_seeds
 from studies.sensitivity import figures
 from studies.sensitivity.measure import COMPARED, sensitivity_row, summarise_variants
 

@@ -15,16 +15,19 @@ repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is 
                                     # `seed_by_seed: true` beside it: all points with the first seed come first
                                     # `more: {seeds: [4], only: {friction: [0.2]}}`: more of some points, afterwards
 again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
+variants:                           # JSON merge patches (RFC 7386) of this file; null removes a key
+  quick: {constants: {count: 20}, repeats: {seeds: [1]}}    # FILE@quick; FILE@code,quick applies two, in this order
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest, shown
@@ -158,6 +161,7 @@ class SweepFile(Strict):
     derived: dict[str, Value] = Field(default={})
     repeats: Repeats | None = None
     again: Again | None = None
+    variants: dict[str, dict[str, Any]] = Field(default={}, description="merge patches of this file, by name")
 
     @model_validator(mode="after")
     def _known(self) -> SweepFile:
@@ -211,14 +215,26 @@ class Sweep:
     table_text: str | None = None
 
 
+VARIANT = "@"
+"""Stands between a sweep file and the names of its variants, which commas separate: `strength.yaml@code,quick`."""
+
+
 def load_sweep(path: Path) -> Sweep:
     """Read a sweep file, its template and its table.
 
+    Args:
+        path: The file; `FILE@VARIANT` applies one of its variants, `FILE@VARIANT,VARIANT` several in this order.
+
     Raises:
-        InputError: a file is missing or malformed, a key unknown, a value out of range.
+        InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
     """
-    text = read_text(path, "sweep file")
+    name, _, variants = path.name.partition(VARIANT)
+    text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
+    if variants and isinstance(data, dict):
+        data = _varied(path, data, variants.split(","))
+        # The resolved file, so that the record of a sweep is complete.
+        text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     if not isinstance(data, dict):
         msg = f"{path}: a sweep file holds keys such as template and points: got {shown(data)}"
         raise InputError(msg)
@@ -242,6 +258,34 @@ def load_sweep(path: Path) -> Sweep:
         table_path=table_path,
         table_text=table_text,
     )
+
+
+def _varied(path: Path, data: Mapping[str, Any], variants: Sequence[str]) -> dict[str, Any]:
+    patches = data.get("variants") or {}
+    varied = {key: value for key, value in data.items() if key != "variants"}
+    for variant in variants:
+        if variant not in patches:
+            known = nearest(variant, sorted(patches)) if patches else "it has none"
+            msg = f"{path}: there is no variant {variant!r}; {known}"
+            raise InputError(msg)
+        varied = {
+            **merged(varied, patches[variant]),
+            "name": patches[variant].get("name", f"{varied['name']}-{variant}"),
+        }
+    return varied
+
+
+def merged(value: Any, patch: Any) -> Any:
+    """Apply a JSON merge patch (RFC 7386): mappings are merged, null removes a key, all else replaces."""
+    if not isinstance(patch, Mapping):
+        return patch
+    result = dict(value) if isinstance(value, Mapping) else {}
+    for key, part in patch.items():
+        if part is None:
+            result.pop(key, None)
+        else:
+            result[key] = merged(result.get(key), part)
+    return result
 
 
 def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:

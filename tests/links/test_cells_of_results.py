@@ -22,7 +22,8 @@ from scipy import stats
 from dem.record.manifest import read_run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
-from studies.base.runs import DEFINITION
+from studies.framework.runs import DEFINITION
+from studies.framework.study import Study
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import SEED, load_sweep
@@ -140,7 +141,9 @@ def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, obje
     command = [sys.executable, "-m", "smarticles", "run", str(file), "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return shipped(table).load(quick=False).measure(read_run(out)).rows[0]
+    study = shipped(table).load(quick=False)
+    measured = study.measured if isinstance(study, Study) else study.measure
+    return measured(read_run(out)).rows[0]
 
 
 @pytest.mark.parametrize(("table", "run"), CELLS)

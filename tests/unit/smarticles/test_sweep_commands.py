@@ -290,7 +290,7 @@ def test_the_study_of_procedures_is_analysed(
         manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
         (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
-    monkeypatch.setattr("studies.procedures.figures.draw", lambda *_, **__: [])
+    monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
     said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
     assert said.status == 0
     lines = said.out.splitlines()

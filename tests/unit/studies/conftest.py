@@ -14,13 +14,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from postprocess.report import figures
-from studies.registry import STUDIES
+from studies.registry import STUDIES, Script
 
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leaves out the figures of all studies, which take most of the time."""
-    for name in [*{study.folder.name for study in STUDIES.values()}, "accuracy"]:
+    monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
+    for name in [*{study.folder.name for study in STUDIES.values() if not isinstance(study, Script)}, "accuracy"]:
         monkeypatch.setattr(import_module(f"studies.{name}.figures"), "draw", lambda *_, **__: [])
 
 

@@ -30,8 +30,8 @@ from studies.accuracy.measure import (
 )
 from studies.accuracy.rung import Rung
 from studies.accuracy.study import TABLE, Accuracy
-from studies.base.runs import DEFINITION, ENGINE
 from studies.base.variants import VARIANT
+from studies.framework.runs import DEFINITION, ENGINE
 
 PHI_F = f"phi_f {DEFINITION} [-]"
 STEPS = [

@@ -10,7 +10,6 @@ from synthetic.released import stack, write_released
 from dem.errors import InputError
 from dem.record.manifest import read_run
 from postprocess.measures.mould import read_tiers
-from studies.base.procedures import PROCEDURE
 from studies.casting import figures as casting_figures
 from studies.casting.measure import (
     FILLED,
@@ -26,6 +25,7 @@ from studies.casting.measure import (
     casting_row,
 )
 from studies.casting.study import Casting
+from studies.framework.procedures import PROCEDURE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [

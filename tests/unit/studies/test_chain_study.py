@@ -16,12 +16,12 @@ from dem.errors import InputError
 from postprocess.measures.strain import FRACTURE, PEAK, STIFFNESS
 from postprocess.statistics.findings import CRITERION, Finding
 from postprocess.statistics.points import marked
-from studies.base.references import SAVOIE
 from studies.base.report import Report
 from studies.chain import figures as chain_figures
 from studies.chain import measure as chain_measure
 from studies.chain.measure import CONFINEMENT, COUNT, VARIANT
 from studies.chain.study import Chain
+from studies.framework.provenance import SAVOIE
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}
 

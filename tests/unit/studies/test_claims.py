@@ -68,7 +68,7 @@ def test_seeds_are_told_from_the_point_with_the_fewest_to_that_with_the_most(tmp
     assert most.code.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 1 seed, links"
 
 
-HIGHEST = "⟨N⟩ is highest for shape change"
+HIGHEST = "shape-change-most-entangled"
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_test_of_ours_decides_where_theirs_cannot_tell(
     tmp_path: Path, by_theirs: str, by_ours: str, verdict: str
 ) -> None:
     theirs = {(study, f"{STRONGEST}, l/w = 0.7"): by_theirs for study in ("fracture", "fracture-code")}
-    ours = {(study, STRONGEST): by_ours for study in ("strength", "strength-code")}
+    ours = {(study, "shape-change-strongest"): by_ours for study in ("strength", "strength-code")}
     claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
     assert claim.verdict == verdict
     assert "; by a test of ours, strength-code: " in text((claim,))

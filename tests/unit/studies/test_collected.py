@@ -9,7 +9,7 @@ from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
 from dem.record.manifest import read_run
-from studies.base.runs import Collected, MeasuredRun
+from studies.framework.runs import Collected, MeasuredRun
 
 
 def collected(folder: Path, *runs: SyntheticRun) -> Collected:

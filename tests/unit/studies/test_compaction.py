@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies.base.references import SHAKE_TIME
-from studies.base.runs import MeasuredRun
+from studies.framework.provenance import SHAKE_TIME
+from studies.framework.runs import MeasuredRun
 from studies.friction import compaction_figures
 from studies.friction.compaction import LAW, MISSED, RESIDUAL, TIMES, answers, at, fitted, over_time
 from studies.friction.laws import LAWS, LOGARITHMIC, STRETCHED, Fit, fit, spread_out

@@ -18,8 +18,8 @@ from dem.errors import InputError
 from dem.record.manifest import read_run
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from studies.base.questions import Question
-from studies.base.references import read_reference, reference_at
 from studies.base.report import Report
+from studies.framework.provenance import read_reference, reference_at
 from studies.friction.contact_effects import (
     CALLED,
     CROSSED,

@@ -12,10 +12,9 @@ from synthetic import write_run
 from dem.errors import InputError
 from dem.scene.reading import dump_scene
 from smarticles.main import main
-from studies.base.earlier import Wanted, earlier_runs
-from studies.base.runs import MeasuredRun, collect_runs
-from studies.procedures.study import Procedures
-from studies.registry import study_file
+from studies.framework.earlier import Wanted, earlier_runs
+from studies.framework.runs import MeasuredRun, collect_runs
+from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep
 
@@ -53,12 +52,16 @@ def test_a_run_is_what_the_table_and_the_provenance_say(wanted: dict[str, Wanted
 
 
 def test_the_same_tables_come_out_again(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
-    report = Procedures().analyse(
-        [tmp_path / name for name in wanted],
-        tmp_path / "results",
-        note="two",
-        command="test",
-        earlier=earlier_runs(RESULTS, wanted),
+    report = (
+        shipped("procedures")
+        .load(quick=False)
+        .analyse(
+            [tmp_path / name for name in wanted],
+            tmp_path / "results",
+            note="two",
+            command="test",
+            earlier=earlier_runs(RESULTS, wanted),
+        )
     )
     assert not report.missing
     assert sorted(report.tables["runs"]["run"]) == sorted(wanted)

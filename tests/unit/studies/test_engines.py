@@ -13,11 +13,11 @@ from synthetic import SyntheticRun, write_manifest, write_run
 from dem.errors import InputError
 from dem.record.manifest import read_run
 from postprocess.statistics.columns import SEED
-from studies.base.engines import compared_engines, engines_of, judging
-from studies.base.runs import ENGINE
 from studies.engines.findings import QUANTITIES, judged, pitch_of, verdict_of
 from studies.engines.measure import CASE, COLUMNS, FORCE, PHI_0, VARIANT
 from studies.engines.study import Engines
+from studies.framework.engines import compared_engines, engines_of, judging
+from studies.framework.runs import ENGINE
 from studies.gravish.study import Gravish
 
 ORIGIN = {"note": "a test", "command": "smarticles study engines --quick --out 'my engines'"}

@@ -16,7 +16,6 @@ from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked
 from smarticles.commands.study import told_report
-from studies.base.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.fracture.findings import findings
 from studies.fracture.measure import (
     ABOVE,
@@ -36,6 +35,7 @@ from studies.fracture.measure import (
     WORK,
 )
 from studies.fracture.study import Fracture
+from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out 'my study'"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}

@@ -13,9 +13,9 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from studies.base.references import read_reference
-from studies.base.runs import DEFINITION
 from studies.base.shipped import differences
+from studies.framework.provenance import read_reference
+from studies.framework.runs import DEFINITION
 from studies.friction.findings import answers
 from studies.friction.measure import FRICTION, column
 from studies.friction.scatter import scatters

@@ -10,8 +10,8 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from studies.base.references import DIGITISING_ERROR, read_reference
-from studies.base.runs import DEFINITION
+from studies.framework.provenance import DIGITISING_ERROR, read_reference
+from studies.framework.runs import DEFINITION
 from studies.gravish.findings import (
     answers,
     deviations_from_reference,

@@ -23,7 +23,7 @@ from dem.phases.pull_hook import PullHook
 from dem.record.manifest import read_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.framework.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.landscape import cost, measure, predictors
 from studies.landscape.cost import COMMON, FRONTIER, GAIN, YIELD, costs
 from studies.landscape.findings import answers

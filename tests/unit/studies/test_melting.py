@@ -12,7 +12,7 @@ from dem.errors import InputError
 from dem.record.manifest import read_run
 from postprocess.measures.spread import centre_of_mass
 from postprocess.statistics.columns import SEED
-from studies.base.procedures import PROCEDURE
+from studies.framework.procedures import PROCEDURE
 from studies.melting import figures as melting_figures
 from studies.melting.measure import (
     BASE,

@@ -12,9 +12,9 @@ from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
-from studies.base.references import Reference
-from studies.base.runs import Collected, MeasuredRun
 from studies.base.study import Analysis, Study, Tables
+from studies.framework.provenance import Reference
+from studies.framework.runs import Collected, MeasuredRun
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study toy --out 'my toy'"}
 

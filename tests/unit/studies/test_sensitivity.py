@@ -10,7 +10,7 @@ from PIL import Image
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from studies.base.runs import DEFINITION
+from studies.framework.runs import DEFINITION
 from studies.sensitivity.study import Sensitivity
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"

@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 import studies
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
-from studies.base.figures import draw_bounds, draw_means, finished, marker
-from studies.base.references import told_gaps, told_reference
-from studies.base.runs import BARS, told_numbers
 from studies.collapse.reference import told_points
+from studies.framework.plots import draw_bounds, draw_means, finished, marker
+from studies.framework.provenance import told_gaps, told_reference
+from studies.framework.runs import BARS, told_numbers
 
 LOOK = {**marker("o", figures.BLUE, "white"), "linestyle": "none"}
 ORIGIN = ("Study toy: 2 of 2 runs.", "More: toy.md.")

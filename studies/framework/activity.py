@@ -23,7 +23,7 @@ from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.procedures import (
+from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,
     EXTERNAL,
@@ -35,7 +35,7 @@ from studies.base.procedures import (
     STATIC,
     THETA,
 )
-from studies.base.runs import DEFINITION, duration
+from studies.framework.runs import DEFINITION, duration
 
 PHI_ACTIVE = f"phi {DEFINITION} at the end of the activity [-]"
 ENERGY = "energy per smarticle [J]"

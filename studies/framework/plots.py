@@ -22,8 +22,8 @@ from postprocess.report import figures
 from postprocess.report.limits import hold_everything
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
-from studies.base.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
-from studies.base.runs import BARS
+from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
+from studies.framework.runs import BARS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

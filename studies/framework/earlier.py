@@ -16,7 +16,7 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
-from studies.base.runs import ENGINE, MeasuredRun, Row
+from studies.framework.runs import ENGINE, MeasuredRun, Row
 
 _REMEDY = "give the results folder of an earlier analysis of this study, with runs.csv and provenance.json"
 

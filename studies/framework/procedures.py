@@ -15,7 +15,7 @@ from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.points import mean_columns, ordered, seeds_of
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.runs import DEFINITION, Collected, MeasuredRun
+from studies.framework.runs import DEFINITION, Collected, MeasuredRun
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
 PROCEDURES: Mapping[str, str] = MappingProxyType(

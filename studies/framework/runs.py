@@ -237,7 +237,8 @@ def duration(phase: PhaseRecord) -> float:
 def runs_table(found: Collected) -> pd.DataFrame:
     """One row per run, the columns that tell runs from measures at its ends."""
     table = found.table()
-    return table[[*table.columns.difference(_TAIL, sort=False), *_TAIL]]
+    tail = [name for name in _TAIL if name in table]
+    return table[[*table.columns.difference(tail, sort=False), *tail]]
 
 
 def told_bars(counts: pd.Series, point: str) -> str:

@@ -16,7 +16,7 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.base.runs import ENGINE, ENGINES
+from studies.framework.runs import ENGINE, ENGINES
 
 TOLD: Mapping[str, str] = MappingProxyType({"links": "links", "yade": "YADE"})
 """What an engine is called in figures and text."""

@@ -1,0 +1,128 @@
+"""Which difference between the paper's text and its own code decides what a shape change leaves.
+
+A full factorial of three differences that a shape change feels: the motor's law at its torque limit, friction, and
+the radius of the wall. The main effect of one is the mean of paired differences, code less text, over aspect ratios,
+seeds and all combinations of the other two.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.manifest import RunManifest
+from postprocess.scene_file import read_scene
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.factorial import paired_differences
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
+from studies.framework.figures import Combinations
+from studies.framework.findings import Effect, Finding, Outcome, means_by
+from studies.framework.procedures import CROSSINGS, PROCEDURE, SHAPE
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import Row
+from studies.framework.study import Study
+
+LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
+FACTORS: dict[str, tuple[object, object]] = {LAW: ("halt", "ease"), FRICTION: (0.4, 0.2), RADIUS: (0.0234, 0.0224)}
+"""Levels by the text, and by the code."""
+
+NAMES = {
+    LAW: ("law", "the motor's law (half speed, for a halt)"),
+    FRICTION: ("friction", "friction (0.2, for 0.4)"),
+    RADIUS: ("radius", "the wall's radius (22.4 mm, for 23.4)"),
+}
+QUANTITIES = (
+    Quantity(
+        column=CROSSINGS,
+        label="⟨N⟩",
+        form=".2f",
+        axis=r"$\langle N \rangle$ after the shape change [-]",
+        meaning="⟨N⟩ at rest after the shape change",
+    ),
+    Quantity(
+        column=HEIGHT,
+        label="h/h0",
+        form=".3f",
+        axis=r"height over $h_0$ after it [-]",
+        meaning="height of the centre of mass at rest after it, over that before",
+    ),
+    Quantity(
+        column=PHI_ACTIVE, label="φ_f", form=".4f", meaning="packing fraction over the last frames of the activity"
+    ),
+    Quantity(column=ENERGY, label="energy [J]", form=".2e", meaning="work of the motors"),
+)
+SIGNS = {CROSSINGS: ("⟨N⟩", 1), HEIGHT: ("h/h0", 1), PHI_ACTIVE: ("φ_f", -1), ENERGY: ("energy per smarticle [J]", 1)}
+
+
+def measure(run: RunManifest) -> Row:
+    """Measure the shape change, and which rules it went by."""
+    row = procedure_row(run)
+    if row[PROCEDURE] != SHAPE:
+        msg = f"{run.directory}: {row[PROCEDURE]}, where factors are of shape changes; leave it out"
+        raise InputError(msg)
+    scene = read_scene(run.directory)
+    motor, contact = scene.part("motor"), scene.part("contact")
+    return {
+        LAW: str(motor.values["law"]) if motor else "",
+        FRICTION: contact.number("friction_smarticle") if contact else float("nan"),
+        RADIUS: run.container_radius,
+        **row,
+    }
+
+
+def differences(runs: pd.DataFrame, quantity: str, factor: str) -> pd.DataFrame:
+    """Paired differences of a quantity, by the code's rule less by the text's, all else alike."""
+    others = [name for name in (*FACTORS, ASPECT, SEED) if name != factor]
+    return paired_differences(runs, quantity, factor, FACTORS[factor], others)
+
+
+def effect(quantity: str, factor: str) -> Finding:
+    """Make the finding that a difference pushes a quantity in the sense of the paper's findings."""
+    (symbol, sign), (name, text) = SIGNS[quantity], NAMES[factor]
+
+    def outcome(runs: pd.DataFrame) -> Outcome:
+        found = differences(runs, quantity, factor)
+        value = mean_over_seeds(found[quantity])
+        note = f"by l/w {means_by(found, quantity, ASPECT, '+.3g')}"
+        return Outcome(effects=[Effect(label="code less text", value=value, sign=sign)], note=note)
+
+    return Finding(
+        id=f"{quantity.split(maxsplit=1)[0]}-{name}",
+        says=f"(ours) {symbol} after a shape change is {'raised' if sign > 0 else 'lowered'} by {text}",
+        outcome=outcome,
+        found_if=f"mean of paired differences {'>' if sign > 0 else '<'} 0",
+    )
+
+
+STUDY = Study(
+    name="factors",
+    title="What the paper's text and its own code differ in, one by one: shape change",
+    measure=measure,
+    keys=(
+        Key(column=LAW, label="law"),
+        Key(column=FRICTION, label="friction", form="g"),
+        Key(column=RADIUS, label="wall [mm]", form=".1f", scale=1e3),
+        Key(column=ASPECT, label="l/w", form="g"),
+    ),
+    quantities=QUANTITIES,
+    findings=tuple(effect(quantity, factor) for quantity, factor in product(SIGNS, FACTORS)),
+    figures=(
+        Combinations(
+            name="factors",
+            quantities=QUANTITIES[:2],
+            factors=FACTORS,
+            row=lambda point: f"{point[LAW]}, μ = {point[FRICTION]:g}, r = {1e3 * point[RADIUS]:.1f} mm",
+        ),
+    ),
+    order=(*FACTORS, ASPECT, SEED),
+    one_engine=True,
+    from_tables=True,
+    remarks=(
+        "Effect of a difference: mean of paired differences, code less text, over l/w, seeds and all combinations of "
+        "the other two; pairs begin with piles of the same random poses.",
+    ),
+    pictured={"protocol": "code", "law": "ease", "friction": 0.2, "l_over_w": 0.7},
+)

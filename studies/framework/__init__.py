@@ -1,0 +1,1 @@
+"""Framework of the studies: sweeps, quantities, findings, figures, provenance, claims."""

@@ -1,0 +1,688 @@
+"""Shape change, external and internal oscillation of smarticles of several l/w and amplitudes θ.
+
+Smarticles poured into a cylinder go through one of three activities: packing fraction, entanglement, energy and
+height, against the findings of Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter
+2023. There are no static runs: static is the state of every run before its activity.
+
+Runs of the same aspect ratio and seed begin with the same pile, so they are compared pair by pair, and slopes against
+θ are taken within them; the scatter over seeds and aspect ratios is what makes the error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from dem.record.manifest import RunManifest
+from postprocess.measures.motors import APART
+from postprocess.measures.packing import DEFINITIONS
+from postprocess.report import figures as style
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.pairs import pairs
+from postprocess.statistics.seeds import CONFIDENCE, Slope, difference, mean_over_seeds, parabola, slope_within
+from studies.framework.activity import (
+    ENERGY,
+    HALF,
+    HEIGHT,
+    LOWEST,
+    PHI_ACTIVE,
+    QUANTITIES,
+    SAMPLED,
+    STRAIGHT,
+    height_history,
+    procedure_row,
+    samples,
+)
+from studies.framework.figures import Histories, Means, Series, Split, by_procedure, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict, above, mean, means_by, slope
+from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, THETA_LABEL, History, marker
+from studies.framework.procedures import (
+    ACTIVE,
+    AMPLITUDE,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PHI,
+    PROCEDURE,
+    SHAPE,
+    STATIC,
+    THETA,
+    of_procedure,
+)
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import DEFINITION
+from studies.framework.study import Study
+
+FLAT = 0.2  # of the mean of ⟨N⟩: by less it does not change with l/w
+NEAR = 0.15  # of l/w: how far from 1.0 a maximum is still near it, one and a half steps of the paper's l/w
+EARLY = 0.24  # of the activity: half of the compaction is early up to here, twice the paper's 12 %
+MARGINAL = 0.5  # of the gain in φ at θ = 10°: a gain below is marginal
+FACTOR = 10.0  # energy of the shape change over that of the internal oscillation, at least
+PEAK = 0.9  # l/w of the energy's local maximum
+
+_SHOWN = {
+    PHI_ACTIVE: ("φ_f", ".4f", "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]", 1.0),
+    PHI: ("φ at rest again", ".4f", "", 1.0),
+    CROSSINGS: ("⟨N⟩", ".2f", CROSSINGS_LABEL, 1.0),
+    ENERGY: ("energy [J]", ".2e", "energy per smarticle,\nevery step [µJ]", 1e6),
+    SAMPLED: ("", ".2e", f"energy per smarticle,\nsummed every {APART:g} s [µJ]", 1e6),
+    HEIGHT: ("h/h0", ".3f", r"height over $h_0$ [-]", 1.0),
+}
+COLUMNS = {
+    column: Quantity(column=column, meaning=meaning, label=label, form=form, axis=axis, axis_scale=scale)
+    for column, meaning in QUANTITIES.items()
+    for label, form, axis, scale in [_SHOWN.get(column, ("", ".3g", "", 1.0))]
+}
+KEYS = (
+    Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, SHAPE, INTERNAL)),
+    Key(column=THETA, label="θ", form="g", unit="°"),
+    Key(column=ASPECT, label="l/w", form="g"),
+)
+
+
+def only(procedure: str, drop: str | None = None) -> Rows:
+    """Select one procedure, the internal oscillation at one θ; and rows with a value in a column."""
+    return lambda table: of_procedure(table, procedure).dropna(subset=[drop] if drop else [])
+
+
+def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
+    """Select the internal oscillation at every θ."""
+    return table[table[PROCEDURE] == INTERNAL]
+
+
+def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
+    """Values of two procedures for the same aspect ratio and seed: columns `one` and `other`."""
+    return pairs(of_procedure(table, one), of_procedure(table, other), quantity)
+
+
+def gains(procedure: str) -> Rows:
+    """φ_f less that of the static state of the same aspect ratio and seed, in the column of φ_f."""
+
+    def rows(table: pd.DataFrame) -> pd.DataFrame:
+        both = pairs_of(table, PHI_ACTIVE, procedure, STATIC)
+        return both.assign(**{PHI_ACTIVE: both["one"] - both["other"]})
+
+    return rows
+
+
+def with_aspect(
+    name: str, says: str, rows: Rows, quantity: str, *, label: str, sign: int, form: str, unit: str = "", when: str = ""
+) -> Finding:
+    """Make a finding that a quantity rises (sign 1) or falls (−1) with the aspect ratio."""
+    return slope(
+        name,
+        says,
+        quantity,
+        ASPECT,
+        sign=sign,
+        label=f"{label} against l/w",
+        means=form,
+        rows=rows,
+        unit=unit,
+        found_if=f"slope of {label} against l/w {'>' if sign > 0 else '<'} 0{when}",
+    )
+
+
+def with_amplitude(
+    name: str, says: str, quantity: str, *, label: str, sign: int, of: str, unit: str = "", rows: Rows = amplitudes
+) -> Finding:
+    """Make a finding that a quantity rises (sign 1) or falls (−1) with θ within runs that begin with one pile."""
+    return slope(
+        name,
+        says,
+        quantity,
+        THETA,
+        sign=sign,
+        within=(ASPECT, SEED),
+        label=f"{label} against θ",
+        rows=rows,
+        unit=f"{unit} per degree",
+        found_if=f"slope of {of} against θ {'>' if sign > 0 else '<'} 0, within runs of the same l/w and seed",
+    )
+
+
+def _bend(table: pd.DataFrame) -> list[Effect]:
+    bend = parabola(table[ASPECT], table[PHI_ACTIVE], at=1.0).bend
+    return [Effect(label="bend of φ_f against l/w, of the parabola through all runs,", value=bend)]
+
+
+def _compacts_early(table: pd.DataFrame) -> Outcome:
+    drop = Effect(label="h comes down by, of h0,", value=mean_over_seeds(1 - table[HEIGHT]))
+    half = Effect(
+        label="half is reached after, of the activity,", value=mean_over_seeds(table[HALF]), sign=-1, threshold=EARLY
+    )
+    # Half of nothing is reached at any time: there must be a compaction first.
+    return Outcome(effects=[half, drop], verdict=drop.verdict if drop.verdict != Verdict.FOUND else half.verdict)
+
+
+def _largest_gains_little(table: pd.DataFrame) -> list[Effect]:
+    gain = table.merge(table[table[PROCEDURE] == STATIC], on=[ASPECT, SEED], suffixes=("", " static"))
+    gain = gain[gain[PROCEDURE] == INTERNAL].assign(gain=lambda row: row[PHI_ACTIVE] - row[f"{PHI_ACTIVE} static"])
+    wide = gain.pivot_table(index=[ASPECT, SEED], columns=THETA, values="gain").reindex(columns=[AMPLITUDE, 30.0])
+    share = mean_over_seeds((wide[30.0] / wide[AMPLITUDE]).dropna())
+    return [Effect(label=f"Δφ at 30° over that at {AMPLITUDE:g}°", value=share, sign=-1, threshold=MARGINAL)]
+
+
+def _logarithms(table: pd.DataFrame, one: str, other: str) -> pd.Series:
+    """log10 of the ratio of energies, where both are above 0, by l/w."""
+    both = pairs_of(table, ENERGY, one, other)
+    both = both[(both["one"] > 0) & (both["other"] > 0)].set_index(ASPECT)
+    return np.log10(both["one"] / both["other"])
+
+
+def _shape_change_costs(table: pd.DataFrame) -> Outcome:
+    ratio = _logarithms(table, SHAPE, INTERNAL)
+    value = mean_over_seeds(ratio)
+    error = f"×/÷ {10**value.standard_error:.3g}" if value.count > 1 else "without an error"
+    text = f"{10**value.value:.3g} {error} (n = {value.count})" if value.count else ""
+    by = ", ".join(f"{aspect:g}: {10**one:.3g}" for aspect, one in ratio.groupby(level=0).mean().items())
+    effect = Effect(label="ratio, geometric mean,", value=value, threshold=math.log10(FACTOR), text=text)
+    return Outcome(effects=[effect], note=f"by l/w {by}" if by else "")
+
+
+def _costs_by_samples(table: pd.DataFrame) -> Outcome:
+    both = pairs_of(table, SAMPLED, SHAPE, INTERNAL)
+    means = both.groupby(ASPECT)[["one", "other"]].mean()
+    by = ", ".join(f"{aspect:g}: {row['one']:.3g} and {row['other']:.3g}" for aspect, row in means.iterrows())
+    value = mean_over_seeds(both["one"] - FACTOR * both["other"])
+    return Outcome(
+        effects=[Effect(label="shape-change less 10 times internal", value=value, unit=" J")],
+        note=f"the two by l/w {by} J" if by else "",
+    )
+
+
+def _little_less(table: pd.DataFrame) -> list[Effect]:
+    value = mean_over_seeds(_logarithms(table, INTERNAL, EXTERNAL) * math.log(10))
+    text = f"{math.exp(value.value):.3g} ×/÷ {math.exp(value.half_width):.3g} (n = {value.count})"
+    return [
+        Effect(
+            label="internal over external, geometric mean and 95 %:",
+            value=value,
+            sign=-1,
+            text=text if value.count > 1 else "no data",
+        ),
+        Effect(label="the same", value=value, threshold=-math.log(2), text="above 1/2"),
+    ]
+
+
+def _local_maximum(quantity: str) -> Callable[[pd.DataFrame], Sequence[Effect]]:
+    def effects(table: pd.DataFrame) -> list[Effect]:
+        wide = table.pivot_table(index=SEED, columns=ASPECT, values=quantity)
+        around = [aspect for aspect in wide.columns if 0.05 < abs(aspect - PEAK) < 0.15] if PEAK in wide else []
+        if len(around) != 2:
+            return []
+        return [
+            Effect(label=f"at {PEAK:g} less at {aspect:g}", value=mean_over_seeds(wide[PEAK] - wide[aspect]), unit=" J")
+            for aspect in around
+        ]
+
+    return effects
+
+
+def _static_flat(table: pd.DataFrame) -> Outcome:
+    line = slope_within(table[ASPECT], table[CROSSINGS], ["all"] * len(table))
+    average = float(table[CROSSINGS].mean())
+    scale = float(np.ptp(table[ASPECT])) / average if len(table) and average else math.nan
+    change, half_width = abs(scale * line.value), abs(scale) * line.half_width
+    verdict = Verdict.NOT_RESOLVED
+    if math.isnan(change):
+        verdict = Verdict.NO_DATA
+    elif change + half_width <= FLAT:
+        verdict = Verdict.FOUND
+    elif change - half_width > FLAT:
+        verdict = Verdict.NOT_FOUND
+    ends = "" if math.isnan(change) else f", from end to end {100 * scale * line.value:+.0f} % of the mean"
+    return Outcome(
+        effects=[Effect(label="⟨N⟩ against l/w", value=line, sign=0, note=ends)],
+        note=f"by l/w {means_by(table, CROSSINGS, ASPECT, '.2f')}",
+        verdict=verdict,
+    )
+
+
+def _near_one(table: pd.DataFrame) -> Outcome:
+    """⟨N⟩ is greatest near l/w = 1.0, by a parabola where one describes the means, by the means else."""
+    before, after = (parabola(table[ASPECT], table[CROSSINGS], at=place) for place in (1 - NEAR, 1 + NEAR))
+    by = f"by l/w {means_by(table, CROSSINGS, ASPECT, '.2f')}"
+    beyond = bool((table[ASPECT] > 1.0).any())
+    if beyond and not before.fits < 1 - CONFIDENCE:
+        top = f", highest at {before.top:.2f}" if before.bend.value < 0 else ""
+        return Outcome(
+            effects=[
+                Effect(label=f"slope of ⟨N⟩ at l/w = {1 - NEAR:g}", value=before.slope),
+                Effect(label=f"at {1 + NEAR:g}", value=after.slope, sign=-1, note=top),
+            ],
+            note=by,
+        )
+    note = by if beyond else f"{by}; nothing beyond 1 was run, so a fall there is not tested"
+    means = {float(aspect): mean_over_seeds(group[CROSSINGS]) for aspect, group in table.groupby(ASPECT)}
+    near = min(means, key=lambda aspect: abs(aspect - 1), default=math.nan)
+    if len(means) < 2 or abs(near - 1) > 0.1:
+        return Outcome(note=note, verdict=Verdict.NO_DATA)
+    part = table[table[ASPECT] <= near]
+    rise = Effect(label=f"⟨N⟩ against l/w up to {near:g}", value=_line(part))
+    others = [difference(mean, means[near]) for aspect, mean in means.items() if aspect != near]
+    verdict = rise.verdict
+    if any(other.value > other.half_width for other in others):
+        verdict = Verdict.NOT_FOUND
+    elif verdict == Verdict.FOUND and any(other.value > 0 for other in others):
+        verdict = Verdict.NOT_RESOLVED
+    return Outcome(effects=[rise], note=note, verdict=verdict)
+
+
+def _line(part: pd.DataFrame) -> Slope:
+    return slope_within(part[ASPECT], part[CROSSINGS], ["all"] * len(part))
+
+
+def _peaks_with_amplitude(table: pd.DataFrame) -> list[Effect]:
+    part = table[(table[PROCEDURE] == INTERNAL) & (table[ASPECT] > 0.51)]
+    bands = pd.cut(part[THETA], [0, 6, 9, 16, 90], right=False, labels=["low", "between", "peak", "high"])
+    means = part.groupby([part[ASPECT], part[SEED], bands], observed=False)[CROSSINGS].mean()
+    wide = means.unstack().reindex(columns=["low", "peak", "high"])
+    return [
+        Effect(label="⟨N⟩ at 10° to 15° less that at 5°", value=mean_over_seeds(wide["peak"] - wide["low"])),
+        Effect(label="less that at 20° to 30°", value=mean_over_seeds(wide["peak"] - wide["high"])),
+    ]
+
+
+def _energies(suffix: str, how: str, quantity: str) -> dict[str, Finding]:
+    """Findings on the energy of the internal oscillation, by one of its two readings."""
+    part = only(INTERNAL)
+    return {
+        "theta": with_amplitude(
+            f"energy-grows-with-theta{suffix}",
+            f"Internal oscillation: energy grows with θ{how}",
+            quantity,
+            label="energy per smarticle",
+            sign=1,
+            of="the energy",
+            unit=" J",
+        ),
+        "aspect": with_aspect(
+            f"energy-grows-with-aspect{suffix}",
+            f"Internal oscillation: energy grows with l/w{how}",
+            part,
+            quantity,
+            label="energy per smarticle",
+            sign=1,
+            form=".3g",
+            unit=" J",
+            when=f", θ = {AMPLITUDE:g}°",
+        ),
+        "peak": Finding(
+            id=f"energy-maximum{suffix}",
+            says=f"Internal oscillation: the energy has a local maximum at l/w = {PEAK:g}{how}",
+            outcome=_local_maximum(quantity),
+            rows=part,
+            found_if="above that at either neighbouring l/w, seed by seed, mean over seeds",
+        ),
+    }
+
+
+BY_SAMPLES = f", summed every {APART:g} s"
+STEPS, SUMS = _energies("", "", ENERGY), _energies("-sampled", BY_SAMPLES, SAMPLED)
+
+PACKING = (
+    with_aspect(
+        "poured-falls", "φ_0 of the poured pile falls with l/w", only(STATIC), PHI, label="φ_0", sign=-1, form=".4f"
+    ),
+    with_aspect(
+        "shaken-falls",
+        "External oscillation: φ_f falls with l/w",
+        only(EXTERNAL),
+        PHI_ACTIVE,
+        label="φ_f",
+        sign=-1,
+        form=".4f",
+    ),
+    Finding(
+        id="shaken-bends",
+        says="External oscillation: φ changes with l/w faster than linearly",
+        outcome=_bend,
+        rows=only(EXTERNAL, PHI_ACTIVE),
+        found_if="φ_f against l/w is convex: bend > 0, that is a fall that is steeper at small l/w",
+    ),
+    mean(
+        "shaken-compacts",
+        "External oscillation makes the pile denser",
+        lambda table: table[PHI_ACTIVE],
+        "φ_f − φ_0",
+        rows=gains(EXTERNAL),
+    ),
+    mean(
+        "straight-rises",
+        "Shape change: the centre of mass rises when the smarticles straighten",
+        lambda table: table[STRAIGHT] - 1,
+        "h/h0 − 1 while straight",
+        rows=only(SHAPE),
+        note=lambda table: f"h/h0 by l/w {means_by(table, STRAIGHT, ASPECT, '.3f')}",
+        found_if="h/h0 − 1 at the end of the straight state > 0, mean over runs",
+    ),
+    mean(
+        "sinks-while-closing",
+        "Shape change: the pile sinks at first when the barbs close",
+        lambda table: table[STRAIGHT] - table[LOWEST],
+        "h/h0 while straight less the lowest while closing",
+        rows=only(SHAPE),
+    ),
+    mean(
+        "stays-up",
+        "Shape change: the centre of mass does not come back to h0",
+        lambda table: table[HEIGHT] - 1,
+        "h/h0 − 1 at rest again",
+        rows=only(SHAPE),
+        note=lambda table: f"h/h0 by l/w {means_by(table, HEIGHT, ASPECT, '.3f')}",
+        found_if="h/h0 − 1 at rest after the shape change > 0, mean over runs",
+    ),
+    mean(
+        "rises-after-the-drop",
+        "Shape change: after that drop the pile grows upwards again",
+        lambda table: table[HEIGHT] - table[LOWEST],
+        "h/h0 at rest again less the lowest while closing",
+        rows=only(SHAPE),
+    ),
+    with_aspect(
+        "shape-change-falls",
+        "Shape change: φ_f falls with l/w",
+        only(SHAPE),
+        PHI_ACTIVE,
+        label="φ_f",
+        sign=-1,
+        form=".4f",
+    ),
+    mean(
+        "internal-sinks",
+        "Internal oscillation: the pile becomes lower than it was poured",
+        lambda table: 1 - table[HEIGHT],
+        "1 − h/h0 at rest again",
+        rows=only(INTERNAL),
+    ),
+    Finding(
+        id="compacts-early",
+        says="Internal oscillation: half of the compaction is reached after about 12 % of the activity",
+        outcome=_compacts_early,
+        rows=only(INTERNAL),
+        found_if=f"the centre of mass comes down, by half of it within {EARLY:g} of the activity, twice the paper's "
+        "0.12 (a steady descent would take 0.5)",
+    ),
+    with_aspect(
+        "internal-falls",
+        "Internal oscillation: φ_f falls with l/w",
+        only(INTERNAL),
+        PHI_ACTIVE,
+        label="φ_f",
+        sign=-1,
+        form=".4f",
+    ),
+    with_aspect(
+        "internal-gains-more",
+        "Internal oscillation: Δφ = φ_f − φ_0 grows with l/w",
+        gains(INTERNAL),
+        PHI_ACTIVE,
+        label="Δφ",
+        sign=1,
+        form=".4f",
+    ),
+    with_amplitude(
+        "tighter-at-low-theta",
+        "Internal oscillation: lower θ packs tighter",
+        PHI_ACTIVE,
+        label="φ_f",
+        sign=-1,
+        of="φ_f",
+    ),
+    Finding(
+        id="largest-theta-gains-little",
+        says="Internal oscillation: the largest amplitude packs only marginally denser than static",
+        outcome=_largest_gains_little,
+        found_if=f"below {MARGINAL:g}, within runs of the same l/w and seed",
+    ),
+    above(
+        "internal-densest",
+        "Internal oscillation packs densest",
+        PHI_ACTIVE,
+        INTERNAL,
+        (STATIC, EXTERNAL, SHAPE),
+        of=of_procedure,
+        label="φ_f",
+        beside=(EXTERNAL,),
+        beside_quantity=PHI,
+        found_if=f"φ_f at θ = {AMPLITUDE:g}°, at the end of the activity as in the paper, above that of each other "
+        "procedure, paired by l/w and seed",
+    ),
+    above(
+        "shape-change-loosest",
+        "Of the three activities shape change packs least densely",
+        PHI_ACTIVE,
+        SHAPE,
+        (EXTERNAL, INTERNAL),
+        of=of_procedure,
+        sign=-1,
+        label="φ_f",
+        beside=(STATIC,),
+        found_if="φ_f at the end of the activity below those of external and internal oscillation, paired by l/w and "
+        "seed",
+    ),
+)
+
+ENERGIES = (
+    above(
+        "shape-change-costs-most",
+        "Shape change needs the most energy, at any l/w",
+        ENERGY,
+        SHAPE,
+        (EXTERNAL, INTERNAL),
+        of=of_procedure,
+        label="energy per smarticle [J]",
+        found_if="energy above that of each other activity, paired by l/w and seed",
+    ),
+    Finding(
+        id="shape-change-costs-ten-times",
+        says="Shape change costs more than 10 times the energy of internal oscillation",
+        outcome=_shape_change_costs,
+        found_if=f"geometric mean of the ratio > {FACTOR:g}, paired by l/w and seed, θ = {AMPLITUDE:g}°",
+    ),
+    Finding(
+        id="shape-change-costs-ten-times-sampled",
+        says=f"Shape change costs more than 10 times the energy of internal oscillation{BY_SAMPLES}",
+        outcome=_costs_by_samples,
+        found_if="the mean of the difference > 0, paired by l/w and seed; no ratio, since a sum over samples can be "
+        "zero or negative",
+    ),
+    above(
+        "internal-costs-least",
+        "Internal oscillation needs the least energy",
+        ENERGY,
+        INTERNAL,
+        (EXTERNAL, SHAPE),
+        of=of_procedure,
+        sign=-1,
+        label="energy per smarticle [J]",
+        found_if=f"energy at θ = {AMPLITUDE:g}° below that of each other activity, paired by l/w and seed",
+    ),
+    *(findings[kind] for kind in ("theta", "aspect", "peak") for findings in (STEPS, SUMS)),
+    Finding(
+        id="internal-costs-a-little-less",
+        says="External and internal oscillation need similar energies, internal slightly less",
+        outcome=_little_less,
+        found_if="geometric mean of the ratio between 1/2 and 1, paired by l/w and seed",
+    ),
+)
+
+ENTANGLEMENT = (
+    above(
+        "static-least-entangled",
+        "⟨N⟩ is lowest for static",
+        CROSSINGS,
+        STATIC,
+        (EXTERNAL, INTERNAL, SHAPE),
+        of=of_procedure,
+        sign=-1,
+        label="⟨N⟩",
+        found_if="⟨N⟩ below that of each activity, paired by l/w and seed",
+    ),
+    Finding(
+        id="static-flat",
+        says="⟨N⟩ of static hardly depends on l/w",
+        outcome=_static_flat,
+        rows=only(STATIC),
+        found_if=f"the straight line through all runs changes by less than {FLAT:.0%} of the mean, at 95 %",
+    ),
+    above(
+        "shape-change-most-entangled",
+        "⟨N⟩ is highest for shape change",
+        CROSSINGS,
+        SHAPE,
+        (STATIC, EXTERNAL, INTERNAL),
+        of=of_procedure,
+        label="⟨N⟩",
+        found_if="⟨N⟩ above that of each other procedure, paired by l/w and seed",
+    ),
+    with_aspect(
+        "shape-change-rises",
+        "⟨N⟩ of shape change rises with l/w",
+        only(SHAPE),
+        CROSSINGS,
+        label="⟨N⟩",
+        sign=1,
+        form=".2f",
+    ),
+    *(
+        Finding(
+            id=f"{procedure}-near-one",
+            says=f"⟨N⟩ of {procedure} oscillation is greatest near l/w = 1.0",
+            outcome=_near_one,
+            rows=only(procedure, CROSSINGS),
+            found_if=f"the parabola through all runs still rises at l/w = {1 - NEAR:g} and falls at {1 + NEAR:g}, so "
+            "that of the paper's l/w 0.9, 1.0 or 1.1 is the nearest to its maximum; where none describes the means at "
+            "95 %, or nothing beyond 1.0 was run: slope of ⟨N⟩ up to l/w = 1.0 > 0, and no other mean above that at "
+            "1.0",
+        )
+        for procedure in (EXTERNAL, INTERNAL)
+    ),
+    with_amplitude(
+        "crossings-fall-with-theta",
+        "Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5",
+        CROSSINGS,
+        label="⟨N⟩",
+        sign=-1,
+        of="⟨N⟩",
+        rows=lambda table: table[(table[PROCEDURE] == INTERNAL) & (table[ASPECT] < 0.51)],
+    ),
+    Finding(
+        id="crossings-peak-with-theta",
+        says="Internal oscillation: ⟨N⟩ peaks at θ = 10° to 15° at larger l/w",
+        outcome=_peaks_with_amplitude,
+        found_if="both differences > 0, within runs of the same l/w and seed, l/w > 0.5",
+    ),
+)
+
+
+def heights(run: RunManifest) -> History:
+    """Read h/h0 against the time since the activity began."""
+    values, times = height_history(run)
+    active = next(phase for phase in run.phases if phase.type not in ("deposit", "relax"))
+    end = 0.0 if active.start is None or active.end is None else active.end - active.start
+    return History(times=times, values=values, active=end)
+
+
+def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the runs of the aspect ratio of the paper's figure, 0.7, or the nearest one."""
+    return runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))]
+
+
+def _energy_series(points: pd.DataFrame) -> list[Series]:
+    """Make series of the procedures that move smarticles, and of the internal oscillation at its other amplitudes."""
+    internal = amplitudes(points)
+    others = sorted(theta for theta in internal[THETA].unique() if theta != AMPLITUDE)
+    thin = {"markersize": 2.2, "linewidth": 0.5, "linestyle": (0, (2, 1.5))}
+    colours = style.sequence(len(others), last=0.85)
+    return by_procedure({name: label for name, label in _LABELS.items() if name != STATIC})(points) + [
+        Series(
+            rows=internal[internal[THETA] == theta],
+            label=rf"internal, $\theta$ = {theta:g}°",
+            look={**marker("o", colour, "white"), **thin},
+        )
+        for theta, colour in zip(others, colours, strict=True)
+    ]
+
+
+def _aspect_series(points: pd.DataFrame) -> list[Series]:
+    """Make a series of the internal oscillation for each aspect ratio with more than one amplitude."""
+    internal = amplitudes(points).sort_values(THETA)
+    several = internal[internal.groupby(ASPECT)[THETA].transform("nunique") > 1]
+    return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)
+
+
+_LABELS = {
+    SHAPE: "shape change",
+    EXTERNAL: "external oscillation",
+    INTERNAL: rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°",
+    STATIC: r"static ($\phi_0$)",
+}
+
+
+def _means(name: str, columns: Sequence[str], x: str, split: Split, *, log: bool = False, mark: float = 0.0) -> Means:
+    return Means(
+        name=name,
+        quantities=[COLUMNS[column] for column in columns],
+        x=x,
+        x_label=ASPECT_LABEL if x == ASPECT else THETA_LABEL,
+        split=split,
+        log=log,
+        marks=[mark] if mark else [],
+        share_y=len(columns) > 1,
+        told=[f"Broken line: l/w = {mark:g}, where the paper's energies have a local maximum."] if mark else [],
+    )
+
+
+STUDY = Study(
+    name="procedures",
+    title="Procedures of smarticles against the findings of Savoie et al.",
+    measure=procedure_row,
+    keys=KEYS,
+    quantities=tuple(COLUMNS.values()),
+    findings=(*PACKING, *ENERGIES, *ENTANGLEMENT),
+    figures=(
+        Histories(
+            name="height_time",
+            history=heights,
+            rows=nearest_aspect,
+            split=by_procedure(_LABELS),
+            x_label="time since the activity began [s]",
+            y_label=r"height of the centre of mass $h/h_0$ [-]",
+            level=1.0,
+            told=["l/w = 0.7, or the nearest one. Each activity begins and ends at the broken lines."],
+        ),
+        _means("phi_aspect", [PHI_ACTIVE], ASPECT, by_procedure(_LABELS, apart=0.004)),
+        _means("crossings_aspect", [CROSSINGS], ASPECT, by_procedure(_LABELS, apart=0.004)),
+        _means("energy_aspect", [ENERGY], ASPECT, _energy_series, log=True),
+        _means("phi_theta", [PHI_ACTIVE], THETA, _aspect_series),
+        _means("crossings_theta", [CROSSINGS], THETA, _aspect_series),
+        _means("energy_theta", [ENERGY], THETA, _aspect_series, log=True),
+        _means(
+            "energy_readings",
+            [ENERGY, SAMPLED],
+            ASPECT,
+            by_procedure({name: _LABELS[name] for name in (SHAPE, INTERNAL)}),
+            mark=PEAK,
+        ),
+    ),
+    samples=samples,
+    order=(PROCEDURE, THETA, ASPECT, SEED),
+    constant={ACTIVE: (PROCEDURE,)},
+    count_values=True,
+    from_tables=True,
+    remarks=(
+        f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}): φ_f is the mean over the last 20 frames of the activity, as "
+        "in the paper. ⟨N⟩: links of others through a smarticle's plane, mean over the frames of the relaxation after "
+        "the activity; static: of that before it, h0 its mean height of the centre of mass. Energy: work of the "
+        "motors, or of the shaken container without its own weight. Procedures are compared at "
+        f"θ = {AMPLITUDE:g}°.",
+        "Of θ only what the hinge reaches is run: a barb swings to 90° + θ/2 · 0.7/(l/w), 105° at most, so θ is at "
+        "most 30° (l/w)/0.7.",
+    ),
+    pictured={"procedure": SHAPE, "l_over_w": 0.7},
+)

@@ -1,0 +1,109 @@
+"""Every study against its published tables: points, verdicts and numbers follow from the stored table of runs."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from studies.claims.verdicts import claims
+from studies.framework.figures import Analysis
+from studies.framework.study import Study, read_runs
+from studies.registry import STUDIES, Script
+from templates.sweep.expand import expand
+from templates.sweep.sweep_file import load_sweep
+
+RESULTS = Path(__file__).resolve().parents[2] / "results"
+SCRIPTS = [name for name, study in STUDIES.items() if isinstance(study, Script)]
+ON_YADE = ["procedures-links-100"]
+"""Further results of a study: the name of the study is that of the folder up to the first such ending."""
+
+ROUNDING = 3e-4  # tables have six digits, and a standard error is a small difference of them
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def study_of(table: str) -> Study:
+    """Load the study that a folder of results is of."""
+    name = next(name for name in sorted(SCRIPTS, key=len, reverse=True) if table.startswith(name))
+    study = STUDIES[name].load(quick=False)
+    assert isinstance(study, Study)
+    return study
+
+
+def stored(table: str, name: str) -> pd.DataFrame:
+    return pd.read_csv(RESULTS / table / name, comment="#" if name != "findings.csv" else None)
+
+
+def findings(table: str) -> pd.DataFrame:
+    """The findings as published; their text may hold a `#`, so the footer is cut line by line."""
+    lines = (RESULTS / table / "findings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    text = "".join(line for line in lines if not line.startswith("# "))
+    return pd.read_csv(io.StringIO(text), keep_default_na=False).set_index("id")
+
+
+def numbers(text: str) -> list[float]:
+    return sorted({abs(float(number)) for number in NUMBER.findall(text.replace("−", "-"))})
+
+
+@pytest.mark.parametrize("table", [*SCRIPTS, *ON_YADE])
+def test_points_follow_from_the_table_of_runs(table: str) -> None:
+    tables = study_of(table).tabulate(read_runs(RESULTS / table))
+    made = pd.read_csv(io.StringIO(tables["points"].to_csv(index=False, float_format="%.6g")))
+    pd.testing.assert_frame_equal(made, stored(table, "points.csv"), rtol=ROUNDING, check_dtype=False)
+
+
+@pytest.mark.parametrize("table", [*SCRIPTS, *ON_YADE])
+def test_findings_follow_from_the_table_of_runs(table: str) -> None:
+    published = findings(table)
+    judged = {one.finding.id: one for one in study_of(table).judge(read_runs(RESULTS / table))}
+    assert list(judged) == published.index.tolist()
+    for name, one in judged.items():
+        row = published.loc[name]
+        assert (one.verdict, one.finding.says) == (row["verdict"], row["finding in the paper"]), name
+        assert one.needed == row.get("needed", one.needed), name
+        # Every number with an error stands in the published text, but for the rounding of the table.
+        known = numbers(row["ours"])
+        for number in (abs(float(value)) for value in re.findall(r"([-+]\d[\d.e-]*) ±", one.ours)):
+            assert any(number == pytest.approx(other, rel=0.02) for other in known), (name, number, row["ours"])
+
+
+@pytest.mark.parametrize("table", SCRIPTS)
+def test_scenes_of_the_table_are_those_of_the_sweep(table: str) -> None:
+    points = {point.name: point.scene_sha256 for point in expand(load_sweep(STUDIES[table].sweep_file()))}
+    runs = read_runs(RESULTS / table)
+    assert {name: points.get(name) for name in runs["run"]} == dict(zip(runs["run"], runs["scene_sha256"], strict=True))
+
+
+@pytest.mark.parametrize("table", SCRIPTS)
+def test_ids_quantities_and_columns_are_declared_once(table: str) -> None:
+    study = study_of(table)
+    for names in (
+        [finding.id for finding in study.findings],
+        [finding.says for finding in study.findings],
+        [quantity.column for quantity in study.quantities],
+        [figure.name for figure in study.figures],
+    ):
+        assert len(set(names)) == len(names)
+    assert all(quantity.meaning for quantity in study.quantities)
+
+
+@pytest.mark.parametrize("table", SCRIPTS)
+def test_text_and_figures_are_made_from_the_tables(table: str, tmp_path: Path) -> None:
+    study = study_of(table)
+    tables = study.tabulate(read_runs(RESULTS / table))
+    header, rows = study.table(tables)
+    assert all(len(row) == len(header) for row in rows)
+    assert "seeds 1" in study.statements(tables)[0]
+    assert len(study.text(tables, study.judge(tables["runs"]), [])) > 2 * len(study.quantities)
+    drawn = study.draw(tmp_path, Analysis(tables=tables, manifests={}, footer=["A footer."]))
+    assert {path.stem for path in drawn} <= {figure.name for figure in study.figures}
+    assert all(path.stat().st_size > 1000 for path in drawn)
+
+
+def test_verdicts_of_the_claims() -> None:
+    published = pd.read_csv(RESULTS / "claims.csv", keep_default_na=False)
+    assert [claim.verdict for claim in claims(RESULTS)] == published["verdict"].tolist()
+    assert len(published) == 68
