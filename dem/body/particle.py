@@ -20,6 +20,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.linear import eigen_symmetric, matrix_product
 from dem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -167,7 +168,7 @@ class Boxes:
             second = mass / 12 * np.array([length**2, in_plane**2, self.thickness_normal**2])
             axes = np.stack([u, v, n], axis=1)
             arm = centre - self.plain_centre_of_mass
-            moment = axes @ np.diag(second) @ axes.T + mass * np.outer(arm, arm)
+            moment = matrix_product(axes * second, axes.T) + mass * np.outer(arm, arm)
             tensor += np.trace(moment) * np.eye(3) - moment
         # z is a principal axis by symmetry, so only the in-plane block is turned: the smallest rotation that
         # diagonalises it keeps x along the middle link for every symmetric shape.
@@ -176,7 +177,7 @@ class Boxes:
             angle -= math.copysign(math.pi / 2, angle)
         c, s = math.cos(angle), math.sin(angle)
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return np.diag(rotation.T @ tensor @ rotation).copy(), rotation
+        return np.diag(matrix_product(matrix_product(rotation.T, tensor), rotation)).copy(), rotation
 
     @property
     def link_masses(self) -> Array:
@@ -205,7 +206,7 @@ class Boxes:
         """
         normal = np.array([0.0, 0.0, 1.0])
         frames = [np.stack([u, np.cross(normal, u), normal], axis=1) for u in self.directions]
-        return np.asarray(self._principal[1].T @ np.array(frames))
+        return matrix_product(self._principal[1].T, np.array(frames))
 
     @property
     def inertia(self) -> Array:
@@ -214,7 +215,7 @@ class Boxes:
 
     def to_body(self, points: Array) -> Array:
         """Points (n, 3) [m] from the middle link's frame to the body frame."""
-        return (points - self.plain_centre_of_mass) @ self._principal[1]
+        return matrix_product(points - self.plain_centre_of_mass, self._principal[1])
 
     @cached_property
     def vertices(self) -> Array:
@@ -368,6 +369,6 @@ class Particle:
         cross[:, 0, 1], cross[:, 0, 2] = -z, y
         cross[:, 1, 0], cross[:, 1, 2] = z, -x
         cross[:, 2, 0], cross[:, 2, 1] = -y, x
-        tensors = np.eye(3) / self.boxes.mass + cross.transpose(0, 2, 1) @ (inverse[:, None] * cross)
-        mobility = float(np.linalg.eigvalsh(tensors)[:, -1].max())
+        tensors = np.eye(3) / self.boxes.mass + matrix_product(cross.transpose(0, 2, 1), inverse[:, None] * cross)
+        mobility = float(eigen_symmetric(tensors)[0].max())
         return 1.0 / mobility

@@ -298,7 +298,25 @@ def versions(made_by: tuple[str, str]) -> dict[str, str]:
         "numpy": np.__version__,
         "h5py": h5py.__version__,
         "meshio": meshio.__version__,
+        "processor": _processor(),
+        "blas": _blas(),
     }
+
+
+def _processor() -> str:
+    """Model of the processor, for output only."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def _blas() -> str:
+    """BLAS that NumPy was built with, and the kernels that its environment forces; no run of links depends on it."""
+    built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]  # type: ignore[index,call-overload]
+    forced = os.environ.get("OPENBLAS_CORETYPE", "")
+    return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"
 
 
 def _own_version() -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.linear import matrix_product
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -161,7 +162,7 @@ class World:
         fresh.velocity[:, 2] = -speed
         # Poses are those of the principal axes; here the axes are the middle link's.
         for i, rotation in enumerate(poses.rotations):
-            fresh.turn[i] = quaternion_of(rotation.as_matrix() @ boxes.link_rotations[1])
+            fresh.turn[i] = quaternion_of(matrix_product(rotation.as_matrix(), boxes.link_rotations[1]))
         fresh.alpha[:] = boxes.angles
         for i in range(new):
             lay_out(self.shape, *boxes.angles, fresh.plane[i])
@@ -380,7 +381,8 @@ def quaternion_of(matrix: Array) -> Array:
         q = np.array([m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1 + m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]])
     else:
         q = np.array([m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1 + m[2, 2] - m[0, 0] - m[1, 1]])
-    unit: Array = q / np.linalg.norm(q)
+    a, b, c, d = (float(value) for value in q)
+    unit: Array = q / math.sqrt(a * a + b * b + c * c + d * d)
     return unit
 
 
