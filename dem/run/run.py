@@ -314,7 +314,7 @@ def _processor() -> str:
 
 def _blas() -> str:
     """BLAS that NumPy was built with, and the kernels that its environment forces; no run of links depends on it."""
-    built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]  # type: ignore[index,call-overload]
+    built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"
 
