@@ -65,7 +65,7 @@ def test_error_bars_may_lie_across(tmp_path: Path) -> None:
 
 
 def test_no_study_draws_error_bars_by_itself() -> None:
-    """So that all are of one kind: `base.figures` draws those of 95 %, and names them."""
+    """So that all are of one kind: `framework.plots` draws those of 95 %, and names them."""
     own = []
     for path in Path(studies.__file__).parent.rglob("*.py"):
         called = {
@@ -75,7 +75,7 @@ def test_no_study_draws_error_bars_by_itself() -> None:
         }
         if called & {"errorbar", "savefig", "add_footer"}:
             own.append("/".join(path.parts[-2:]))
-    assert own == ["base/figures.py"]
+    assert own == ["framework/plots.py"]
 
 
 # -- limits ----------------------------------------------------------------------------------------------------------
