@@ -60,7 +60,7 @@ def force_fields() -> str:
 
 def export_fields() -> str:
     """Fields of exported bodies."""
-    from postprocess.export.fields import FIELDS  # noqa: PLC0415
+    from postprocess.bodies.fields import FIELDS  # noqa: PLC0415
 
     rows = [(code(field.name), cell(field.unit), f"each {field.of}", cell(field.meaning)) for field in FIELDS]
     return table(("field", "unit", "of", "what"), rows)

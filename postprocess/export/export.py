@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from dem.errors import InputError, RunError, nearest
-from dem.record.frames import FrameSequence, read_frames
+from dem.record.frame import Frame
+from dem.record.frames import read_frames
 from dem.record.manifest import read_run
-from postprocess.export.bodies import Bodies, checked_kinds
-from postprocess.export.collection import Collection
-from postprocess.export.fields import IDENTITY, fields_of
-from postprocess.export.painting import Painter
-from postprocess.export.solids import SUFFIXES, solids_file
+from postprocess.bodies.fields import IDENTITY, fields_of
+from postprocess.bodies.meshes import Bodies, checked_kinds
+from postprocess.export.collection import write_collection
+from postprocess.export.solids import SUFFIXES, Painter
 
 FORMATS = ("vtp", *SUFFIXES)
 """What a run can be exported to."""
@@ -24,7 +24,7 @@ FORMATS = ("vtp", *SUFFIXES)
 _FIELDLESS = ("stl", "obj")
 
 Tell = Callable[[int, int], None]
-"""Told how many frames are written, and of how many."""
+"""Receives how many frames are written, and of how many."""
 
 
 def export_run(
@@ -39,7 +39,7 @@ def export_run(
     color_by: str | None = None,
     tell: Tell = lambda _done, _all: None,
 ) -> Path:
-    """Writes true bodies of a run for other programs.
+    """Write true bodies of a run for other programs.
 
     Args:
         directory: A run directory with at least one frame; the run need not be done.
@@ -48,7 +48,7 @@ def export_run(
             says; `export-TO` or `export.TO` in the run directory if not given.
         time: Simulated time [s], the nearest frame is taken; the last one if not given.
         every_frame: All frames instead.
-        wanted: Kinds of bodies besides the usual ones, see `bodies.KINDS`.
+        wanted: Kinds of bodies besides the usual ones, see `postprocess.bodies.meshes.KINDS`.
         unwanted: Kinds and fields to leave out.
         color_by: Name of a field, for formats with colours; None: crossings, in a plane smarticle_id.
         tell: Progress.
@@ -75,52 +75,35 @@ def export_run(
     folder = every_frame or to == "vtp"
     path = _checked_output(run.directory, output, to, folder=folder)
     carried = [field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)]
-    bodies = Bodies.read(run, kinds, carried)
+    bodies = Bodies(run, kinds, carried)
     bodies.hold(frames[index] for index in chosen)
+
+    def followed() -> Iterator[tuple[int, Frame]]:
+        for done, index in enumerate(chosen):
+            yield index, frames[index]
+            tell(done + 1, len(chosen))
+
     with _whole(path) as made:
+        if folder:
+            made.mkdir()
         if to == "vtp":
-            _write_collection(made, bodies, frames, chosen, tell)
+            found = write_collection(made, bodies, followed())
         else:
-            painter = Painter.of(run, color_by, (frames[index] for index in chosen))
-            if folder:
-                made.mkdir()
+            painter = Painter(bodies, color_by, frames, chosen)
             found = 0
-            for done, index in enumerate(chosen):
-                frame = frames[index]
-                solids = painter.solids(bodies, frame)
-                found += len(solids)
-                if solids:  # a wall alone that was taken away is no file
-                    target = made / f"frame_{index:06d}.{to}" if folder else made
-                    target.write_bytes(solids_file(solids, to, painter.told(frame)))
-                tell(done + 1, len(chosen))
-            _refuse_nothing(found, kinds)
+            for index, frame in followed():
+                content = painter.content(frame, to)
+                if content is not None:  # a wall alone that was taken away is no file
+                    (made / f"frame_{index:06d}.{to}" if folder else made).write_bytes(content)
+                    found += 1
+        if not found:
+            msg = f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less"
+            raise InputError(msg)
     return path
 
 
-def _write_collection(folder: Path, bodies: Bodies, frames: FrameSequence, chosen: Sequence[int], tell: Tell) -> None:
-    folder.mkdir()
-    collection = Collection(folder, bodies.run)
-    for done, index in enumerate(chosen):
-        frame = frames[index]
-        collection.add(index, frame, bodies.at(frame))
-        tell(done + 1, len(chosen))
-    _refuse_nothing(len(collection.kinds), bodies.kinds)
-    collection.close()
-
-
-def _refuse_nothing(found: int, kinds: Sequence[str]) -> None:
-    """A file without a body is none that was wanted.
-
-    Raises:
-        InputError: nothing was found.
-    """
-    if not found:
-        msg = f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less"
-        raise InputError(msg)
-
-
 def _checked_output(directory: Path, output: Path | str | None, to: str, *, folder: bool) -> Path:
-    """Where to write.
+    """Return where to write.
 
     Raises:
         InputError: There is something, or it cannot be there.
@@ -140,7 +123,7 @@ def _checked_output(directory: Path, output: Path | str | None, to: str, *, fold
 
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """A path that does not exist yet, in a folder beside; moved to `path` when the block ends well, else removed.
+    """Give a path that does not exist yet, in a folder beside; moved to `path` when the block ends well, else removed.
 
     Raises:
         RunError: It cannot be written.

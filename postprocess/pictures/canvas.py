@@ -1,372 +1,387 @@
-"""The canvas of a picture: container, lights and smarticles, drawn by VTK. It and `force_lines` alone import PyVista.
+"""The canvas of a picture: bodies of one or more runs side by side, in parallel projection, drawn by PyVista.
 
-The three-dimensional part is drawn at twice its size and scaled down; what stands around it is set by
-`postprocess.pictures.page`. No display is needed: VTK falls back to EGL.
+It is drawn at twice its size and scaled down. No display is needed: VTK falls back to EGL.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
-import warnings
-from collections.abc import Sequence
-from types import TracebackType
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from PIL import Image
+import pyvista as pv
+from matplotlib.font_manager import FontProperties, findfont
+from PIL import Image, ImageDraw
+from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkRenderingCore import vtkTextRenderer
 
-from dem.errors import InputError
-from dem.record.forces import read_forces
+from dem.errors import InputError, RunError, nearest
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
-from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
-from postprocess.pictures.camera import (
-    FIELD_OF_VIEW,
-    MILLIMETRE,
-    Look,
-    channel,
-    circle,
-    fitted_camera,
-    millimetres_per_pixel,
-    wall_corners,
-)
-from postprocess.pictures.force_lines import force_lines, force_tubes
-from postprocess.pictures.graphics import check_graphics, quiet_vtk
-from postprocess.pictures.surroundings import Bounds, Surroundings
-
-with warnings.catch_warnings():
-    # PyVista imports pyplot: see postprocess.report.figures.
-    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
-    import pyvista as pv
-    import pyvista.plotting
+from postprocess.bodies.colours import PAINTS, ColourScale, colour_field
+from postprocess.bodies.fields import Field
+from postprocess.bodies.meshes import BOX_POINTS, Bodies, owners, solid
+from postprocess.report import figures
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from matplotlib.colors import Colormap
+    from numpy.typing import NDArray
+
+VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
+)
+"""Named views: the camera's azimuth and elevation [degree], seen from the pile."""
+
+MILLIMETRE = 1e3
+"""Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m."""
 
 _OVERSAMPLING = 2
-_FIXTURE = "#b3261e"  # of hooks and strings
-_FORCE = "#a11a2e"
+_LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # pixel
+_FILL = 0.97  # share of the room that bodies take
+_EDGE = "#7d8f9f"
 _PALE = 0.15  # opacity of smarticles that let forces be seen
-_THICK = 0.8  # radius of the thickest line of force, in the thickness of a link
+# In hundredths of a picture's shorter side: height of the captions, of scale and colour bar, margin, text.
+_HEAD, _FOOT, _MARGIN, _TITLE, _TEXT = 11.5, 10.0, 2.6, 2.5, 1.9
+_LEAST_UNIT = 4.4  # pixel: smaller text cannot be read
+_LETTER = 0.62  # width of a letter over its height
+_LIGHTS = ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25))  # right, up, intensity
 
-# Corners of a box (along, in plane, normal) and its faces, seen from outside.
-_CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
-_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+Rectangle = tuple[float, float, float, float]
+"""Least and largest x, least and largest y in the picture's plane [mm]."""
 
 
-def link_boxes(
-    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
-) -> pv.PolyData:
-    """The links of all smarticles as one mesh of boxes.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Look:
+    """What colours mean, size [pixel] of a panel, and axes (3, 3) of the camera: right, up, forward."""
 
-    The section of a straight smarticle, or of one without barbs, is turned about its length by an
-    angle that four vertices do not tell: some angle is taken. Links without length have no box.
+    field: Field
+    size: tuple[int, int]
+    axes: NDArray[np.float64]
+
+    @classmethod
+    def checked(cls, run: RunManifest, *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
+        """Return a look by names.
+
+        Raises:
+            InputError: Unknown field or view, or a bad size.
+        """
+        name = view or ("top" if run.planar else "front")
+        if name not in VIEWS:
+            msg = f"view {name!r}: is not known; {nearest(name, VIEWS)}"
+            raise InputError(msg)
+        if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
+            msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"
+            raise InputError(msg)
+        return cls(field=colour_field(color_by, run), size=size, axes=axes_from(*VIEWS[name]))
+
+    @property
+    def unit(self) -> float:
+        """A hundredth of the picture's shorter side, or what can just be read [pixel]."""
+        return max(min(self.size) / 100, _LEAST_UNIT)
+
+
+@dataclass(frozen=True)
+class Caption:
+    """A title, and lines below it."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+def axes_from(azimuth: float, elevation: float) -> NDArray[np.float64]:
+    """Return right, up and forward (3, 3) of a camera, by its direction from the pile [degree]."""
+    a, e = math.radians(azimuth), math.radians(elevation)
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    forward = -np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+    return np.stack([right, np.cross(right, forward), forward])
+
+
+def drawn(
+    bodies: Bodies, frame: Frame, forward: NDArray[np.float64], *, largest: float | None = None
+) -> dict[str, pv.PolyData]:
+    """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
+
+    A wall that was taken away is there as `ghost`.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
-
-    Returns:
-        Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
-        `vertices`, and `link`, 0 to 2.
-
-    Raises:
-        InputError: Bad vertices or thicknesses.
+        bodies: Of the run.
+        frame: One of its frames.
+        forward: (3,) direction in which the camera looks; zeros: walls stay whole.
+        largest: Normal force of the thickest line of force [N].
     """
-    vertices = checked_vertices(vertices)
-    in_plane = np.broadcast_to(thickness_in_plane, 3)
-    if not (thickness_normal > 0 and (in_plane > 0).all()):
-        msg = f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m"
-        raise InputError(msg)
-    lengths = link_lengths(vertices)
-    smarticle, link = np.nonzero(lengths > 1e-9 * lengths.sum(axis=1, keepdims=True))
-    start, end = vertices[smarticle, link], vertices[smarticle, link + 1]
-    along = end - start
-    across = np.cross(plane_frames(vertices)[smarticle, 2], along)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    # Square to the link even where the four vertices are not quite in one plane.
-    normal = np.cross(along, across)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    edges = np.stack([along, in_plane[link, None] * across, thickness_normal * normal], axis=1)
-    points = ((start + end) / 2)[:, None] + np.einsum("ce,bex->bcx", _CORNERS, edges)
-    faces: Any = _FACES + 8 * np.arange(len(points))[:, None, None]
-    mesh: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
-    mesh.cell_data["smarticle"] = np.repeat(smarticle, len(_FACES))
-    mesh.cell_data["link"] = np.repeat(link, len(_FACES))
-    return mesh
+    made = bodies.at(frame)
+    if "wall" in bodies.kinds and "wall" not in made and bodies.around.removed is not None:
+        made["ghost"] = bodies.wall_at(frame.floor_z)
+    found = {}
+    for kind, mesh in made.items():
+        shape = mesh if kind in {"smarticles", "ghost"} else solid(kind, mesh, bodies.run, largest=largest)
+        if kind in {"wall", "ghost"} and not bodies.run.planar and np.hypot(*forward[:2]) > 1e-9:
+            shape = shape.clean(tolerance=1e-6).clip(normal=(-forward[0], -forward[1], 0.0), origin=(0.0, 0.0, 0.0))
+        found[kind] = shape.translate((0.0, 0.0, -frame.floor_z)).scale(MILLIMETRE)
+    return found
+
+
+def rectangle(meshes: Iterable[pv.PolyData], axes: NDArray[np.float64]) -> Rectangle:
+    """Return the part of the picture's plane that meshes [mm] take."""
+    places = np.concatenate([np.asarray(mesh.points) @ axes[:2].T for mesh in meshes])
+    (left, below), (right, above) = places.min(axis=0), places.max(axis=0)
+    return float(left), float(right), float(below), float(above)
+
+
+def union(parts: Sequence[Rectangle]) -> Rectangle:
+    """Return the rectangle around some."""
+    left, right, below, above = np.array(parts).T
+    return float(left.min()), float(right.max()), float(below.min()), float(above.max())
+
+
+def add_bodies(
+    plotter: Any, meshes: Mapping[str, pv.PolyData], colours: NDArray[np.uint8], *, pale: bool = False
+) -> None:
+    """Put meshes into a window in place of those of their kinds that are there.
+
+    Args:
+        plotter: The window.
+        meshes: Of `drawn`.
+        colours: (boxes, 3) of the smarticles, 0 to 255.
+        pale: Whether smarticles are seen through.
+    """
+    for kind in (*PAINTS, "ghost"):
+        for name in (kind, f"{kind} edges"):
+            plotter.renderer.remove_actor(name, render=False)
+    for kind, mesh in meshes.items():
+        options = {"name": kind, "reset_camera": False, "render": False, "culling": False}
+        if kind in {"wall", "floor", "ghost"}:
+            # Points that coincide would make seams, which would be drawn.
+            edges = mesh.clean(tolerance=1e-6).extract_feature_edges(feature_angle=30, manifold_edges=False)
+            opacity = 0.3 if kind == "ghost" else 1.0
+            line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
+            plotter.add_mesh(edges, **(options | line | {"name": f"{kind} edges"}))
+        if kind == "smarticles":
+            mesh.point_data["colour"] = np.repeat(colours, BOX_POINTS, axis=0)
+            options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
+            # Of a closed box nobody sees the faces behind; drawing them took a quarter of a film's time.
+            options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
+            options |= {"show_edges": True, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
+        elif kind != "ghost":
+            grazed = kind == "floor"  # light that grazes it would leave it black
+            options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": kind != "wall"}
+            options |= {"ambient": 0.45 if grazed else 0.25, "diffuse": 0.6 if grazed else 0.8}
+        if kind != "ghost":
+            plotter.add_mesh(mesh, **options)
 
 
 class Canvas:
-    """Container, camera and lights of one picture or film; draws frame after frame.
+    """A window of one or more panels with one camera, one scale of colours and one scale bar.
 
     Args:
-        run: The run.
-        look: Size and direction.
-        surroundings: What is drawn besides smarticles; None: nothing.
-        extent: (n, 3) [mm], what the camera has in view.
-        axes: (3, 3) rows: right, up and forward from the camera; those of the look if not given.
-        quick: Whether to draw as films are: without the shade in corners, which takes most of the time of a still.
-        largest_force: Normal force of the thickest line of force [N]; None: no forces are drawn.
+        look: Of each panel.
+        room: What the camera has in view.
+        run: By whose sizes corners are shaded.
+        columns: Panels side by side.
+        scale: Of colours; None: no bar of colours.
+        quick: Whether to leave out the shade in corners, which takes most of the time of a picture.
+
+    Attributes:
+        pixel: Length of a pixel [mm].
+
+    Raises:
+        RunError: This machine lacks the libraries to draw without a display.
     """
 
     def __init__(
         self,
-        run: RunManifest,
         look: Look,
-        surroundings: Surroundings | None,
-        extent: NDArray[np.float64],
+        room: Rectangle,
+        run: RunManifest,
         *,
-        axes: NDArray[np.float64] | None = None,
+        columns: int = 1,
+        scale: ColourScale | None = None,
         quick: bool = False,
-        largest_force: float | None = None,
     ) -> None:
-        self._run = run
-        self._largest_force = largest_force
-        self._look = look
-        self._axes = look.axes if axes is None else axes
-        self._surroundings = surroundings
-        self._quick = quick
-        self._wall: list[Any] = []  # what goes away with the container
-        self._ghost: Any = None  # what is left of it then
-        self._hooks: list[Any] = []  # the lower and the upper one
-        self._boxes: pv.PolyData | None = None
         check_graphics()
+        self._look, self._columns = look, columns
+        self.size = look.size[0] * columns, look.size[1]
+        width, height = look.size
+        free = height - (_HEAD + _FOOT) * look.unit
+        left, right, below, above = room
+        self.pixel = max((right - left) / (_FILL * width), (above - below) / (_FILL * free)) or 1.0  # mm
+        # Captions take more of the picture than the bars do.
+        lift = (_HEAD - _FOOT) / 2 * look.unit * self.pixel
+        self._centre = (left + right) / 2, (below + above) / 2 + lift
+        self._reach = 4 * self.pixel * max(self.size)
         with quiet_vtk():
-            width, height = look.panel
-            self._plotter: Any = pv.Plotter(
-                off_screen=True,
-                window_size=[_OVERSAMPLING * width, _OVERSAMPLING * height],
-                lighting="none",
-            )
-            # Drawn larger and scaled down, edges are smooth already.
-            self._plotter.disable_anti_aliasing()
-            self._pixel = self._build(extent)
+            plotter: Any = pv.Plotter(
+                off_screen=True, shape=(1, columns), border=False, lighting="none",
+                window_size=[_OVERSAMPLING * side for side in self.size],
+            )  # fmt: skip
+            self._plotter = plotter
+            plotter.disable_anti_aliasing()  # drawn larger and scaled down, edges are smooth already
+            plotter.set_background("white")
+            vtkTextRenderer.GetInstance().SetDefaultBackend(vtkTextRenderer.FreeType)  # names are no formulas
+            for column in range(columns):
+                plotter.subplot(0, column)
+                for aside, rise, strength in _LIGHTS:
+                    lamp = pv.Light(position=(aside, rise, 1.0), intensity=strength, light_type="camera light")
+                    plotter.add_light(lamp, only_active=True)
+                if not quick:
+                    plotter.enable_ssao(
+                        radius=0.6 * run.middle_length * MILLIMETRE, bias=0.4 * run.thickness_in_plane * MILLIMETRE,
+                        kernel_size=64, blur=True,
+                    )  # fmt: skip
+            self.turn(look.axes)
+            if scale is not None and scale.colours is not None:
+                self._add_colour_bar(scale, scale.colours)
+            self._length = round_length(0.2 * width * self.pixel)
+            at = self._bar[2] + look.unit, self._bar[3]
+            self._write(0, "scale", f"{self._length:g} mm", at, _TEXT)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._plotter.close()
 
     @property
-    def pixel(self) -> float:
-        """How long a pixel of the panel is at half depth [mm]."""
-        return self._pixel
+    def _bar(self) -> tuple[float, float, float, float]:
+        """The scale bar from the lower left [pixel]: left, top, right, bottom."""
+        unit = self._look.unit
+        return _MARGIN * unit, (_FOOT / 2 + 0.9) * unit, _MARGIN * unit + self._length / self.pixel, _FOOT / 2 * unit
 
-    def panel(self, frame: Frame, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The three-dimensional part of a picture.
+    def turn(self, axes: NDArray[np.float64]) -> None:
+        """Turn all cameras."""
+        right, up, forward = axes
+        focus = self._centre[0] * right + self._centre[1] * up
+        for column in range(self._columns):
+            self._plotter.subplot(0, column)
+            camera = self._plotter.camera
+            camera.parallel_projection = True
+            camera.parallel_scale = self.pixel * self._look.size[1] / 2
+            camera.focal_point, camera.position = tuple(focus), tuple(focus - self._reach * forward)
+            camera.up, camera.clipping_range = tuple(up), (self._reach / 1000, 2 * self._reach)
+
+    def show(
+        self,
+        column: int,
+        frame: Frame,
+        meshes: Mapping[str, pv.PolyData],
+        colours: NDArray[np.uint8],
+        caption: Caption,
+    ) -> None:
+        """Put a frame into a panel.
 
         Args:
+            column: The panel, from the left.
             frame: What to draw.
-            colours: (N, 3) of each smarticle, or (N, 3, 3) of each of its links, 0 to 255.
-
-        Returns:
-            (height, width, 3) of `Look.panel`.
+            meshes: Of `drawn`.
+            colours: (N, 3, 3) of each link of each smarticle, 0 to 255.
+            caption: What is written above.
         """
-        colours = colours if colours.ndim == 3 else np.repeat(colours[:, None], 3, axis=1)
         with quiet_vtk():
-            self._set_boxes(frame, colours)
-            self._move(frame)
-            if self._largest_force is not None:
-                self._press(frame, self._largest_force)
-            self._plotter.render()
-            pixels = self._plotter.screenshot(return_img=True)
-        return np.asarray(Image.fromarray(pixels).reduce(_OVERSAMPLING))
+            self._plotter.subplot(0, column)
+            boxes = colours[owners(meshes["smarticles"], frame)] if "smarticles" in meshes else colours[:0, 0]
+            add_bodies(self._plotter, meshes, boxes, pale="forces" in meshes)
+            unit, down = self._look.unit, self._look.size[1] - 2.0 * self._look.unit
+            for number, text in enumerate((caption.title, *caption.lines)):
+                size = _TEXT if number else _TITLE
+                down -= 1.4 * size * unit
+                self._write(column, f"line {number}", text, (_MARGIN * unit, down), size, bold=not number)
 
-    def add_plane(self, corners: NDArray[np.float64], colour: str) -> None:
-        """Adds a flat see-through patch with corners (n, 3) [mm]."""
+    def add_patch(self, corners: NDArray[np.float64], colour: str) -> None:
+        """Add a flat see-through patch with corners (n, 3) [mm]."""
         patch = pv.PolyData.from_regular_faces(corners, [list(range(len(corners)))])
-        self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, render=False)
+        self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, reset_camera=False, render=False)
 
-    def _set_boxes(self, frame: Frame, colours: NDArray[np.uint8]) -> None:
-        """Puts the boxes where they are in a frame; builds them anew only where there are more or fewer."""
-        boxes = link_boxes(
-            frame.vertices - [0.0, 0.0, frame.floor_z],
-            thickness_normal=self._run.thickness_normal,
-            thickness_in_plane=self._run.thicknesses_in_plane,
-        )
-        boxes.points *= MILLIMETRE
-        boxes.cell_data["colour"] = colours[boxes.cell_data["smarticle"], boxes.cell_data["link"]]
-        if self._boxes is not None and self._boxes.n_cells == boxes.n_cells:
-            self._boxes.points = boxes.points
-            self._boxes.cell_data["colour"] = boxes.cell_data["colour"]
-            return
-        self._boxes = boxes
-        self._plotter.add_mesh(
-            boxes,
-            scalars="colour",
-            rgb=True,
-            name="smarticles",
-            opacity=1.0 if self._largest_force is None else _PALE,
-            # Of a closed box nobody sees the faces behind; drawing them took a quarter of a film's time.
-            culling=self._largest_force is None and "back",
-            ambient=0.22,
-            diffuse=0.85,
-            specular=0.12,
-            specular_power=20,
-            show_edges=True,
-            edge_color="#101418",
-            edge_opacity=0.55,
-            line_width=0.5 * _OVERSAMPLING,
-            reset_camera=False,
-            render=False,
-        )
+    def image(self) -> Image.Image:
+        """Return the picture as it stands."""
+        with quiet_vtk():
+            self._plotter.render()
+            image = Image.fromarray(self._plotter.screenshot(return_img=True)).reduce(_OVERSAMPLING)
+        left, top, right, bottom = self._bar
+        ImageDraw.Draw(image).rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
+        return image
 
-    def _build(self, extent: NDArray[np.float64]) -> float:
-        """Builds all but smarticles; returns how long a pixel is [mm]."""
-        plotter, axes, around = self._plotter, self._axes, self._surroundings
-        plotter.set_background("white")
-        if around is not None:
-            if self._run.planar:
-                for wall in channel(extent, self._run):
-                    self._add_outline(pv.MultipleLines(wall))
-            else:
-                self._add_container(around, self._run.container_radius * MILLIMETRE, float(extent[:, 2].max()))
-            if around.hooks is not None:
-                look = {"color": _FIXTURE, "ambient": 0.25, "diffuse": 0.8, "render": False}
-                self._hooks = [plotter.add_mesh(_cross(bars), **look) for bars in around.hooks.bars]
-        width, height = self._look.panel
-        position, focus = fitted_camera(extent, axes, width / height)
-        self._light(position, focus)
-        camera = plotter.camera
-        camera.view_angle = FIELD_OF_VIEW
-        camera.position = tuple(position)
-        camera.focal_point = tuple(focus)
-        camera.up = tuple(axes[1])
-        distance = float(np.linalg.norm(position - focus))
-        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + self._run.container_radius * MILLIMETRE
-        camera.clipping_range = (max(distance - reach, distance / 1000), distance + reach)
-        if not self._quick:
-            plotter.enable_ssao(
-                radius=0.6 * self._run.middle_length * MILLIMETRE,
-                bias=0.4 * self._run.thickness_in_plane * MILLIMETRE,
-                kernel_size=64,
-                blur=True,
-            )
-        return millimetres_per_pixel(position, focus, height)
+    def panel(self) -> Image.Image:
+        """Return the bodies alone, without what is written around them."""
+        unit = self._look.unit
+        width, height = self.size
+        return self.image().crop((0, round(_HEAD * unit), width, height - round(_FOOT * unit)))
 
-    def _move(self, frame: Frame) -> None:
-        """Puts walls, hooks and strings where they are in a frame."""
-        around = self._surroundings
-        if around is None:
-            return
-        top = float(frame.vertices[..., 2].max()) - frame.floor_z
-        raised = around.raised(frame.time, frame.phase, top)
-        for part in self._wall:
-            part.visibility = raised is not None
-            part.position = (0.0, 0.0, MILLIMETRE * (raised or 0.0))
-        if self._ghost is not None:
-            self._ghost.visibility = raised is None
-        if around.hooks is not None:
-            for hook, height in zip(self._hooks, around.hooks.heights(frame.time), strict=True):
-                hook.position = (0.0, 0.0, MILLIMETRE * height)
-        if around.strings is not None:
-            self._tie((around.strings.lines(frame) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE)
+    def _write(
+        self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False
+    ) -> None:
+        """Write a line at a place from the lower left [pixel], smaller or cut where it has no room."""
+        (x, y), width = at, self._look.size[0]
+        text = "".join(letter if letter.isprintable() else "?" for letter in text)
+        points, room = size * self._look.unit, (width - x) / _LETTER
+        points = min(points, max(room / max(len(text), 1), 0.6 * points))
+        if len(text) * points > room:
+            text = f"{text[: int(room / points) - 1]}…"
+        font = findfont(FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal"))
+        colour = figures.BLACK if size == _TITLE or name == "scale" else figures.GREY
+        line = pv.Text(text, position=(_OVERSAMPLING * x, _OVERSAMPLING * y))
+        line.prop = pv.TextProperty(color=colour, font_size=round(_OVERSAMPLING * points), font_file=font)
+        self._plotter.subplot(0, column)
+        self._plotter.add_actor(line, name=name, reset_camera=False, render=False)
 
-    def _tie(self, strings: NDArray[np.float64]) -> None:
-        """Draws strings (n, 2, 3) [mm] as tubes at half height of the links, with a knot at either end."""
-        self._plotter.remove_actor("strings", render=False)
-        if not len(strings):
-            return
-        # A string has no thickness in the simulation: here one that is seen.
-        thick = max(0.06 * self._run.thickness_in_plane * MILLIMETRE, self._pixel)
-        lifted = strings + np.array([0.0, 0.0, self._run.thickness_normal * MILLIMETRE])
-        tubes = [pv.Line(*ends).tube(radius=thick) for ends in lifted]
-        knots = [pv.Sphere(radius=3 * thick, center=end) for ends in lifted for end in ends]
-        mesh = tubes[0].append_polydata(*tubes[1:], *knots)
-        self._plotter.add_mesh(mesh, name="strings", color=_FIXTURE, lighting=False, reset_camera=False, render=False)
-
-    def _press(self, frame: Frame, largest: float) -> None:
-        """Draws lines of force, the thickest for the largest normal force [N]."""
-        self._plotter.remove_actor("forces", render=False)
-        forces = read_forces(frame)
-        if not len(forces.contacts.normal):
-            return
-        lines, thickest = force_lines(forces), _THICK * self._run.thickness_in_plane
-        normal = forces.contacts.normal[lines.cell_data["contact"]]
-        tubes = force_tubes(lines, normal, thickest=thickest, largest=largest)
-        tubes.points = (tubes.points - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
-        self._plotter.add_mesh(tubes, name="forces", color=_FORCE, ambient=0.35, reset_camera=False, render=False)
-
-    def _add_container(self, around: Surroundings, radius: float, top: float) -> None:
-        plotter, forward = self._plotter, self._axes[2]
-        floor = pv.Disc(inner=0, outer=radius, c_res=180)
-        plotter.add_mesh(floor, color="#e9e9e7", ambient=0.45, diffuse=0.6, render=False)
-        corners = wall_corners(top, self._run, around)
-        rims = _back_rims(corners, forward)
-        if rims is None:
-            for outer, height in corners[1:]:
-                self._add_outline(pv.MultipleLines(circle(outer, height)))
-            return
-        outline = _outline(rims)
-        self._wall = [
-            plotter.add_mesh(_bands(rims), color="#9db4c8", opacity=0.22, lighting=False, render=False),
-            self._add_outline(outline),
-        ]
-        if around.removed is not None:
-            self._ghost = self._add_outline(outline, opacity=0.3)
-        self._add_outline(pv.MultipleLines(circle(radius, 0.0)))
-
-    def _add_outline(self, lines: pv.PolyData, *, opacity: float = 1.0) -> Any:
-        return self._plotter.add_mesh(
-            lines,
-            opacity=opacity,
-            color="#7d8f9f",
-            line_width=1.8 * _OVERSAMPLING,
-            lighting=False,
-            render=False,
-        )
-
-    def _light(self, position: NDArray[np.float64], focus: NDArray[np.float64]) -> None:
-        right, up, forward = self._axes
-        distance = float(np.linalg.norm(position - focus))
-        for side, rise, strength in ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25)):
-            source = focus + distance * (side * right + rise * up - forward)
-            self._plotter.add_light(
-                pv.Light(
-                    position=tuple(source),
-                    focal_point=tuple(focus),
-                    intensity=strength,
-                    light_type="scene light",
-                )
-            )
+    def _add_colour_bar(self, scale: ColourScale, colours: Colormap) -> None:
+        unit, height = self._look.unit * _OVERSAMPLING, self._look.size[1]
+        table = pv.LookupTable(colours, n_values=min(colours.N, 256), scalar_range=(scale.low, scale.high))
+        table.annotations = dict(scale.labels)
+        mapper = pv.DataSetMapper(pv.PolyData())
+        mapper.lookup_table = table
+        self._plotter.subplot(0, self._columns - 1)
+        self._plotter.add_scalar_bar(
+            self._look.field.title, mapper=mapper, vertical=False, n_labels=0, color=figures.BLACK, render=False,
+            position_x=0.45, position_y=3.2 * self._look.unit / height, width=0.52,
+            height=5.6 * self._look.unit / height,
+            title_font_size=round(_TEXT * unit), label_font_size=round(_TEXT * unit), use_opacity=False,
+        )  # fmt: skip
 
 
-def _back_rims(corners: Sequence[tuple[float, float]], forward: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The halves (m, n, 3) of a wall's rims that face the camera from behind; None seen from above."""
-    if math.hypot(forward[0], forward[1]) < 1e-9:
-        return None
-    middle = math.atan2(forward[1], forward[0])
-    angle = middle + np.linspace(-math.pi / 2, math.pi / 2, 91)
-    arc = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-    return np.stack([radius * arc + [0.0, 0.0, height] for radius, height in corners])
+def round_length(most: float) -> float:
+    """Return the largest of 1, 2, 5, 10, … that is no longer than a length above 0, in its unit.
+
+    Example:
+        >>> round_length(37.0), round_length(0.6)
+        (20.0, 0.5)
+    """
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most * (1 + 1e-9))
 
 
-def _bands(rims: NDArray[np.float64]) -> pv.PolyData:
-    """The surface between successive rims (m, n, 3)."""
-    count, points = rims.shape[:2]
-    first = (points * np.arange(count - 1)[:, None] + np.arange(points - 1)).ravel()
-    faces: Any = np.stack([first, first + 1, first + points + 1, first + points], axis=1)
-    mesh: pv.PolyData = pv.PolyData.from_regular_faces(rims.reshape(-1, 3), faces)
-    return mesh
+def check_graphics() -> None:
+    """Reject a machine on which VTK would end the process by a segmentation fault.
+
+    Raises:
+        RunError: There is neither a display nor a library to draw without one.
+    """
+    if sys.platform != "linux" or os.environ.get("DISPLAY"):
+        return
+    for library in ("libEGL.so.1", "libOSMesa.so.8"):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return
+    msg = (
+        "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
+    )
+    raise RunError(msg)
 
 
-def _outline(rims: NDArray[np.float64]) -> pv.PolyData:
-    """Both edges of a wall, and every rim of it but the lowest, (m, n, 3)."""
-    lines = [rims[:, 0], *rims[1:], rims[:, -1]]
-    first, *rest = (pv.MultipleLines(line) for line in lines)
-    mesh: pv.PolyData = first.append_polydata(*rest)
-    return mesh
-
-
-def _cross(bars: Sequence[Bounds]) -> pv.PolyData:
-    """The bars of a hook, centred at the origin [mm]."""
-    first, *rest = (pv.Box(tuple(MILLIMETRE * bound for bound in bar)) for bar in bars)
-    mesh: pv.PolyData = first.append_polydata(*rest)
-    return mesh
+@contextmanager
+def quiet_vtk() -> Iterator[None]:
+    """Keep VTK from warning, on standard error, that there is no display."""
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)

@@ -1,35 +1,22 @@
-"""What is said above a picture: which run, which time, and the two numbers that `smarticles measure` gives of it."""
+"""What is written above a picture: run, time, and the two numbers that `smarticles measure` gives of it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from postprocess.pictures.canvas import Caption
 
 DEFINITION = "second-highest-com"
-"""Definition of the packing fraction that pictures tell, as the first column of `smarticles measure`."""
-
-
-@dataclass(frozen=True)
-class Caption:
-    """A title, and lines below it."""
-
-    title: str
-    lines: tuple[str, ...]
+"""Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
 
 
 def titles_of(runs: Sequence[RunManifest]) -> list[str]:
-    """What pictures of runs beside each other are called: by their names, with their folders where these are alike."""
+    """Return the headings of runs beside each other: their names, with their folders where these are alike."""
     names = [run.name for run in runs]
     if len(set(names)) == len(names):
         return names
@@ -42,23 +29,14 @@ def titles_of(runs: Sequence[RunManifest]) -> list[str]:
     return [f"{name} ({'/'.join(folder.parts[-depth:])})" for name, folder in zip(names, folders, strict=True)]
 
 
-def caption_of(
-    frame: Frame,
-    run: RunManifest,
-    *,
-    pace: str = "",
-    force: float | None = None,
-    crossings: NDArray[np.int64] | None = None,
-    title: str | None = None,
-) -> Caption:
-    """The caption of a frame.
+def caption_of(frame: Frame, run: RunManifest, *, title: str, pace: str = "", force: float | None = None) -> Caption:
+    """Return the caption of a frame.
 
     Args:
         frame: One of the run's frames.
         run: The run.
+        title: The heading.
         pace: How fast a film plays; empty for a picture.
-        title: What the run is called; its name if not given.
-        crossings: Of all smarticles, where they are known already.
         force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
     count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
@@ -68,16 +46,16 @@ def caption_of(
     if pace:
         lines[0] += f"   {pace}"
     if not run.planar:  # neither packing nor crossings have a meaning there
-        mean = entanglement(frame.vertices, crossings).mean
+        mean = entanglement(frame.vertices).mean
         passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {passed}")
     if force is not None:
         lines[-1] += f"   widest line: {1e3 * force:.3g} mN"
-    return Caption(run.name if title is None else title, tuple(lines))
+    return Caption(title, tuple(lines))
 
 
 def packing_text(frame: Frame, run: RunManifest) -> str:
-    """φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
+    """Return φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
     value = packing_of(frame, run, definition=DEFINITION)
     if math.isfinite(value):
         return f"φ = {value:.4f} ({DEFINITION})"

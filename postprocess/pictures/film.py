@@ -1,42 +1,136 @@
-"""Films from pictures: `.gif` and `.webp` by Pillow, `.mp4` by the ffmpeg of the package imageio-ffmpeg."""
+"""Films: which frames they show, how fast they play, and their files."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from PIL import Image
-from scipy.spatial import cKDTree
 
 from dem.errors import InputError
-from postprocess.pictures.moments import durations
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 KINDS = (".gif", ".webp", ".mp4")
 """Suffixes of films."""
 
-# What a format can tell of the time that a picture is shown [s].
-_TICKS = {".gif": 0.01, ".webp": 0.001}
-_COLOURS = 256  # of a GIF
+MOST = 150
+"""Pictures of a film, unless a time between them is asked for."""
+
+RATE = 15.0
+"""Pictures per second of a film [1/s], unless asked for."""
+
+_TICKS = {".gif": 0.01, ".webp": 0.001}  # unit of the time that a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))
+# 4:2:0 colours and the index in front, which browsers, phones and slides play.
 _H264 = ("-crf", "18", "-movflags", "+faststart", "-vf", "scale=out_color_matrix=bt709", *_BT709)
 
 
-def check_film(path: Path, size: tuple[int, int]) -> None:
-    """Complains before anything is drawn.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moments:
+    """Times at equal distances, so that a film plays at one speed.
+
+    Attributes:
+        times: (n,) simulated times [s]; each is shown by the recorded frame nearest to it.
+        every: From one to the next [s].
+        rate: Pictures per second [1/s].
+    """
+
+    times: NDArray[np.float64] = field(repr=False)
+    every: float
+    rate: float
+
+    @property
+    def pace(self) -> str:
+        """Simulated time over playing time, in words."""
+        return f"{float(f'{self.every * self.rate:.3g}'):g} × real time"
+
+    @classmethod
+    def chosen(
+        cls,
+        recorded: ArrayLike,
+        *,
+        start: float | None = None,
+        end: float | None = None,
+        every: float | None = None,
+        rate: float = RATE,
+        most: int = MOST,
+    ) -> Self:
+        """Return the moments of a film.
+
+        Args:
+            recorded: (m,) times of the frames, ascending [s].
+            start: First moment [s]; the first frame if not given.
+            end: Last moment at most [s]; the last frame if not given.
+            every: From one moment to the next [s]; if not given the time between frames, or a multiple of it that
+                makes no more than `most`.
+            rate: Pictures per second [1/s].
+            most: See `every`.
+
+        Raises:
+            InputError: Fewer than two moments, or times out of order or out of the run.
+        """
+        recorded = np.asarray(recorded, dtype=np.float64)
+        if len(recorded) < 2:
+            msg = f"a film needs at least 2 frames: got {len(recorded)}; draw a picture, .png"
+            raise InputError(msg)
+        if not (math.isfinite(rate) and 0 < rate <= 100):
+            msg = f"fps must be above 0 and up to 100 pictures per second: got {rate:g}; {RATE:g} is usual"
+            raise InputError(msg)
+        first, last = float(recorded[0]), float(recorded[-1])
+        low, high = first if start is None else start, last if end is None else end
+        slack = 1e-9 * max(abs(first), abs(last), 1.0)
+        if not first - slack <= low < high <= last + slack:
+            msg = (
+                f"a film must begin before it ends, within {first:g} s to {last:g} s, the run's frames: "
+                f"got {low:g} s to {high:g} s"
+            )
+            raise InputError(msg)
+        spacing = float(np.median(np.diff(recorded)))
+        if every is None:
+            every = spacing * max(1, math.ceil((high - low) / spacing / (most - 1) - 1e-6))
+        elif not (math.isfinite(every) and every >= spacing * (1 - 1e-6)):
+            msg = f"every must be {spacing:g} s or more, the time between the run's frames: got {every:g} s"
+            raise InputError(msg)
+        steps = math.floor((high - low) / every + 1e-6)
+        if steps < 1:
+            msg = f"every {every:g} s leaves one picture between {low:g} s and {high:g} s; choose less"
+            raise InputError(msg)
+        return cls(times=low + every * np.arange(steps + 1.0), every=every, rate=rate)
+
+    def indices(self, recorded: NDArray[np.float64]) -> list[int]:
+        """Return the frame nearest to each moment, of frames at (m,) times [s]."""
+        nearest: list[int] = np.abs(recorded[None] - self.times[:, None]).argmin(axis=1).tolist()
+        return nearest
+
+
+def durations(count: int, rate: float, unit: float) -> list[int]:
+    """Return how long each of some pictures is shown, in whole units of time, right to half a unit in sum.
 
     Args:
-        path: The film to be.
-        size: Width and height [pixel].
+        count: Pictures.
+        rate: Pictures per second [1/s].
+        unit: [s].
+
+    Example:
+        >>> durations(4, 15.0, 0.01)
+        [7, 6, 7, 7]
+    """
+    return [after - before for before, after in pairwise(round(k / rate / unit) for k in range(count + 1))]
+
+
+def check_film(path: Path, size: tuple[int, int]) -> None:
+    """Complain before anything is drawn.
 
     Raises:
-        InputError: Such a film cannot be written here: a package is missing, or the size does not
-            suit.
+        InputError: Such a film cannot be written here: a package is missing, or the size [pixel] does not suit.
     """
     if path.suffix != ".mp4":
         return
@@ -50,106 +144,31 @@ def check_film(path: Path, size: tuple[int, int]) -> None:
         raise InputError(msg) from None
 
 
-def write_film(
-    path: Path,
-    images: Iterable[Image.Image],
-    *,
-    count: int,
-    rate: float,
-    samples: Sequence[Image.Image],
-    keys: NDArray[np.uint8],
-) -> None:
-    """Writes a film, one picture at a time.
-
-    An `.mp4` is H.264 with 4:2:0 colours and its index in front, which browsers, phones and slides play.
+def write_film(path: Path, images: Iterable[Image.Image], *, count: int, rate: float) -> None:
+    """Write a film, one picture at a time.
 
     Args:
         path: With a suffix of `KINDS`.
         images: All of one size.
         count: How many.
         rate: Pictures per second [1/s].
-        samples: Some of the pictures. A `.gif` has 256 colours; they are chosen once for the whole film, or colours
-            would flicker.
-        keys: (n, 3) colours that a `.gif` shall have exactly, 0 to 255: those of the colour bar.
     """
-    if path.suffix == ".mp4":
-        _write_mp4(path, images, rate)
-        return
     frames = iter(images)
-    if path.suffix == ".gif":
-        frames = map(Palette.of(samples, keys).indexed, frames)
+    first = next(frames)
+    if path.suffix == ".mp4":
+        encoder: Any = importlib.import_module("imageio_ffmpeg")
+        writer = encoder.write_frames(
+            str(path), first.size, pix_fmt_in="rgb24", pix_fmt_out="yuv420p", fps=rate, codec="libx264", quality=None,
+            macro_block_size=2, output_params=[*_H264],
+        )  # fmt: skip
+        writer.send(None)
+        try:
+            for image in (first, *frames):
+                writer.send(np.ascontiguousarray(image.convert("RGB")))
+        finally:
+            writer.close()
+        return
     tick = _TICKS[path.suffix]
     shown = [round(1000 * tick) * ticks for ticks in durations(count, rate, tick)]
-    first = next(frames)
     options: dict[str, Any] = {"lossless": True, "method": 2} if path.suffix == ".webp" else {"optimize": False}
     first.save(path, save_all=True, append_images=frames, duration=shown, loop=0, **options)
-
-
-class Palette:
-    """The 256 colours of a film.
-
-    Args:
-        colours: (256, 3), 0 to 255.
-    """
-
-    def __init__(self, colours: NDArray[np.uint8]) -> None:
-        self._bytes = colours.ravel().tolist()
-        # Pillow looks for the nearest colour once per cube of 4 x 4 x 4 colours, and so misses exact ones.
-        self._tree = cKDTree(colours.astype(np.float64))
-
-    @classmethod
-    def of(cls, samples: Sequence[Image.Image], keys: NDArray[np.uint8]) -> Self:
-        """The keys, and what suits all samples best besides.
-
-        Median cut alone gives colours by the area they cover: two steps of a colour bar that few smarticles have would
-        share one.
-
-        Args:
-            samples: Pictures.
-            keys: (n, 3) colours, 0 to 255; up to 128 of them are kept.
-        """
-        kept = np.unique(np.asarray(keys, dtype=np.uint8).reshape(-1, 3), axis=0)[:128]
-        pixels = np.concatenate([np.asarray(image.convert("RGB")).reshape(-1, 3) for image in samples])
-        # White is most of a picture: every colour counts once for each of its shades.
-        shades = np.unique(pixels // 4 * 4 + 2, axis=0)
-        found = Image.fromarray(shades[None]).quantize(_COLOURS - len(kept) - 2, kmeans=2)
-        extra = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
-        colours = np.zeros((_COLOURS, 3), dtype=np.uint8)
-        listed = np.concatenate([[[255, 255, 255], [0, 0, 0]], kept, extra])[:_COLOURS]
-        colours[: len(listed)] = listed
-        return cls(colours)
-
-    def indexed(self, image: Image.Image) -> Image.Image:
-        """A picture in these colours, the nearest of each pixel."""
-        pixels = np.asarray(image.convert("RGB")).astype(np.int64)
-        packed = (pixels[..., 0] << 16) | (pixels[..., 1] << 8) | pixels[..., 2]
-        different, which = np.unique(packed, return_inverse=True)
-        channels = np.stack([different >> 16, different >> 8 & 255, different & 255], axis=1)
-        _, nearest = self._tree.query(channels.astype(np.float64))
-        result = Image.fromarray(nearest.astype(np.uint8)[which.reshape(packed.shape)])
-        result.putpalette(self._bytes)
-        return result
-
-
-def _write_mp4(path: Path, images: Iterable[Image.Image], rate: float) -> None:
-    encoder: Any = importlib.import_module("imageio_ffmpeg")
-    writer: Any = None
-    try:
-        for image in images:
-            if writer is None:
-                writer = encoder.write_frames(
-                    str(path),
-                    image.size,
-                    pix_fmt_in="rgb24",
-                    pix_fmt_out="yuv420p",
-                    fps=rate,
-                    codec="libx264",
-                    quality=None,
-                    macro_block_size=2,
-                    output_params=[*_H264],
-                )
-                writer.send(None)
-            writer.send(np.ascontiguousarray(image.convert("RGB")))
-    finally:
-        if writer is not None:
-            writer.close()

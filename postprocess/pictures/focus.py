@@ -12,11 +12,8 @@ from PIL import Image
 from dem.errors import InputError
 from postprocess.geometry.links import plane_frames
 from postprocess.measures.entanglement import has_plane, link_passages
-from postprocess.pictures.camera import MILLIMETRE, Look
-from postprocess.pictures.canvas import Canvas
-from postprocess.pictures.captions import Caption
-from postprocess.pictures.page import Page
-from postprocess.pictures.shot import Shot
+from postprocess.pictures.canvas import MILLIMETRE, Canvas, Caption, Look, drawn, rectangle
+from postprocess.pictures.render import Shot
 from postprocess.report import figures
 
 if TYPE_CHECKING:
@@ -27,7 +24,7 @@ _ASKEW = np.radians([25.0, 20.0])  # how far the camera looks past the normal, a
 
 
 def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Image.Image:
-    """A picture of one smarticle and of those that pass through its plane.
+    """Draw one smarticle and those that pass through its plane.
 
     It is orange, the plane through its four vertices faintly so; links that pass through are blue, other links of
     theirs grey. The camera looks through its mouth, somewhat askew.
@@ -68,16 +65,10 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
     colours[:] = _bytes(_OTHERS)
     colours[shown == own] = _bytes(figures.ORANGE)
     colours[np.searchsorted(shown, passages.j[through]), passages.link[through]] = _bytes(figures.BLUE)
-
-    look = Look.checked(color_by="id", size=size, view="front")
-    corners = (frame.vertices[own] - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
-    points = (part.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
-    thick = run.thickness_normal * MILLIMETRE
-    links = int(through.sum())
+    links, others = int(through.sum()), len(shown) - 1
+    said = "straight: it has no plane"
     if has_plane(frame.vertices[own][None])[0]:
-        said = f"{links} link{'s' * (links != 1)} of {len(shown) - 1} other{'s' * (len(shown) != 2)} through its plane"
-    else:
-        said = "straight: it has no plane"
+        said = f"{links} link{'s' * (links != 1)} of {others} other{'s' * (others != 1)} through its plane"
     caption = Caption(
         f"{run.name}: smarticle {smarticle}",
         (
@@ -85,15 +76,17 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
             "orange: the smarticle, faintly its plane; blue: links through it",
         ),
     )
-    extent = np.concatenate([points - thick, points + thick])
-    with Canvas(run, look, None, extent, axes=_through_the_mouth(frame.vertices[own])) as canvas:
-        canvas.add_plane(corners, figures.ORANGE)
-        panel = canvas.panel(part, colours)
-        return Page(look, None, canvas.pixel).picture([panel], [caption])
+    axes = _through_the_mouth(frame.vertices[own])
+    look = replace(Look.checked(run, color_by="id", size=size, view="front"), axes=axes)
+    boxes = {"smarticles": drawn(shot.bodies, part, axes[2])["smarticles"]}
+    with Canvas(look, rectangle(boxes.values(), axes), run) as canvas:
+        canvas.add_patch((frame.vertices[own] - [0.0, 0.0, frame.floor_z]) * MILLIMETRE, figures.ORANGE)
+        canvas.show(0, part, boxes, colours, caption)
+        return canvas.image()
 
 
 def _through_the_mouth(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) rows: right, along the middle link, up, towards the mouth, and forward; turned by `_ASKEW`."""
+    """Return axes (3, 3): right, along the middle link, up, towards the mouth, and forward; turned by `_ASKEW`."""
     normal = plane_frames(vertices[None])[0, 2]
     right = vertices[2] - vertices[1]
     right -= (right @ normal) * normal

@@ -1,33 +1,65 @@
-"""Pictures and films of runs, off-screen: what is drawn, and where to. How is in `postprocess.pictures.canvas`."""
+"""Pictures and films of runs, off-screen."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
+from dem.record.forces import read_forces
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.manifest import RunManifest, read_run
+from postprocess.bodies.colours import ColourScale, Span, scalars, span
+from postprocess.bodies.fields import BY_NAME, IDENTITY
+from postprocess.bodies.meshes import USUAL, Bodies
 from postprocess.pictures import film
-from postprocess.pictures.camera import Look
-from postprocess.pictures.canvas import Canvas
+from postprocess.pictures.canvas import VIEWS, Canvas, Caption, Look, Rectangle, axes_from, drawn, rectangle, union
 from postprocess.pictures.captions import caption_of, titles_of
-from postprocess.pictures.colouring import COLOURINGS, ColourScale
-from postprocess.pictures.focus import focused
-from postprocess.pictures.moments import MOST, RATE, Moments
-from postprocess.pictures.page import Page, page_size
-from postprocess.pictures.shot import Shot, Span, common_times, span_of
 from postprocess.report import figures
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Limits = Span | Literal["run"] | None
 """Ends of the scale of colours: given, of all frames of the runs, or of what is shown."""
 
-Track = Callable[[Iterable[int], int], Iterable[int]]
+Track = Callable[[Iterable[Image.Image], int], Iterable[Image.Image]]
 """Follows the pictures of a film, of which there are so many."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shot:
+    """A run to be drawn."""
+
+    run: RunManifest
+    frames: FrameSequence = field(repr=False)
+    bodies: Bodies = field(repr=False)
+
+    @classmethod
+    def of(cls, directory: Path | str, *, forces: bool = False) -> Self:
+        """Return a shot of a run directory.
+
+        Raises:
+            InputError: Something of it is missing or damaged, or forces are wanted and not recorded.
+        """
+        run = read_run(directory)
+        kinds = (*USUAL, "forces") if forces else USUAL
+        bodies = Bodies(run, kinds, [BY_NAME[name] for name in IDENTITY], cut=True)
+        return cls(run=run, frames=read_frames(directory), bodies=bodies)
+
+    def room(self, indices: Iterable[int], axes: NDArray[np.float64]) -> Rectangle:
+        """Return what the camera must have in view to show some frames [mm]."""
+        return union([rectangle(drawn(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
+
+    def values(self, indices: Iterable[int], look: Look) -> list[NDArray[np.float64]]:
+        """Return values (N, 3) that the colours of some frames show."""
+        return [scalars(look.field, self.frames[i], self.run) for i in indices]
 
 
 def render_run(
@@ -44,18 +76,16 @@ def render_run(
     forces: bool = False,
     overwrite: bool = False,
 ) -> Path:
-    """Draws one frame of a run: every link as its real box, in a container cut open in front, with hooks and strings.
+    """Draw one frame of a run: every link as its real box, in a container cut open in front, with hooks and strings.
 
-    A cylinder is drawn up to a little above the pile, a mould of tiers as it is. A wall that is being lifted is where
-    it is then; of one that was taken away its outline is left, faint. A bar tells how long a millimetre is half way
-    between the nearest and the farthest point.
+    A wall that is being lifted is where it is then; of one that was taken away its outline is left, faint.
 
     Args:
         directory: A run directory with at least one frame; the run need not be done.
         compare: Further runs, drawn beside it at the same time, from the same distance and in the same colours.
         output: File to write, `.png`; `render.png` in the run directory if not given.
         time: Simulated time [s], the nearest frame is taken; the last one that all runs have if not given.
-        color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
+        color_by: Name of a field, or height, speed, id; None: crossings, and of motion in a plane, which has none, id.
         limits: Ends of the scale of colours; those of this picture if not given.
         smarticle: Number of a smarticle: only it and those that pass through its plane are drawn, looked at through
             its mouth.
@@ -69,7 +99,7 @@ def render_run(
         The file written.
 
     Raises:
-        InputError: No frame, unknown colouring or view, a time before the first or after the last
+        InputError: No frame, unknown field or view, a time before the first or after the last
             frame, a bad size, bad limits, no such smarticle, or an output that exists.
         RunError: This machine lacks the libraries to draw without a display.
 
@@ -78,21 +108,22 @@ def render_run(
         'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",))
-    shots = [Shot.of(path) for path in (directory, *compare)]
+    shots = [Shot.of(path, forces=forces) for path in (directory, *compare)]
     if time is None and compare:
         time = float(common_times(shots)[-1])
-    indices = [[shot.frame_at(time)] for shot in shots]
+    indices = [[len(shot.frames) - 1 if time is None else shot.frames.nearest(time)] for shot in shots]
     look = _look(shots, color_by, size, view)
     # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
     figures.refuse_to_overwrite(output, overwrite=overwrite)
     if smarticle is not None:
+        from postprocess.pictures.focus import focused  # noqa: PLC0415  (imports this module)
+
         if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
             raise InputError(msg)
         image = focused(shots[0], indices[0][0], smarticle, size)
     else:
-        with _Set(shots, indices, look, limits, quick=False, forces=forces) as scenery:
-            image = scenery.picture([frames[0] for frames in indices])
+        image = next(pictures(shots, indices, look, limits))
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
@@ -107,26 +138,26 @@ def render_film(
     limits: Limits = None,
     size: tuple[int, int] = (720, 720),
     view: str | None = None,
-    frames_per_second: float = RATE,
+    frames_per_second: float = film.RATE,
     start: float | None = None,
     end: float | None = None,
     every: float | None = None,
-    most_frames: int = MOST,
+    most_frames: int = film.MOST,
     forces: bool = False,
     track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Draws a film of a run with one camera and one scale of colours throughout.
+    """Draw a film of a run with one camera and one scale of colours throughout.
 
     Its pictures are at equal distances in simulated time, each the nearest recorded frame, so that it plays at one
-    speed, which its caption tells.
+    speed, which its caption states.
 
     Args:
         directory: A run directory with at least two frames.
         output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg;
             `film.gif` in the run directory if not given.
         compare: Further runs, as in `render_run`; the film shows the times that all have come to.
-        color_by: Key of `COLOURINGS`; None: crossings, and of motion in a plane, which has none, id.
+        color_by: As in `render_run`.
         limits: Ends of the scale of colours; those of the film if not given.
         size: Width and height of the picture of one run [pixel]; for `.mp4` even numbers.
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
@@ -148,134 +179,129 @@ def render_film(
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS)
     if most_frames < 2:
-        msg = f"a film needs most_frames of at least 2: got {most_frames}; leave it out for {MOST}"
+        msg = f"a film needs most_frames of at least 2: got {most_frames}; leave it out for {film.MOST}"
         raise InputError(msg)
-    shots = [Shot.of(path) for path in (directory, *compare)]
+    shots = [Shot.of(path, forces=forces) for path in (directory, *compare)]
     look = _look(shots, color_by, size, view)
-    film.check_film(output, page_size(look, len(shots)))
-    moments = Moments.chosen(
+    film.check_film(output, (size[0] * len(shots), size[1]))
+    moments = film.Moments.chosen(
         common_times(shots), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
     )
-    indices = [moments.indices(shot.frames.times).tolist() for shot in shots]
+    indices = [moments.indices(shot.frames.times) for shot in shots]
     figures.refuse_to_overwrite(output, overwrite=overwrite)
-    numbers = range(len(moments.times))
-    with (
-        _Set(shots, indices, look, limits, quick=True, forces=forces) as scenery,
-        figures.whole_file(output, overwrite=overwrite) as temporary,
-    ):
-
-        def picture(number: int) -> Image.Image:
-            return scenery.picture([frames[number] for frames in indices], pace=moments.pace)
-
-        last = numbers[-1]
-        sampled = sorted({0, last // 3, 2 * last // 3, last}) if output.suffix == ".gif" else []
-        film.write_film(
-            temporary,
-            map(picture, numbers if track is None else track(numbers, len(numbers))),
-            count=len(numbers),
-            rate=moments.rate,
-            samples=[picture(number) for number in sampled],
-            keys=scenery.scale.keys,
-        )
+    images, count = pictures(shots, indices, look, limits, quick=True, pace=moments.pace), len(moments.times)
+    with figures.whole_file(output, overwrite=overwrite) as temporary:
+        film.write_film(temporary, track(images, count) if track else images, count=count, rate=moments.rate)
     return output
 
 
-class _Set:
-    """Runs side by side under one camera, in one scale of colours.
+def turntable(directory: Path | str, *, views: int = 24, size: int = 560, elevation: float = 26.0) -> list[Image.Image]:
+    """Draw the last frame of a run from all around, at equal angles from the front.
+
+    Raises:
+        InputError: No frame, or a damaged one.
+        RunError: This machine lacks the libraries to draw without a display.
+    """
+    shot = Shot.of(directory)
+    frame = shot.frames[-1]
+    shot.bodies.hold([frame])
+    look = _look([shot], None, (size, size), None)
+    around = [axes_from(VIEWS["front"][0] + 360.0 * number / views, elevation) for number in range(views)]
+    values = shot.values([len(shot.frames) - 1], look)[0]
+    colours = ColourScale.of(look.field, span([values])).painted(values)
+    room = union([shot.room([len(shot.frames) - 1], axes) for axes in around])
+    images = []
+    with Canvas(replace(look, axes=around[0]), room, shot.run, quick=True) as canvas:
+        for axes in around:
+            canvas.turn(axes)
+            canvas.show(0, frame, drawn(shot.bodies, frame, axes[2]), colours, Caption("", ()))
+            images.append(canvas.panel())
+    return images
+
+
+def pictures(
+    shots: Sequence[Shot],
+    indices: Sequence[Sequence[int]],
+    look: Look,
+    limits: Limits = None,
+    *,
+    quick: bool = False,
+    pace: str = "",
+) -> Iterator[Image.Image]:
+    """Draw runs side by side under one camera, in one scale of colours, picture after picture.
 
     Args:
         shots: The runs.
-        indices: Of the frames of each that are to be shown.
-        look: Of each.
+        indices: Of the frames of each that are shown.
+        look: Of each panel.
         limits: Ends of the scale.
         quick: See `Canvas`.
-        forces: Whether lines of force are drawn.
-
-    Raises:
-        InputError: A run records no forces, or as in `render_run`.
+        pace: For the captions of a film.
     """
+    titles = titles_of([shot.run for shot in shots])
+    pairs = list(zip(shots, indices, strict=True))
+    for shot, shown in pairs:
+        shot.bodies.hold(shot.frames[i] for i in shown)
+    values = [dict(zip(shown, shot.values(shown, look), strict=True)) for shot, shown in pairs]
+    scale = ColourScale.of(look.field, _span(shots, values, look, limits))
+    force = None
+    if "forces" in shots[0].bodies.kinds:
+        force = max(_largest_force(shot, shown) for shot, shown in pairs)
+    room = union([shot.room(shown, look.axes) for shot, shown in pairs])
+    with Canvas(look, room, shots[0].run, columns=len(shots), scale=scale, quick=quick) as canvas:
+        for step in zip(*indices, strict=True):
+            for column, (shot, index) in enumerate(zip(shots, step, strict=True)):
+                frame = shot.frames[index]
+                meshes = drawn(shot.bodies, frame, look.axes[2], largest=force)
+                caption = caption_of(frame, shot.run, title=titles[column], pace=pace, force=force)
+                canvas.show(column, frame, meshes, scale.painted(values[column][index]), caption)
+            yield canvas.image()
 
-    def __init__(
-        self,
-        shots: Sequence[Shot],
-        indices: Sequence[Sequence[int]],
-        look: Look,
-        limits: Limits,
-        *,
-        quick: bool,
-        forces: bool,
-    ) -> None:
-        self._shots = shots
-        self._look = look
-        self._titles = titles_of([shot.run for shot in shots])
-        pairs = list(zip(shots, indices, strict=True))
-        self._values = [dict(zip(frames, shot.values(frames, look), strict=True)) for shot, frames in pairs]
-        self.scale = ColourScale.of(look.colouring, *self._span(limits))
-        self._largest = max(shot.largest_force(frames) for shot, frames in pairs) if forces else None
-        extents = [shot.extent(frames, look) for shot, frames in pairs]
-        # All walls are drawn as high as the highest pile asks for, and some are wider than that one's.
-        top = float(np.concatenate(extents)[:, 2].max())
-        extents += [shot.rims(top, look) for shot in shots]
-        self._stack = ExitStack()
-        with ExitStack() as stack:
-            self._canvases = [
-                stack.enter_context(
-                    Canvas(
-                        shot.run, look, shot.around, np.concatenate(extents), quick=quick, largest_force=self._largest
-                    )
-                )
-                for shot in shots
-            ]
-            self._stack = stack.pop_all()
-        self._page = Page(look, self.scale, self._canvases[0].pixel, columns=len(shots))
 
-    def __enter__(self) -> _Set:
-        return self
+def _largest_force(shot: Shot, indices: Sequence[int]) -> float:
+    """Return the largest normal force at a contact in some frames [N]; a millinewton where there is none."""
+    return max(float(read_forces(shot.frames[i]).contacts.normal.max(initial=0.0)) for i in indices) or 1e-3
 
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
 
-    def _span(self, limits: Limits) -> Span:
-        if isinstance(limits, tuple):
-            low, high = limits
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                msg = f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}"
-                raise InputError(msg)
-            return low, high
-        if limits == "run":
-            return span_of(
-                values for shot in self._shots for values in shot.values(range(len(shot.frames)), self._look)
-            )
-        return span_of(values for of_run in self._values for values in of_run.values())
-
-    def picture(self, indices: Sequence[int], *, pace: str = "") -> Image.Image:
-        """One picture of a frame of each run."""
-        panels, captions = [], []
-        parts = zip(self._shots, self._canvases, self._values, self._titles, indices, strict=True)
-        for shot, canvas, values, title, index in parts:
-            frame = shot.frames[index]
-            panels.append(canvas.panel(frame, self.scale.colours(values[index])))
-            known = values[index] if self._look.colouring is COLOURINGS["crossings"] else None
-            captions.append(caption_of(frame, shot.run, pace=pace, title=title, force=self._largest, crossings=known))
-        return self._page.picture(panels, captions)
+def _span(shots: Sequence[Shot], values: Sequence[dict[int, NDArray[np.float64]]], look: Look, limits: Limits) -> Span:
+    if isinstance(limits, tuple):
+        low, high = limits
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            msg = f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}"
+            raise InputError(msg)
+        factor = look.field.shown[0] if look.field.shown else 1.0
+        return low / factor, high / factor
+    if limits == "run":
+        return span(each for shot in shots for each in shot.values(range(len(shot.frames)), look))
+    return span(each for of_run in values for each in of_run.values())
 
 
 def _look(shots: Sequence[Shot], color_by: str | None, size: tuple[int, int], view: str | None) -> Look:
-    planar = shots[0].run.planar
-    if any(shot.run.planar != planar for shot in shots):
+    if len({shot.run.planar for shot in shots}) > 1:
         msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
         raise InputError(msg)
-    return Look.checked(
-        color_by=color_by or ("id" if planar else "crossings"), size=size, view=view or ("top" if planar else "front")
-    )
+    return Look.checked(shots[0].run, color_by=color_by, size=size, view=view)
 
 
-def _checked_output(
-    directory: Path | str,
-    output: Path | str | None,
-    default: str,
-    kinds: tuple[str, ...],
-) -> Path:
+def common_times(shots: Sequence[Shot]) -> NDArray[np.float64]:
+    """Return times of the frames that all runs have come to: those of the one with the fewest [s].
+
+    Raises:
+        InputError: There is no time at which all have frames.
+    """
+    low = max(float(shot.frames.times[0]) for shot in shots)
+    high = min(float(shot.frames.times[-1]) for shot in shots)
+    if low > high:
+        spans = ", ".join(
+            f"{shot.run.directory} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots
+        )
+        msg = f"the runs have no time in common: {spans}; compare runs that overlap in time"
+        raise InputError(msg)
+    inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]
+    return min(inside, key=len)
+
+
+def _checked_output(directory: Path | str, output: Path | str | None, default: str, kinds: tuple[str, ...]) -> Path:
     path = Path(directory) / default if output is None else Path(output)
     if path.suffix not in kinds:
         msg = f"{path}: the output must end in {' or '.join(kinds)}: got '{path.suffix}'"

@@ -1,17 +1,19 @@
-"""The page and its server: controls, what they do, and the address that only this user has."""
+"""The page of a run and its server, for whoever has the address with its token, on this machine."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import os
+import secrets
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from aiohttp import web
 from trame.app import get_server
 from trame.ui.html import DivLayout
 from trame.widgets import client, html
@@ -19,9 +21,19 @@ from trame.widgets import vtk as vtk_widgets
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from dem.errors import InputError
-from postprocess.view.guard import HOST, address, new_token, protect
 from postprocess.view.run_view import RunView, colour_names
 
+HOST = "127.0.0.1"
+"""The loopback interface: nobody else's machine reaches it."""
+
+# The page's script compiles its templates as it runs; it may speak to this server and to nobody else.
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' {own} "
+    "data: blob:; frame-ancestors 'none'; base-uri 'self'; form-action 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
 _LOOK_EVERY = 1.0  # s, for new frames
 _FILM_STEP = 0.12  # s between frames while it plays
 _CLOSED_FOR = 5  # s without a window until the server ends; a page that is loaded anew comes back sooner
@@ -58,7 +70,7 @@ class Viewer:
         self._view = view
         self._port = port
         self._opened = opened
-        self._token = new_token()
+        self._token = secrets.token_urlsafe(32)
         self._web: Any = None
         self._server: Any = get_server(f"smarticles-{id(self)}", client_type="vue3")
         self._state = self._server.state
@@ -111,8 +123,8 @@ class Viewer:
         state.index, state.last = view.index, len(view.frames) - 1
         state.playing, state.following = False, not view.ended
         state.fault = ""
-        self._tell()
-        view.look()
+        self._describe()
+        view.aim()
 
     def _connect(self) -> None:
         state, controller = self._state, self._server.controller
@@ -120,12 +132,14 @@ class Viewer:
         state.change("field")(self._on_field)
         state.change("playing")(self._on_playing)
         controller.add("on_server_bind")(self._bind)
-        controller.add("on_server_ready")(lambda **_: self._opened(address(self._server.port, self._token)))
+        controller.add("on_server_ready")(
+            lambda **_: self._opened(f"http://{HOST}:{self._server.port}/index.html?token={self._token}")
+        )
         controller.add("on_client_connected")(self._shorten)
 
-    def _bind(self, web: Any) -> None:
-        self._web = web
-        protect(web.app, self._token)
+    def _bind(self, served: Any) -> None:
+        self._web = served
+        protect(served.app, self._token)
 
     def _shorten(self, **_: Any) -> None:
         self._web.config["timeout"] = _CLOSED_FOR
@@ -141,7 +155,7 @@ class Viewer:
                 html.Span("{{ fault }}", v_if="fault", classes="fault", role="alert")
             with html.Main():
                 self._canvas = vtk_widgets.VtkLocalView(
-                    self._view.window.vtk,
+                    self._view.plotter.render_window,
                     picking_modes=("['click']",),
                     click=(self._on_click, "[$event]"),
                 )
@@ -164,19 +178,19 @@ class Viewer:
                     html.Input(type="checkbox", v_model=("following",), id="follow")
                     html.Span(" follow the run")
 
-    def _tell(self) -> None:
-        """What the page says of the frame shown."""
+    def _describe(self) -> None:
+        """Update what the page says of the frame shown."""
         view, state = self._view, self._state
         frame = view.frame
         view.draw()
         state.caption = f"N = {frame.count} of {view.run.count}, {view.phase}"
         state.clock = f"t = {frame.time:.4g} s, frame {view.index} of {len(view.frames) - 1}"
         state.legend = view.legend()
-        state.told = view.told()
+        state.told = view.describe()
         state.growing = not view.ended
 
     def _redraw(self) -> None:
-        self._tell()
+        self._describe()
         self._canvas.update()
 
     def _on_index(self, index: Any, **_: Any) -> None:
@@ -245,3 +259,35 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
     # Says that there is no display, which nothing here needs.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     Viewer(RunView(directory), port=port, opened=opened).serve()
+
+
+def protect(app: web.Application, token: str) -> None:
+    """Answer 403 to every request, of pages, files and messages alike, that does not bring the token.
+
+    The address brings it once; then a cookie does, which no other site's page can send along.
+    """
+
+    @web.middleware
+    async def guard(
+        request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        # Cookies are shared by all ports of a machine, so their names are not.
+        name = f"smarticles-{request.url.port}"
+        brought = request.query.get("token", ""), request.cookies.get(name, "")
+        allowed = [secrets.compare_digest(word.encode(), token.encode()) for word in brought]
+        if not any(allowed):
+            raise web.HTTPForbidden(text="403: open the address that `smarticles view` printed, with its token\n")
+        response = await handler(request)
+        if not response.prepared:
+            own = f"ws://{HOST}:{request.url.port}"
+            response.headers.update({key: value.replace("{own}", own) for key, value in _HEADERS.items()})
+            if allowed[0]:
+                response.set_cookie(name, token, httponly=True, samesite="Strict", max_age=24 * 3600)
+        return response
+
+    async def session(request: web.Request) -> web.StreamResponse:
+        """Answer the page's script, which asks first where to send messages and what proves them."""
+        return web.json_response({"sessionURL": f"ws://{HOST}:{request.url.port}/ws", "secret": token})
+
+    app.middlewares.append(guard)
+    app.router.add_post("/paraview/", session)

@@ -1,4 +1,4 @@
-"""A run as the page sees it: its frames, the field it is coloured by, and what is picked."""
+"""A run as the page shows it: its frames, the field it is coloured by, and what is picked."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyvista as pv
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import read_run
-from postprocess.export.bodies import KINDS, ON_REQUEST, Bodies
-from postprocess.export.colours import colour_field, painted, scalars, scale, span
-from postprocess.export.fields import FIELDS, IDENTITY, Field, fields_of, link_values
-from postprocess.view.window import BOX_FACES, Window
+from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
+from postprocess.bodies.fields import IDENTITY, Field, fields_of, link_values
+from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies, owners
+from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +25,6 @@ PICKED = (255, 0, 170)
 """Colour of the smarticle that is picked, which no palette has."""
 
 _SAMPLES, _COSTLY_SAMPLES = 12, 3
-_STEPS = 7  # of a continuous scale in the legend
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,11 @@ class RunView:
         )
         self.field = colour_field(None, self.run)
         self.pick: Pick | None = None
-        self.window = Window(self.run)
-        kinds = [kind for kind in KINDS if kind not in ON_REQUEST]
-        self._bodies = Bodies.read(self.run, kinds, [each for each in self.fields if each.name in IDENTITY])
+        window: Any = pv.Plotter(off_screen=True)
+        self.plotter: Any = window
+        window.set_background("white")
+        self._bodies = Bodies(self.run, USUAL, [each for each in self.fields if each.name in IDENTITY])
+        self._meshes: dict[str, pv.PolyData] = {}
         self._bodies.hold(self.frames[index] for index in self._spread(_SAMPLES))
         self._bounds: dict[str, tuple[float, float]] = {}
         self._index = len(self.frames) - 1
@@ -114,54 +116,45 @@ class RunView:
 
     def draw(self) -> None:
         """Put all bodies into the window."""
-        bodies = self._bodies.at(self._frame)
         values = scalars(self.field, self._frame, self.run)
-        palette = scale(self.field, self._widened(values))
-        colours = np.empty((0, 3), dtype=np.uint8)
-        if "smarticles" in bodies:
-            colours = painted(palette, values[self._boxes(bodies["smarticles"])])
-            if self.pick is not None:
-                chosen = bodies["smarticles"].cell_data["smarticle_id"][::BOX_FACES] == self.pick.smarticle_id
-                colours[chosen] = PICKED
-        self.window.show(bodies, colours, self._frame.floor_z)
+        colours = ColourScale.of(self.field, self._widened(values)).painted(values)
+        if self.pick is not None:
+            colours[self._frame.smarticle_ids == self.pick.smarticle_id] = PICKED
+        self._meshes = drawn(self._bodies, self._frame, np.zeros(3))
+        boxes = colours[:0, 0]
+        if "smarticles" in self._meshes:
+            boxes = colours[owners(self._meshes["smarticles"], self._frame)]
+        add_bodies(self.plotter, self._meshes, boxes)
 
-    def look(self) -> None:
+    def aim(self) -> None:
         """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
-        if self.run.planar:
-            self.window.look_from((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
-        else:
-            self.window.look_from((0.0, -1.0, 0.35), (0.0, 0.0, 1.0))
+        _, up, forward = axes_from(*VIEWS["top" if self.run.planar else "front"])
+        camera = self.plotter.camera
+        camera.focal_point, camera.position, camera.up = (0.0, 0.0, 0.0), tuple(-forward), tuple(up)
+        self.plotter.reset_camera(render=False)
 
     def legend(self) -> list[dict[str, str]]:
-        """Colours with their labels, from the greatest; none where colours only tell identity."""
-        low, high = self._bounds.get(self.field.name, (0.0, 1.0))
-        if self.field.kind == "name":
-            return []
-        if self.field.kind == "count":
-            values = np.arange(max(int(high), 1) + 1, dtype=np.float64)
-            labels = [f"{value:g}" for value in values]
-        else:
-            values = np.linspace(low, high, _STEPS)
-            labels = [f"{value:.3g}" for value in values]
-        colours = painted(scale(self.field, (low, high)), values)
+        """Return colours with their labels, from the greatest; none where colours only tell identity."""
+        scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
+        colours = scale.painted(np.array(list(scale.labels)))
         shown = [
             {"colour": "#{:02x}{:02x}{:02x}".format(*colour), "label": label}
-            for colour, label in zip(colours.tolist(), labels, strict=True)
+            for colour, label in zip(colours.tolist(), scale.labels.values(), strict=True)
         ]
         return shown[::-1]
 
     def pick_along(self, ray: NDArray[np.float64]) -> None:
         """Pick the smarticle that a ray (2, 3) [mm] meets first, or none."""
-        box = self.window.picked(ray)
         self.pick = None
-        if box is None:
-            return
-        mesh = self._bodies.at(self._frame)["smarticles"]
-        owner, link = (int(mesh.cell_data[name][BOX_FACES * box]) for name in ("smarticle_id", "link"))
-        self.pick = Pick(owner, link)
+        if "smarticles" in self._meshes:
+            mesh = self._meshes["smarticles"]
+            _, faces = mesh.triangulate().ray_trace(ray[0], ray[1], first_point=True)
+            if np.size(faces):
+                face = int(np.atleast_1d(faces)[0]) // (2 * BOX_FACES) * BOX_FACES
+                self.pick = Pick(*(int(mesh.cell_data[name][face]) for name in IDENTITY))
 
-    def told(self) -> list[dict[str, str]]:
-        """All fields of what is picked, as text: name, unit, value; none where nothing is."""
+    def describe(self) -> list[dict[str, str]]:
+        """Return all fields of what is picked, as text: name, unit, value; none where nothing is."""
         if self.pick is None:
             return []
         (found,) = np.nonzero(self._frame.smarticle_ids == self.pick.smarticle_id)
@@ -175,35 +168,27 @@ class RunView:
                 rows.append({"name": field.name, "unit": field.unit, "value": _text(value), "meaning": field.meaning})
         return rows
 
-    def _boxes(self, mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Places in the frame's arrays of the boxes' smarticles, and links."""
-        owner, link = (mesh.cell_data[name][::BOX_FACES] for name in ("smarticle_id", "link"))
-        order = np.argsort(self._frame.smarticle_ids)
-        return order[np.searchsorted(self._frame.smarticle_ids, owner, sorter=order)], link
-
     def _spread(self, number: int) -> list[int]:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: NDArray[np.float64]) -> tuple[float, float]:
-        """Bounds of the field's scale: of some frames of the run and of all that were shown."""
+        """Return bounds of the field's scale: of some frames of the run and of all that were shown."""
         name = self.field.name
         if name not in self._bounds:
             samples = [values]
             for index in self._spread(_COSTLY_SAMPLES if self.field.costly else _SAMPLES):
                 try:
                     samples.append(scalars(self.field, self.frames[index], self.run))
-                except InputError:  # told when that frame is gone to
+                except InputError:  # reported when that frame is gone to
                     continue
-            self._bounds[name] = span(np.concatenate([sample.ravel() for sample in samples]))
-        low, high = self._bounds[name]
+            self._bounds[name] = span(samples)
         if np.isfinite(values).any():
-            least, greatest = span(values)
-            self._bounds[name] = min(low, least), max(high, greatest)
+            self._bounds[name] = span([np.array(self._bounds[name]), values])
         return self._bounds[name]
 
 
-def colour_names(fields: tuple[Field, ...] = FIELDS) -> list[dict[str, str]]:
-    """Fields for a list to choose from: name, and title with the unit."""
+def colour_names(fields: tuple[Field, ...]) -> list[dict[str, str]]:
+    """Return fields for a list to choose from: name, and title with the unit."""
     return [
         {"name": field.name, "title": field.name if field.unit == "-" else f"{field.name} [{field.unit}]"}
         for field in fields

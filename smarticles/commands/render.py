@@ -142,12 +142,12 @@ def _refuse_what_has_no_meaning(arguments: argparse.Namespace, *, film: bool) ->
         raise InputError(msg)
 
 
-def _track(numbers: Iterable[int], count: int) -> Iterable[int]:
-    """A bar on the terminal, gone when the film is done."""
+def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
+    """Show a bar on the terminal, gone when the film is done."""
     from rich.console import Console  # noqa: PLC0415  (costs a tenth of a second)
     from rich.progress import track  # noqa: PLC0415
 
-    return track(numbers, "drawing", total=count, console=Console(stderr=True), transient=True)
+    return track(images, "drawing", total=count, console=Console(stderr=True), transient=True)
 
 
 def _limits(text: str) -> tuple[float, float] | str:

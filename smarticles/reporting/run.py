@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import shlex
 import tempfile
@@ -134,12 +135,16 @@ def still_blocks(directory: Path, *, caption: str = "") -> list[Block]:
 
 def turntable_blocks(directory: Path, *, caption: str = "") -> list[Block]:
     """The last frame of a run from all around; nothing where there is no picture, see `still_blocks`."""
-    from postprocess.pictures.turntable import turntable  # noqa: PLC0415  (imports PyVista)
+    from postprocess.pictures.render import turntable  # noqa: PLC0415  (imports PyVista)
 
     if not (directory / collection(FRAME)).is_file():
         return []
     try:
-        views = [address(content, "image/webp") for content in turntable(directory)]
+        views = []
+        for image in turntable(directory):
+            content = io.BytesIO()
+            image.save(content, "WEBP", quality=80, method=4)
+            views.append(address(content.getvalue(), "image/webp"))
     except (InputError, RunError):
         return []  # the still says why
     run = read_run(directory)

@@ -18,12 +18,11 @@ from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.manifest import manifest_data, read_run
 from dem.scene.reading import dump_scene
-from postprocess.export.bodies import Bodies
-from postprocess.export.fields import BY_NAME, link_values
+from postprocess.bodies.fields import BY_NAME, link_values
+from postprocess.bodies.meshes import Bodies, link_boxes
+from postprocess.bodies.surroundings import read_surroundings
 from postprocess.geometry import chains
 from postprocess.measures.contacts import chain_of
-from postprocess.pictures.canvas import link_boxes
-from postprocess.pictures.strings import read_strings
 
 W, L, T1, BARB, BODY = 0.0467, 0.042, 0.021, 0.0095, 0.0213
 SPREAD = np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])  # m/s, of barb 1, middle link, barb 2
@@ -93,7 +92,7 @@ def test_boxes_are_as_thick_as_their_links() -> None:
 
 def test_exported_bodies_and_speeds_know_it(run: Path) -> None:
     manifest, frame = read_run(run), read_frames(run)[-1]
-    mesh = Bodies.read(manifest, ["smarticles"], []).at(frame)["smarticles"]
+    mesh = Bodies(manifest, ["smarticles"]).at(frame)["smarticles"]
     assert np.ptp(mesh.points[:, 1]) == pytest.approx(LAYOUT.width)
     masses = robot().link_masses
     expected = np.linalg.norm(masses @ SPREAD) / masses.sum()
@@ -101,7 +100,7 @@ def test_exported_bodies_and_speeds_know_it(run: Path) -> None:
 
 
 def test_strings_are_tied_on_the_axis(run: Path) -> None:
-    strings = read_strings(read_run(run))
+    strings = read_surroundings(read_run(run)).strings
     assert strings is not None
     (frame,) = read_frames(run)
     assert strings.lines(frame)[:, 0, 1] == pytest.approx([0, 0], abs=1e-12)

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles, WriteRun
 from PIL import Image
-
 from postprocess.pictures.camera import VIEWS
 from postprocess.pictures.colouring import COLOURINGS
+
 from smarticles.layout import Cell, columns
 
 

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from PIL import Image
 from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_run
+from synthetic.forces import pressed
 
 from dem.errors import InputError, RunError
-from dem.record.frames import read_frames
-from dem.record.manifest import read_run
-from postprocess.pictures.camera import VIEWS, Look, extent, fitted_camera
-from postprocess.pictures.canvas import link_boxes
-from postprocess.pictures.colouring import COLOURINGS, ColourScale
-from postprocess.pictures.render import render_run
-from postprocess.pictures.surroundings import read_surroundings
-from postprocess.report import figures
+from dem.record.forces import force_mesh
+from dem.record.frames import FrameWriter, read_frames
+from dem.record.names import FORCE
+from postprocess.bodies.colours import ColourScale
+from postprocess.bodies.fields import BY_NAME
+from postprocess.bodies.meshes import link_boxes
+from postprocess.geometry.links import centres_of_mass
+from postprocess.pictures.render import render_run, turntable
 
 SIZE = (240, 240)
 
@@ -38,10 +39,10 @@ def pixels(path):
 
 
 def panel(image):
-    """The three-dimensional part: below the caption, left of the colour bar, above the scale bar."""
+    """The three-dimensional part: below the caption, above the bars."""
     height, width, _ = image.shape
     unit = max(min(height, width) / 100, 4.4)
-    return image[round(12 * unit) : round(height - 5 * unit), : round(width - 14 * unit)]
+    return image[round(11.5 * unit) : round(height - 10 * unit)]
 
 
 def coloured(image):
@@ -50,22 +51,6 @@ def coloured(image):
 
 
 # The mesh
-
-
-@pytest.mark.parametrize("aspect_ratio", [0.4, 1.1])
-def test_boxes_have_the_volume_of_the_links(aspect_ratio):
-    scene = SyntheticRun(aspect_ratio=aspect_ratio, count=7)
-    mesh = link_boxes(scene.vertices(0.1) * 1e3, thickness_normal=1e3 * T1, thickness_in_plane=1e3 * T2)
-    assert mesh.n_cells == 7 * 3 * 6
-    # 0 for faces that point inwards and outwards alike, negative for all inwards.
-    assert mesh.triangulate().volume * 1e-9 == pytest.approx(7 * T1 * T2 * W * (1 + 2 * aspect_ratio), rel=1e-6)
-
-
-def test_thicknesses_lie_along_the_normal_and_in_the_plane():
-    mesh = link_boxes([u_shape(0.7 * W)], thickness_normal=T1, thickness_in_plane=T2)
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    # The U lies in the x-y plane: t1 shows along z, t2 widens it half at each barb.
-    assert high - low == pytest.approx([W + T2, 0.7 * W + T2 / 2, T1])
 
 
 def test_mesh_knows_which_box_is_whose():
@@ -86,52 +71,10 @@ def test_rods_have_one_box():
     assert mesh.triangulate().volume * 1e-9 == pytest.approx(4 * T1 * T2 * W, rel=1e-6)
 
 
-def test_mesh_refuses_flat_boxes():
-    with pytest.raises(InputError, match=r"thicknesses must be above 0 m: got 0\.0 m"):
-        link_boxes([u_shape(W)], thickness_normal=0.0, thickness_in_plane=T2)
-
-
 # The camera
 
 
-@pytest.mark.parametrize("view", VIEWS)
-@pytest.mark.parametrize("packing", [0.001, 0.1, 2.0])  # a column of 1 m, a pile, a flat heap
-def test_camera_sees_everything_and_stands_no_further_than_needed(tmp_path, view, packing):
-    scene = SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(packing,))
-    directory = write_run(tmp_path, scene)
-    look = Look.checked(color_by="id", size=SIZE, view=view)
-    run = read_run(directory)
-    points = extent(read_frames(directory)[0], run, look, read_surroundings(run))
-    right, up, forward = look.axes
-    position, focus = fitted_camera(points, look.axes, 1.3)
-    assert np.cross(focus - position, forward) == pytest.approx(0, abs=1e-6 * np.linalg.norm(focus - position))
-    depth = (points - position) @ forward
-    edge = np.tan(np.radians(11))
-    x, y = (points - position) @ right / depth / edge / 1.3, (points - position) @ up / depth / edge
-    assert depth.min() > 0
-    filled = max(np.abs(x).max(), np.abs(y).max())
-    assert 0.95 < filled <= 1.0
-    assert x.max() + x.min() == pytest.approx(0, abs=1e-3)
-    assert y.max() + y.min() == pytest.approx(0, abs=1e-3)
-
-
 # The picture
-
-
-def test_picture_shows_the_smarticles(run, tmp_path):
-    path = render_run(run, output=tmp_path / "a.png", size=SIZE, color_by="height")
-    image = pixels(path)
-    assert image.shape == (240, 240, 3)
-    assert (panel(image) != 255).any(axis=2).mean() > 0.2  # container, floor, smarticles
-    assert coloured(panel(image)).mean() > 0.02
-    assert list(tmp_path.iterdir()) == [path]  # no temporary file is left
-
-
-def test_a_single_smarticle_fills_some_pixels(tmp_path):
-    run = single_run(tmp_path / "one", u_shape(0.7 * W)[None] + [0, 0, 0.002])
-    image = pixels(render_run(run, output=tmp_path / "a.png", size=SIZE, view="top", color_by="id"))
-    share = coloured(panel(image)).mean()
-    assert 0.002 < share < 0.2
 
 
 def test_colours_reach_the_right_smarticle(tmp_path):
@@ -142,9 +85,8 @@ def test_colours_reach_the_right_smarticle(tmp_path):
     )
     look = {"size": (400, 400), "view": "top", "color_by": "contacts"}
     image = panel(pixels(render_run(run, output=tmp_path / "a.png", **look)))
-    scale = ColourScale.of(COLOURINGS["contacts"], 1, 3)
-    expected = scale.colours(np.array([1, 3])).astype(int)
-    for half, colour, other in ((slice(0, 172), *expected), (slice(172, 344), *expected[::-1])):
+    expected = ColourScale.of(BY_NAME["contacts"], (1, 3)).painted(np.array([1, 3])).astype(int)
+    for half, colour, other in ((slice(0, 200), *expected), (slice(200, 400), *expected[::-1])):
         part = image[:, half][coloured(image[:, half])]
         assert len(part) > 200
         # Light changes a colour's brightness, not its direction.
@@ -155,12 +97,6 @@ def test_colours_reach_the_right_smarticle(tmp_path):
 
         assert closeness(colour) > 0.985
         assert closeness(colour) > closeness(other) + 0.05
-
-
-def test_pictures_of_other_times_differ(run, tmp_path):
-    first = pixels(render_run(run, output=tmp_path / "a.png", size=SIZE, time=0.5))
-    last = pixels(render_run(run, output=tmp_path / "b.png", size=SIZE))
-    assert (panel(first) != panel(last)).any(axis=2).mean() > 0.02
 
 
 def test_wall_is_drawn_as_long_as_it_is_there(tmp_path):
@@ -195,12 +131,11 @@ def test_default_output_lies_in_the_run_directory_and_is_not_overwritten(tmp_pat
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"color_by": "mood"}, r"colour by 'mood': is not known; known: crossings, "),
         ({"view": "below"}, r"view 'below': is not known; known: front, oblique, top"),
         ({"size": (100, 400)}, r"size must be 200 to 8000 pixels each way: got 100 x 400"),
         ({"time": 99.0}, r"time must be between 0\.5 s and 22 s, the run's frames: got 99 s"),
         ({"output": "a.jpg"}, r"a\.jpg: the output must end in \.png: got '\.jpg'"),
-        ({"color_by": "crosings"}, r"colour by 'crosings': is not known; did you mean 'crossings'\?"),
+        ({"color_by": "crosings"}, r"'crosings' is no field; did you mean 'crossings'\?"),
         ({"output": "nowhere/a.png"}, r"the folder nowhere does not exist"),
     ],
 )
@@ -234,24 +169,6 @@ def test_missing_graphics_are_an_error_and_no_crash(run, tmp_path, monkeypatch):
 # Scales
 
 
-@pytest.mark.parametrize(
-    ("largest", "labels"), [(0, ["0", "1"]), (3, list("0123")), (40, [*map(str, range(12)), "≥ 12"])]
-)
-def test_counts_have_one_colour_each(largest, labels):
-    scale = figures.count_colours(largest)
-    assert list(scale.labels) == labels
-    colours = [tuple(scale.colours(scale.norm(number))) for number in range(len(labels))]
-    assert len(set(colours)) == len(labels)
-    assert tuple(scale.colours(scale.norm(largest))) == colours[min(largest, 12)]
-
-
-def test_lightness_grows_with_the_count():
-    """So that the order of counts is seen in grey print and by the colour-blind."""
-    colours = [np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in figures.sequence(12)]
-    lightness = [colour @ [0.2126, 0.7152, 0.0722] for colour in colours]
-    assert np.all(np.diff(lightness) > 5)
-
-
 def test_run_radius_is_drawn_to_scale(tmp_path):
     """Seen from above, the rim spans the panel and the U its share of it."""
     run = single_run(tmp_path / "one", u_shape(0.7 * W)[None] + [0, 0, 0.002])
@@ -259,8 +176,57 @@ def test_run_radius_is_drawn_to_scale(tmp_path):
     columns = np.flatnonzero((image < 200).any(axis=(0, 2)))
     inside = np.flatnonzero((image[..., 0] - image[..., 2] > 60).any(axis=0))  # smarticle 0 is red
     ratio = np.ptp(inside) / np.ptp(columns)
-    # The rim is nearer to the camera than the U, so the U looks a little smaller.
-    assert 0.8 * (W + T2) / (2 * RADIUS) < ratio < (W + T2) / (2 * RADIUS)
+    assert ratio == pytest.approx((W + T2) / (2 * RADIUS), rel=0.03)
+
+
+def test_bars_tell_lengths_and_views_have_everything_in_them(run, tmp_path):
+    """The rim is as many pixels wide as the scale bar says, in the middle of the picture, which it fills."""
+    image = pixels(render_run(run, output=tmp_path / "a.png", size=(500, 400), view="top", color_by="id"))
+    columns = np.flatnonzero((panel(image) < 200).any(axis=(0, 2)))
+    rows = np.flatnonzero((panel(image) < 200).any(axis=(1, 2)))
+    bar = image[round(400 - 5.5 * 4.4)]  # 10 mm
+    black = np.ptp(np.flatnonzero((bar < 40).all(axis=1))[:60])
+    assert np.ptp(columns) / black == pytest.approx(2e3 * RADIUS / 10, rel=0.04)
+    assert columns.mean() == pytest.approx(250, abs=3)
+    assert np.ptp(rows) == pytest.approx(0.97 * len(panel(image)), rel=0.03)
+
+
+def test_runs_side_by_side_share_scale_and_colours(run, tmp_path):
+    image = pixels(render_run(run, compare=[run], output=tmp_path / "a.png", size=SIZE))
+    assert image.shape == (240, 480, 3)
+    left, right = panel(image)[:, :240], panel(image)[:, 240:]
+    assert coloured(left).mean() > 0.02
+    assert np.array_equal(left, right)
+
+
+def test_one_smarticle_is_orange_and_what_passes_through_it_blue(tmp_path):
+    through = np.array([[0.0, 0.01, -0.004], [0.001, 0.0, -0.004], [0.001, 0.0, 0.006], [0.0, 0.01, 0.006]])
+    run = single_run(tmp_path / "two", np.array([u_shape(0.7 * W), through]))
+    image = panel(pixels(render_run(run, output=tmp_path / "a.png", size=(400, 400), smarticle=0)))
+    red, _, blue = np.moveaxis(image, 2, 0)
+    assert (red - blue > 80).mean() > 0.01
+    assert (blue - red > 60).mean() > 0.001
+    for wrong, message in (({"smarticle": 7}, "there are 0 to 1"), ({"smarticle": 0, "view": "top"}, "drawn alone")):
+        with pytest.raises(InputError, match=message):
+            render_run(run, output=tmp_path / "b.png", **wrong)
+
+
+def test_forces_are_drawn_where_they_are_recorded(tmp_path):
+    run = single_run(tmp_path / "two", u_shape(0.7 * W) + np.array([[[-0.008, 0, 0.001]], [[0.008, 0, 0.001]]]))
+    with pytest.raises(InputError, match=r"records no forces; .*recording\.contact_forces: true"):
+        render_run(run, output=tmp_path / "a.png", forces=True)
+    frame = read_frames(run)[0]
+    mesh = force_mesh(pressed([(0, 1)], [2e-3]), centres_of_mass(frame.vertices), time=0.5, phase=0)
+    FrameWriter(run, FORCE).write(mesh, 0.5)
+    look = {"size": SIZE, "view": "top", "color_by": "contacts"}
+    image = panel(pixels(render_run(run, output=tmp_path / "a.png", forces=True, **look)))
+    assert ((image[..., 0] > 100) & (image[..., 1] < 60)).sum() > 20
+
+
+def test_a_turntable_shows_the_pile_from_all_around(run):
+    images = turntable(run, views=4, size=240)
+    assert len({image.tobytes() for image in images}) == 4
+    assert all(coloured(np.asarray(image).astype(int)).mean() > 0.02 for image in images)
 
 
 def test_a_disk_that_is_full_is_told_with_the_picture(make_run, mount_disk):

@@ -12,8 +12,8 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.manifest import read_run
-from postprocess.export.bodies import Bodies
-from postprocess.pictures.strings import read_strings
+from postprocess.bodies.meshes import Bodies
+from postprocess.bodies.surroundings import read_surroundings
 
 W, T, GAP, LENGTH, SPEED = 0.0467, 0.0095, 0.00105, 0.1, 0.02
 BOXES = Boxes(middle_length=W, barb_length=W, thickness_normal=0.021, thickness_in_plane=T, density=1250.0)
@@ -58,7 +58,7 @@ def laid_out(directory, count, tied_at):
 def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at):
     knots = laid_out(tmp_path, count, tied_at)
     run, frames = read_run(tmp_path), read_frames(tmp_path)
-    strings = read_strings(run)
+    strings = read_surroundings(run).strings
     assert len(strings.lines(frames[0])) == 0
     first, later = strings.lines(frames[1]), strings.lines(frames[2])
     assert first[:, 0] == pytest.approx(knots, abs=1e-12)
@@ -72,12 +72,8 @@ def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at
 def test_strings_are_bodies_and_tubes(tmp_path):
     laid_out(tmp_path, 2, "tip")
     run, frames = read_run(tmp_path), read_frames(tmp_path)
-    bodies = Bodies.read(run, ["strings"], [])
+    bodies = Bodies(run, ["strings"])
     assert bodies.at(frames[0]) == {}
     mesh = bodies.at(frames[2])["strings"]
     assert mesh.cell_data["string"].tolist() == [0, 1]
     assert mesh.length > 2 * LENGTH
-
-
-def test_other_runs_have_none(tmp_path):
-    assert read_strings(read_run(write_run(tmp_path, SyntheticRun(count=2, frames_per_phase=1)))) is None

@@ -1,7 +1,6 @@
 """What bodies carry: names, units and values."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +10,10 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.manifest import read_run
-from postprocess.export.colours import colour_field, linear, painted, scale
-from postprocess.export.fields import BY_NAME, FIELDS, checked_field, fields_of, link_values
+from postprocess.bodies.colours import ColourScale, colour_field, linear
+from postprocess.bodies.fields import BY_NAME, checked_field, fields_of, link_values
 from postprocess.measures.clusters import entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
-from smarticles.main import main
 
 
 @pytest.fixture
@@ -26,21 +24,6 @@ def pile(tmp_path):
 def values(directory, name):
     frame: Frame = read_frames(directory)[-1]
     return frame, link_values(BY_NAME[name], frame, read_run(directory))
-
-
-def test_names_end_in_their_units():
-    endings = {"m": "_m", "m/s": "_m_per_s", "rad/s": "_rad_per_s", "rad": "_rad", "N m": "_N_m", "J": "_J", "-": ""}
-    endings["N"] = "_N"
-    assert all(field.name.endswith(endings[field.unit]) for field in FIELDS)
-    assert len(BY_NAME) == len(FIELDS)
-
-
-def test_help_has_the_whole_table(capsys):
-    assert main(["export", "--help"]) == 0
-    told = [line.split("]")[0] + "]" for line in capsys.readouterr().out.splitlines() if "]  " in line]
-    assert [line.strip() for line in told if line.startswith("  ") and "[-h]" not in line] == [
-        f"{field.name} [{field.unit}]" for field in FIELDS
-    ]
 
 
 def test_values_are_those_of_the_measures(pile):
@@ -106,8 +89,7 @@ def test_unknown_field_is_refused():
 
 
 def test_colours_have_grey_for_no_value_and_for_no_crossing():
-    palette = scale(BY_NAME["crossings"], (0.0, 5.0))
-    colours = painted(palette, np.array([0.0, 1.0, 5.0, np.nan]))
+    colours = ColourScale.of(BY_NAME["crossings"], (0.0, 5.0)).painted(np.array([0.0, 1.0, 5.0, np.nan]))
     assert colours[0].tolist() == colours[3].tolist() == [201, 201, 201]
     assert len({tuple(colour) for colour in colours.tolist()}) == 3
 
@@ -115,10 +97,3 @@ def test_colours_have_grey_for_no_value_and_for_no_crossing():
 def test_linear_colours_are_darker_in_the_middle_alone():
     """Half the light is 188 of 255 in sRGB."""
     assert linear(np.array([[0, 188, 255]], dtype=np.uint8)).tolist() == [[0, 128, 255]]
-
-
-def test_the_table_in_the_documentation_is_this_one():
-    text = (Path(__file__).resolve().parents[4] / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    table = text.partition("Cell data of smarticles")[2].partition("Point data of crossings")[0]
-    rows = [line for line in table.splitlines() if line.startswith("| `")]
-    assert rows == [f"| `{field.name}` | {field.unit} | {field.of} | {field.meaning} |" for field in FIELDS]

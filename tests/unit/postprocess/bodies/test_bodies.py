@@ -11,8 +11,8 @@ from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 from dem.errors import InputError
 from dem.record.frames import read_frames
 from dem.record.manifest import read_run
-from postprocess.export.bodies import KINDS, Bodies, checked_kinds, solid
-from postprocess.export.fields import fields_of
+from postprocess.bodies.fields import fields_of
+from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, solid
 from postprocess.measures.entanglement import link_crossings, link_passages
 
 ALL = checked_kinds(["crossings"], [])
@@ -22,7 +22,7 @@ TIERS = ((RADIUS, 0.006), (0.018, 0.008), (0.0125, 0.06))  # radius and height
 
 def bodies_at(directory, index=-1, kinds=ALL):
     run, frames = read_run(directory), read_frames(directory)
-    bodies = Bodies.read(run, kinds, fields_of(run))
+    bodies = Bodies(run, kinds, fields_of(run))
     bodies.hold(frames)
     return bodies.at(frames[index])
 
@@ -157,12 +157,6 @@ def test_there_are_as_many_passages_as_crossings(scene):
     found = link_passages(vertices)
     assert len(found.i) > 50
     assert np.bincount(found.i, minlength=40).tolist() == link_crossings(vertices).tolist()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_can_be_left_out(hooked, kind):
-    kinds = checked_kinds(["crossings"], [kind])
-    assert kind not in bodies_at(hooked, kinds=kinds)
 
 
 def test_refusals_name_what_is_meant():

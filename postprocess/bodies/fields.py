@@ -1,4 +1,4 @@
-"""What every exported body of a smarticle carries: one table of names, units and meanings; the values of a frame."""
+"""Fields that every body of a smarticle carries: names, units, meanings, and their values in a frame."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dem.record.forces import has_forces, read_forces
 from dem.record.frame import Frame
 from dem.record.manifest import RunManifest
 from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.force_chains import force_chains
 from postprocess.measures.registry import in_space
-from postprocess.pictures.colouring import COLOURINGS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,8 +48,10 @@ class Field:
         meaning: One sentence.
         take: (N,), (N, 3) or (N, 3, 3) values of a frame: one per smarticle, per link, or a vector per link; None where
             the frame does not have it.
-        told_of: Whether a run has it at all.
+        available_for: Whether a run has it at all.
         costly: Whether it takes tenths of a second per frame or more.
+        label: For the colour bar of a picture; the name if empty.
+        shown: Factor and unit of the numbers of that bar; None: as they are.
     """
 
     name: str
@@ -58,8 +60,26 @@ class Field:
     of: Literal["smarticle", "link"] = "smarticle"
     meaning: str
     take: Callable[[Frame, RunManifest], NDArray[Any] | None]
-    told_of: Callable[[RunManifest], bool] = lambda _: True
+    available_for: Callable[[RunManifest], bool] = lambda _: True
     costly: bool = False
+    label: str = ""
+    shown: tuple[float, str] | None = None
+
+    @property
+    def title(self) -> str:
+        """What a colour bar says."""
+        unit = self.unit if self.shown is None else self.shown[1]
+        if self.label:
+            return self.label if unit == "-" else f"{self.label} [{unit}]"
+        return self.name if unit == "-" else f"{self.name} [{unit}]"
+
+
+def _speed(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
+    sections = np.array(run.thicknesses_in_plane) / run.thickness_in_plane
+    weights = (link_lengths(frame.vertices) * sections)[:, :, None]
+    velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
+    speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
+    return speed
 
 
 def _recorded(name: str) -> Callable[[Frame, RunManifest], NDArray[Any] | None]:
@@ -127,13 +147,16 @@ FIELDS: tuple[Field, ...] = (
         name="speed_m_per_s",
         unit="m/s",
         meaning="of the smarticle's centre of mass",
-        take=COLOURINGS["speed"].values,
+        take=_speed,
+        label="speed of its centre of mass",
     ),
     Field(
         name="height_m",
         unit="m",
         meaning="of the smarticle's centre of mass above the floor",
-        take=lambda frame, run: COLOURINGS["height"].values(frame, run) / 1e3,
+        take=lambda frame, _: centres_of_mass(frame.vertices)[:, 2] - frame.floor_z,
+        label="height of its centre of mass",
+        shown=(1e3, "mm"),
     ),
     Field(
         name="velocity_m_per_s",
@@ -155,6 +178,7 @@ FIELDS: tuple[Field, ...] = (
         kind="count",
         meaning="other smarticles that it touches, as the engine counted them",
         take=lambda frame, _: frame.contacts,
+        label="smarticles that it touches",
     ),
     Field(
         name="crossings",
@@ -162,7 +186,8 @@ FIELDS: tuple[Field, ...] = (
         kind="count",
         meaning="links of others that pass through its plane; their mean is ⟨N⟩",
         take=lambda frame, _: link_crossings(frame.vertices),
-        told_of=in_space,
+        label="links of others through its plane",
+        available_for=in_space,
     ),
     Field(
         name="contact_cluster",
@@ -177,7 +202,7 @@ FIELDS: tuple[Field, ...] = (
         kind="name",
         meaning="the same of smarticles of which one passes through the other's plane",
         take=_labels(lambda frame, _: entanglement_clusters(frame.vertices)),
-        told_of=in_space,
+        available_for=in_space,
     ),
     Field(
         name="local_packing_fraction",
@@ -185,15 +210,15 @@ FIELDS: tuple[Field, ...] = (
         meaning=f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at "
         "floor, wall and the pile's highest point; NaN without one cylindrical wall",
         take=_local_packing,
-        told_of=lambda run: in_space(run) and run.container_tiers == 1,
+        available_for=lambda run: in_space(run) and run.container_tiers == 1,
         costly=True,
     ),
     Field(
         name="normal_force_N",
         unit="N",
-        meaning="sum of the normal forces at all its contacts, fixtures among them; runs that record forces",
+        meaning="sum of the normal forces at all its contacts, boundaries among them; runs that record forces",
         take=_pressed,
-        told_of=lambda run: has_forces(run.directory),
+        available_for=lambda run: has_forces(run.directory),
     ),
     Field(
         name="force_chain",
@@ -201,7 +226,7 @@ FIELDS: tuple[Field, ...] = (
         kind="name",
         meaning="number of its cluster of smarticles joined by forces above the mean, 0 the largest; likewise",
         take=_chain,
-        told_of=lambda run: has_forces(run.directory),
+        available_for=lambda run: has_forces(run.directory),
     ),
     Field(
         name="angle_rad",
@@ -239,12 +264,12 @@ BY_NAME: Mapping[str, Field] = MappingProxyType({field.name: field for field in 
 
 
 def fields_of(run: RunManifest) -> tuple[Field, ...]:
-    """The fields that a run's frames may have."""
-    return tuple(field for field in FIELDS if field.told_of(run))
+    """Return the fields that a run's frames may have."""
+    return tuple(field for field in FIELDS if field.available_for(run))
 
 
 def checked_field(name: str) -> Field:
-    """The field of a name.
+    """Return the field of a name.
 
     Raises:
         InputError: There is none.
@@ -256,7 +281,7 @@ def checked_field(name: str) -> Field:
 
 
 def link_values(field: Field, frame: Frame, run: RunManifest) -> NDArray[Any] | None:
-    """(N, 3) values of a field, or (N, 3, 3) vectors, one per link; None where the frame does not have it."""
+    """Return values (N, 3) of a field, or vectors (N, 3, 3), one per link; None where the frame does not have it."""
     values = field.take(frame, run)
     if values is None or field.of == "link":
         return values

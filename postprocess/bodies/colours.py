@@ -1,0 +1,146 @@
+"""Colours of bodies: smarticles by any field on one scale, everything else by its kind."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+from matplotlib.colors import Colormap, ListedColormap, Normalize, hsv_to_rgb, to_rgb
+
+from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.report import figures
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height": "height_m", "id": "smarticle_id"})
+"""Short names of fields."""
+
+UNKNOWN = (201, 201, 201)
+"""Where a field has no value."""
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Colour of a kind of body, as hexadecimal sRGB, and its opacity [-]."""
+
+    colour: str
+    opacity: float = 1.0
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """(3,) sRGB, 0 to 255."""
+        return np.round(255 * np.array(to_rgb(self.colour))).astype(np.uint8)
+
+
+PAINTS: Mapping[str, Paint] = MappingProxyType(
+    {
+        "smarticles": Paint("#ffffff"),  # under the colours of a field
+        "wall": Paint("#9db4c8", 0.22),
+        "floor": Paint("#e9e9e7"),
+        "hooks": Paint("#b3261e"),
+        "strings": Paint("#5b4636"),
+        "crossings": Paint("#1a1a1a"),
+        "forces": Paint("#a11a2e"),
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ColourScale:
+    """Turns values of a field into colours.
+
+    Attributes:
+        kind: Of the field.
+        colours: Of the bar; None where colours only tell identity.
+        low: Value at the bar's lower end.
+        high: Value at its upper end.
+        labels: By value, what is written beside the bar.
+    """
+
+    kind: Literal["count", "value", "name"]
+    colours: Colormap | None = None
+    low: float = 0.0
+    high: float = 1.0
+    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def of(cls, field: Field, bounds: Span) -> Self:
+        """Return the scale of a field for values between two bounds."""
+        low, high = bounds
+        if field.kind == "name":
+            return cls(kind="name")
+        if field.kind == "count":
+            counts = figures.count_colours(int(high))
+            labels = dict(zip(map(float, counts.ticks), counts.labels, strict=True))
+            return cls(kind="count", colours=counts.colours, low=-0.5, high=len(labels) - 0.5, labels=labels)
+        if not high > low:  # one smarticle, or all alike
+            low, high = low - 0.5, high + 0.5
+        factor = field.shown[0] if field.shown else 1.0
+        labels = {float(value): f"{factor * value:.3g}" for value in np.linspace(low, high, 5)}
+        return cls(kind="value", colours=ListedColormap(figures.sequence(256)), low=low, high=high, labels=labels)
+
+    def painted(self, values: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return sRGB colours (…, 3), 0 to 255, of values; grey where there is none."""
+        values = np.asarray(values, dtype=np.float64)
+        known = np.isfinite(values)
+        found = np.full((*values.shape, 3), UNKNOWN, dtype=np.uint8)
+        if self.colours is None:
+            # Hues that differ between neighbours in number: golden-ratio steps.
+            hue = (values[known] * (math.sqrt(5) - 1) / 2) % 1
+            tone = np.stack([hue, np.full_like(hue, 0.50), np.full_like(hue, 0.88)], axis=-1)
+            found[known] = (255 * hsv_to_rgb(tone)).astype(np.uint8)
+        else:
+            shares = Normalize(self.low, self.high, clip=True)(values[known])
+            found[known] = self.colours(np.asarray(shares), bytes=True)[..., :3]
+        return found
+
+
+def colour_field(name: str | None, run: RunManifest) -> Field:
+    """Return the field to colour by: crossings, or of motion in a plane, which has none, the number of the smarticle.
+
+    Raises:
+        InputError: It is no field, or the run has no such.
+    """
+    usual = "smarticle_id" if run.planar else "crossings"
+    field = checked_field(usual if name is None else ALIASES.get(name, name))
+    if not field.available_for(run):
+        msg = f"{run.directory}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
+        raise InputError(msg)
+    return field
+
+
+def scalars(field: Field, frame: Frame, run: RunManifest) -> NDArray[np.float64]:
+    """Return values (N, 3) to colour by, one per link: of a vector its length; NaN where there is none."""
+    values = link_values(field, frame, run)
+    if values is None:
+        return np.full((frame.count, 3), np.nan)
+    return np.linalg.norm(values, axis=2) if values.ndim == 3 else np.asarray(values, dtype=np.float64)
+
+
+def span(values: Iterable[NDArray[np.float64]]) -> Span:
+    """Return the least and the greatest of all values that there are; 0 and 1 without any."""
+    finite = [each[np.isfinite(each)] for each in values]
+    joined = np.concatenate([np.empty(0), *finite])
+    return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 1.0)
+
+
+def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return sRGB colours as shares of light, 0 to 255: what glTF wants of the colours of points.
+
+    Source:
+        IEC 61966-2-1; glTF 2.0, section 3.9.2.
+    """
+    shares = colours / 255
+    light = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    return np.round(255 * light).astype(np.uint8)

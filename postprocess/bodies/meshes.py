@@ -1,0 +1,338 @@
+"""True bodies of a run at a time, as meshes in metres: boxes of links, walls, floor, hooks, strings, crossings, forces.
+
+Coordinates are those of the frames, z upwards: a container that is shaken moves. Everything is as large as in the
+simulation, but for what has no size there: a wall without a height ends above the highest smarticle, a string has no
+thickness, a wall neither.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dem.errors import InputError, nearest
+from dem.record.forces import NO_FORCES, RecordedForces, has_forces, read_forces
+from dem.record.frame import Frame
+from dem.record.manifest import RunManifest
+from postprocess.bodies.fields import Field, link_values
+from postprocess.bodies.surroundings import read_surroundings
+from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
+from postprocess.measures.entanglement import link_passages
+from postprocess.measures.force_chains import strong_contacts
+
+with warnings.catch_warnings():
+    # PyVista imports pyplot: see postprocess.report.figures.
+    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
+    import pyvista as pv
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "smarticles": "a box per link, with all fields",
+        "wall": "of the container, tiers and ceilings of a mould, or the two of a plane",
+        "floor": "of the container",
+        "hooks": "the two crosses",
+        "strings": "the two of a strain test, as lines",
+        "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
+        "forces": "on request: lines from centre to contact to centre, where the run records forces",
+    }
+)
+"""Kinds of bodies."""
+
+ON_REQUEST = ("crossings", "forces")
+USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)
+
+BOX_POINTS, BOX_FACES = 8, 6
+_ROUND = 96  # corners of a circle
+_THINNEST = 0.05  # of the thickest tube of a force
+
+# Corners of a box (along, in plane, normal) and its faces, seen from outside.
+_CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
+_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+
+
+def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the kinds to export.
+
+    Args:
+        wanted: Besides those that are exported anyway.
+        unwanted: To leave out.
+        also: What else may be left out.
+
+    Raises:
+        InputError: An unknown kind, or nothing is left.
+    """
+    for name in (*wanted, *(name for name in unwanted if name not in also)):
+        if name not in KINDS:
+            known = [*KINDS, *(also if name in unwanted else ())]
+            msg = f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}"
+            raise InputError(msg)
+    kept = tuple(kind for kind in KINDS if kind in (*USUAL, *wanted) and kind not in unwanted)
+    if not kept:
+        msg = "nothing is left to export; leave out less"
+        raise InputError(msg)
+    return kept
+
+
+class Bodies:
+    """The bodies of one run, frame after frame.
+
+    Args:
+        run: The run.
+        kinds: Which bodies, keys of `KINDS`.
+        fields: What the smarticles carry.
+        cut: Whether walls end a little above the pile, as in pictures.
+
+    Raises:
+        InputError: The scene or the series is damaged, or forces are wanted and not recorded.
+    """
+
+    def __init__(
+        self, run: RunManifest, kinds: Sequence[str] = USUAL, fields: Sequence[Field] = (), *, cut: bool = False
+    ) -> None:
+        if "forces" in kinds and not has_forces(run.directory):
+            msg = f"{run.directory}: records no forces; {NO_FORCES}"
+            raise InputError(msg)
+        self.run = run
+        self.kinds = kinds
+        self.around = read_surroundings(run)
+        self._fields = fields
+        self._cut = cut
+        self._top = 0.0  # of the highest smarticle above the floor
+        self._reach = 0.0  # of the farthest one from the axis
+        self._span = math.inf, -math.inf  # of all along x
+
+    def hold(self, frames: Iterable[Frame]) -> None:
+        """Make walls and floor large enough for these frames too."""
+        for frame in frames:
+            if frame.count:
+                points = frame.vertices.reshape(-1, 3)
+                self._top = max(self._top, float(points[:, 2].max()) - frame.floor_z)
+                self._reach = max(self._reach, float(np.hypot(points[:, 0], points[:, 1]).max()))
+                self._span = (
+                    min(self._span[0], float(points[:, 0].min())),
+                    max(self._span[1], float(points[:, 0].max())),
+                )
+
+    def at(self, frame: Frame) -> dict[str, pv.PolyData]:
+        """Return the bodies of a frame by kind, [m]; only those that there are."""
+        made = {kind: getattr(self, f"_{kind}")(frame) for kind in self.kinds}
+        return {kind: mesh for kind, mesh in made.items() if mesh is not None and mesh.n_points}
+
+    def _smarticles(self, frame: Frame) -> pv.PolyData:
+        run = self.run
+        mesh = link_boxes(
+            frame.vertices, thickness_normal=run.thickness_normal, thickness_in_plane=run.thicknesses_in_plane
+        )
+        owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
+        for field in self._fields:
+            values = link_values(field, frame, run)
+            if values is not None:
+                mesh.cell_data[field.name] = values[owner]
+        return mesh
+
+    def _wall(self, frame: Frame) -> pv.PolyData | None:
+        run, floor = self.run, frame.floor_z
+        if run.planar:
+            if run.channel_width is None:
+                return None
+            half, (first, last) = run.channel_width / 2, self._span
+            return joined(
+                pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.thickness_normal]])
+                for y in (-half, half)
+            )
+        top = float(frame.vertices[..., 2].max(initial=floor)) - floor
+        raised = self.around.raised(frame.time, frame.phase, top)
+        if raised is None:
+            return None
+        return self.wall_at((0.0 if frame.phase in self.around.floor_alone else floor) + raised)
+
+    def wall_at(self, base: float) -> pv.PolyData:
+        """Return the wall of a container that stands at a height [m]."""
+        corners = self.around.corners
+        if not corners:
+            top = self._top + self.run.middle_length if self.around.height is None else self.around.height
+            corners = [(self.run.container_radius, 0.0), (self.run.container_radius, top)]
+        if self._cut:
+            *below, (radius, height) = corners
+            margin = self.run.middle_length / 4
+            corners = [*below, (radius, min(height, max(4 * margin, self._top + margin, below[-1][1] + margin)))]
+        line = pv.MultipleLines(np.array([(radius, 0.0, base + height) for radius, height in corners]))
+        wall: pv.PolyData = line.extrude_rotate(resolution=_ROUND, capping=False).triangulate()
+        wall.clear_data()
+        return wall
+
+    def _floor(self, frame: Frame) -> pv.PolyData | None:
+        if self.run.planar:
+            return None
+        radius = max(self.run.container_radius, self._reach)
+        floor: pv.PolyData = pv.Disc(
+            center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=_ROUND
+        ).triangulate()
+        return floor
+
+    def _hooks(self, frame: Frame) -> pv.PolyData | None:
+        hooks = self.around.hooks
+        if hooks is None:
+            return None
+        heights = [frame.floor_z + height for height in hooks.heights(frame.time)]
+        crosses = [
+            joined(pv.Box((*bar[:4], height + bar[4], height + bar[5])) for bar in bars)
+            for bars, height in zip(hooks.bars, heights, strict=True)
+        ]
+        mesh = joined(crosses)
+        mesh.cell_data["hook"] = np.repeat([0, 1], [one.n_cells for one in crosses])
+        return mesh
+
+    def _strings(self, frame: Frame) -> pv.PolyData | None:
+        lines = () if self.around.strings is None else self.around.strings.lines(frame)
+        if not len(lines):
+            return None
+        mesh = joined(pv.MultipleLines(line) for line in lines)
+        mesh.clear_data()
+        mesh.cell_data["string"] = np.arange(2)
+        return mesh
+
+    def _crossings(self, frame: Frame) -> pv.PolyData | None:
+        if self.run.planar or frame.count == 0:
+            return None
+        found = link_passages(frame.vertices)
+        if not len(found.i):
+            return None
+        along = frame.vertices[found.j, found.link + 1] - frame.vertices[found.j, found.link]
+        mesh = pv.PolyData(found.point)
+        mesh.point_data["smarticle_id"] = frame.smarticle_ids[found.i]
+        mesh.point_data["passing_id"] = frame.smarticle_ids[found.j]
+        mesh.point_data["passing_link"] = found.link
+        mesh.point_data["direction"] = along / np.linalg.norm(along, axis=1, keepdims=True)
+        return mesh
+
+    def _forces(self, frame: Frame) -> pv.PolyData | None:
+        forces = read_forces(frame)
+        found = forces.contacts
+        if not len(found.normal):
+            return None
+        mesh = force_lines(forces)
+        above = np.zeros(len(found.normal), dtype=np.int64)
+        if forces.between.any():
+            above[forces.between] = strong_contacts(found.normal[forces.between])
+        first, second = found.smarticles.T
+        values = {
+            "first_id": frame.smarticle_ids[first],  # as the field smarticle_id has them
+            "second_id": np.where(second < 0, second, frame.smarticle_ids[second]),
+            "fixture": found.fixtures,
+            "normal_force_N": found.normal,
+            "tangential_force_N": found.tangential,
+            "force_N": found.forces,
+            "strong": above,
+        }
+        for name, each in values.items():
+            mesh.cell_data[name] = each[mesh.cell_data["contact"]]
+        return mesh
+
+
+def link_boxes(
+    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
+) -> pv.PolyData:
+    """Return the links of all smarticles as one mesh of boxes.
+
+    The section of a straight smarticle, or of one without barbs, is turned about its length by an angle that four
+    vertices do not tell: some angle is taken. Links without length have no box.
+
+    Args:
+        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+        thickness_normal: t1, along the normal of the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
+
+    Returns:
+        Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
+        `vertices`, and `link`, 0 to 2.
+
+    Raises:
+        InputError: Bad vertices or thicknesses.
+    """
+    vertices = checked_vertices(vertices)
+    in_plane = np.broadcast_to(thickness_in_plane, 3)
+    if not (thickness_normal > 0 and (in_plane > 0).all()):
+        msg = f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m"
+        raise InputError(msg)
+    lengths = link_lengths(vertices)
+    smarticle, link = np.nonzero(lengths > 1e-9 * lengths.sum(axis=1, keepdims=True))
+    start, end = vertices[smarticle, link], vertices[smarticle, link + 1]
+    along = end - start
+    across = np.cross(plane_frames(vertices)[smarticle, 2], along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    # Square to the link even where the four vertices are not quite in one plane.
+    normal = np.cross(along, across)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    edges = np.stack([along, in_plane[link, None] * across, thickness_normal * normal], axis=1)
+    points = ((start + end) / 2)[:, None] + np.einsum("ce,bex->bcx", _CORNERS, edges)
+    faces: Any = _FACES + BOX_POINTS * np.arange(len(points))[:, None, None]
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), faces.reshape(-1, 4))
+    mesh.cell_data["smarticle"] = np.repeat(smarticle, BOX_FACES)
+    mesh.cell_data["link"] = np.repeat(link, BOX_FACES)
+    return mesh
+
+
+def owners(mesh: pv.PolyData, frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return places in a frame's arrays of the boxes' smarticles, and links; the mesh carries both fields."""
+    owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
+    order = np.argsort(frame.smarticle_ids)
+    return order[np.searchsorted(frame.smarticle_ids, owner, sorter=order)], link
+
+
+def force_lines(forces: RecordedForces) -> pv.PolyData:
+    """Return lines from centres of mass to the contacts [m]: two for each contact, one where a boundary is touched.
+
+    Straight lines, each with two points of its own: a tube about a line that bends at a sharp angle is torn. Cell data
+    `contact`, the place of the contact.
+    """
+    halves = [np.stack([forces.ends[:, k], forces.contacts.points], axis=1) for k in (0, 1)]
+    segments = np.concatenate([halves[0], halves[1][forces.between]])
+    numbers = np.arange(len(forces.ends))
+    lines = np.column_stack([np.full(len(segments), 2), np.arange(2 * len(segments)).reshape(-1, 2)])
+    mesh = pv.PolyData(segments.reshape(-1, 3), lines=lines)
+    mesh.cell_data["contact"] = np.concatenate([numbers, numbers[forces.between]])
+    return mesh
+
+
+def solid(kind: str, mesh: pv.PolyData, run: RunManifest, *, largest: float | None = None) -> pv.PolyData:
+    """Return a body as triangles alone.
+
+    Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
+    most, whose thickness is in proportion to the normal force; boxes stay what they are.
+
+    Args:
+        kind: Key of `KINDS`.
+        mesh: Of `Bodies.at`.
+        run: The run.
+        largest: Normal force of the thickest tube [N]; that of this mesh if not given.
+    """
+    thin = min(run.thickness_in_plane, run.thickness_normal)
+    if kind == "strings":
+        mesh = mesh.tube(radius=thin / 10, n_sides=8, capping=True)
+    if kind == "forces":
+        normal = np.asarray(mesh.cell_data["normal_force_N"])
+        shares = np.clip(normal / (largest or float(normal.max())), _THINNEST, 1.0)
+        bare = pv.PolyData(mesh.points, lines=mesh.lines)
+        bare.point_data["radius"] = np.repeat(thin / 2 * shares, 2)
+        mesh = bare.tube(radius=1.0, scalars="radius", absolute=True, n_sides=8, capping=True)
+    if kind == "crossings":
+        arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
+        mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)
+    triangles: pv.PolyData = mesh.triangulate()
+    return triangles
+
+
+def joined(parts: Iterable[pv.PolyData]) -> pv.PolyData:
+    """Return several meshes as one."""
+    first, *rest = parts
+    mesh: pv.PolyData = first.append_polydata(*rest)
+    return mesh
