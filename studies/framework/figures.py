@@ -79,6 +79,23 @@ class Figure(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """A figure of one study alone.
+
+    Attributes:
+        name: Of the files.
+        of: Draws it below a footer and writes it to a path without suffix; gives the files.
+    """
+
+    name: str
+    of: Callable[[Path, Analysis], list[Path]]
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw and write the figure."""
+        return self.of(path, analysis)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Means:
     """Means of quantities with their error bars against a variable, a panel for each quantity.
 

@@ -114,17 +114,20 @@ class Finding:
         found_if: What makes it true.
         outcome: Effects of a table of runs or samples.
         rows: Applied to the table before.
+        tables: Names of the study's tables that `outcome` takes instead, one argument each.
     """
 
     id: str
     says: str
     found_if: str
-    outcome: Callable[[pd.DataFrame], Outcome | Sequence[Effect]] = field(repr=False)
+    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
     rows: Rows = field(default=lambda table: table, repr=False)
+    tables: Sequence[str] = ()
 
-    def judge(self, table: pd.DataFrame) -> Judged:
-        """Judge the finding by a table of runs or samples."""
-        outcome = self.outcome(self.rows(table))
+    def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
+        """Judge the finding by a table of samples, or by the study's tables that it names."""
+        given = [(tables or {})[name] for name in self.tables] if self.tables else [self.rows(samples)]
+        outcome = self.outcome(*given)
         outcome = outcome if isinstance(outcome, Outcome) else Outcome(effects=outcome)
         verdict, more = _verdict([effect for effect in outcome.effects if effect.sign])
         if outcome.verdict is not None:

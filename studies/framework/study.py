@@ -80,12 +80,16 @@ class Study:
     Attributes:
         name: For the command line, and in provenance.
         title: Of its text.
-        measure: Measures one finished run: its row of the table of runs. An InputError lists the run as missing.
+        measure: Measures one finished run: its row of the table of runs, or several. An InputError lists the run as
+            missing.
         keys: Columns that name a point: one combination of the sweep's variables.
         quantities: Columns that are averaged over seeds.
         findings: What is judged, in the paper's order.
         figures: What is drawn.
         samples: Makes the table that is averaged and judged from the table of runs of one engine.
+        extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
+        shown: Selects the points of the short table.
+        same_count: Columns within which all runs must have the same number of smarticles.
         order: Columns that the table of runs is sorted by.
         constant: Columns that must be equal within groups, with the columns that make the groups.
         bounds: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs.
@@ -100,12 +104,15 @@ class Study:
 
     name: str
     title: str
-    measure: Callable[[RunManifest], Row]
+    measure: Callable[[RunManifest], Row | Sequence[Row]]
     keys: Sequence[Key]
     quantities: Sequence[Quantity]
     findings: Sequence[Finding]
     figures: Sequence[Figure] = ()
     samples: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
+    extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
+    shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points
+    same_count: Sequence[str] = (ASPECT,)
     order: Sequence[str]
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
     bounds: tuple[str, str] | None = None
@@ -141,7 +148,7 @@ class Study:
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
         self.reject_unlike(found)
         tables = self.tabulate(runs_table(found))
-        judged = self.judge(tables["runs"])
+        judged = self.judge(tables)
         tables["findings"] = findings_table(judged)
         manifests, missing = found.manifests, found.missing
         origin = Origin(
@@ -172,7 +179,8 @@ class Study:
 
     def measured(self, run: RunManifest) -> MeasuredRun:
         """Measure one finished run."""
-        return MeasuredRun(manifest=run, rows=[self.measure(run)])
+        rows = self.measure(run)
+        return MeasuredRun(manifest=run, rows=[rows] if isinstance(rows, Mapping) else rows)
 
     def reject_unlike(self, found: Collected) -> None:
         """Reject runs that must not be averaged or compared.
@@ -183,7 +191,11 @@ class Study:
         found.refuse_mixture("fidelity", lambda run: run.manifest.fidelity)
         if self.one_engine:
             found.refuse_mixture("engine", lambda run: run.manifest.engine)
-        found.refuse_mixed_counts()
+        found.refuse_mixture(
+            "count",
+            lambda run: f"{run.manifest.count} smarticles",
+            within=partial(_values, columns=self.same_count),
+        )
         for column, within in self.constant.items():
             found.refuse_mixture(column, partial(_value, column=column), within=partial(_values, columns=within))
         found.refuse_repeats("point", self.point_of)
@@ -194,14 +206,17 @@ class Study:
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
     def tabulate(self, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-        """Make all tables of the table of runs: `runs`, `points`, and `engines` if there are several."""
+        """Make all tables of the table of runs: `runs`, `points`, `engines` if there are several, and extra ones."""
         runs = sort_rows(runs, self.order, self.keys)
-        tables = {"runs": runs, "points": by_engine(runs, lambda part: self.points(self.samples(part)))}
-        if engines_of(runs):
-            columns = [quantity.column for quantity in self.quantities]
-            samples = by_engine(runs, self.samples)
-            tables["engines"] = compared_engines(samples, [key.column for key in self.keys], columns)
-        return tables
+        extra = self.extra(runs)
+        tables = {"runs": runs}
+        if "points" not in extra:
+            tables["points"] = by_engine(runs, lambda part: self.points(self.samples(part)))
+            if engines_of(runs):
+                columns = [quantity.column for quantity in self.quantities]
+                samples = by_engine(runs, self.samples)
+                tables["engines"] = compared_engines(samples, [key.column for key in self.keys], columns)
+        return tables | dict(extra)
 
     def points(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Average over seeds: `… SE` is the standard error, `… 95 %` the half-width of the confidence interval."""
@@ -221,14 +236,14 @@ class Study:
             rows.append(row)
         return sort_rows(pd.DataFrame(rows), columns, self.keys)
 
-    def judge(self, runs: pd.DataFrame) -> tuple[Judged, ...]:
-        """Judge all findings by the table of runs: by the runs of the engine that judges."""
-        samples = self.samples(judging(runs))
-        return tuple(finding.judge(samples) for finding in self.findings)
+    def judge(self, tables: Mapping[str, pd.DataFrame]) -> tuple[Judged, ...]:
+        """Judge all findings, by the samples of the engine that judges or by the tables."""
+        samples = self.samples(judging(tables["runs"]))
+        return tuple(finding.judge(samples, tables) for finding in self.findings)
 
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
         """Header and rows of the short table of points."""
-        points = tables["points"]
+        points = self.shown(tables["points"])
         named = {**cells_of(self.keys), "seeds": lambda point: str(point[SEEDS])}
         return short_table(points, told_by_engine(points, named), self.quantities)
 
