@@ -6,13 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-from cases import add, advance_watched, build, pour
+from cases import add, advance_watched, build
 from fixture_cases import damped
 
 from dem.engine.yade.engine import YadeEngine
-from dem.errors import RunError
 from dem.plan.steps import time_step
-from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from validation.bench import scene_of
 
@@ -97,50 +95,3 @@ def carried(data: dict[str, Any], *, periods: int) -> dict[str, Any]:
         "weight": mass * g,
         "amplitude": amplitude,
     }
-
-
-def shaken_pile(data: dict[str, Any], *, count: int, samples: int, every: int) -> dict[str, Any]:
-    """A pile on the floor alone, thrown about: the momentum balance against the contact force of every step."""
-    scene = scene_of(data)
-    engine = build(scene, shaken=True)
-    pour(engine, scene, count)
-    engine.advance(round(0.15 / engine.time_step))
-    wall = without_wall(engine, scene)
-    amplitude, frequency = last_shake(scene)
-    engine.fixtures.shake(amplitude=amplitude, frequency=frequency)
-    sampler = Sampler(scene.container.radius_m)
-    sampler.sample(engine, engine.state(), 0)
-    means, balance = [], []
-    stale = 0
-    for _ in range(samples):
-        forces: list[np.ndarray] = []
-        advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
-        means.append(np.mean(forces, axis=0))
-        balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
-        stale += sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
-    return {
-        "steps": np.array(means),
-        "balance": np.array(balance),
-        "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
-        "stale": stale,
-    }
-
-
-def shake_under_a_hanging_wall(data: dict[str, Any]) -> str:
-    """The phases themselves, of a wall that is lifted too slowly; what the shake says."""
-    phases = [
-        {"type": "deposit"},
-        {"type": "remove-container", "speed_m_per_s": 0.05, "duration_s": 0.06},
-        {"type": "shake", "duration_s": 0.1},
-    ]
-    scene = scene_of(data | {"count": 1, "phases": phases})
-    engine = build(scene, shaken=True)
-    add(engine, (0, 0, -scene.particle.centres[:, 2].min() + scene.particle.radius))
-    lifting = scene.phases[1].begin(scene, 1)
-    while wait := lifting.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-    try:
-        scene.phases[2].begin(scene, 2).proceed(engine)
-    except RunError as error:
-        return str(error)
-    return "nothing"

@@ -25,7 +25,6 @@ from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from validation.bench import add, advance_watched, body_rotations, scene_of
-from validation.known.floor import resting
 from validation.yade_access import YadeAccess
 
 
@@ -110,14 +109,6 @@ def stopping(data: dict[str, Any]) -> dict[str, Any]:
     except RunError as error:
         return {"steps": steps, "text": str(error)}
     return {"steps": steps, "text": ""}
-
-
-def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """A smarticle lying flat on a floor without friction is pushed along it."""
-    scene = scene_of(data)
-    engine = resting(YadeAccess(), scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
-    engine.advance(round(duration / engine.time_step))
-    return {"v": engine.state().velocities[0, 1]}
 
 
 def thrown(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:

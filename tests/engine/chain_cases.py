@@ -8,7 +8,7 @@ import numpy as np
 from cases import add
 from scipy.spatial.transform import Rotation
 
-from dem.body.chain import Tie, extent
+from dem.body.chain import Tie
 from dem.engine.yade.engine import YadeEngine
 from dem.phases.arrange import chain_of
 from dem.physics.strings import StringLaw
@@ -119,35 +119,3 @@ def bodies(data: dict[str, Any]) -> dict[str, int]:
         "container": len(engine.fixtures.container),
         "strings": int(engine.strings.tied),
     }
-
-
-def leaning(data: dict[str, Any], *, depth: float) -> dict[str, Any]:
-    """One smarticle, the face of its middle link deeper in the lower wall than touching it [m]; of the first step."""
-    scene = scene_of(data)
-    engine, boxes = build(scene), scene.particle.boxes
-    face = boxes.vertices[1, 1] - boxes.thicknesses_in_plane[1] / 2
-    add(engine, (0, -scene.plane.width_m / 2 - face - depth, 0), Rotation.identity())
-    engine.motors.articulate()
-    engine.advance(1)
-    force = -float(engine.fixtures.channel_sums[0, 1])
-    return {"force": force, "touches": int(engine.touches()[0]), "energy": engine.state().kinetic_energy}
-
-
-def between_walls(data: dict[str, Any], *, strain: float) -> list[tuple[float, float, float]]:
-    """A chain strained by the phase itself: its width [m], outward force on walls [N] and deepest contact [m]."""
-    scene = scene_of(data)
-    engine = build(scene)
-    scene.phases[0].begin(scene, 0).proceed(engine)
-    stage, first, found = scene.phases[1].begin(scene, 1), chain_of(scene).length, []
-    before, looks = engine.fixtures.channel_sums, 0
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-        now, looks = engine.fixtures.channel_sums, looks + 1
-        if looks % 20 == 0:
-            outwards = float((now - before)[1, 1] - (now - before)[0, 1])
-            width = extent(engine.state(), 2 * scene.particle.radius)
-            found.append((width, outwards, engine.overlaps(1.0).deepest))
-        before = now
-        if np.ptp(engine.strings.ties[:, 0]) > (1 + strain) * first:
-            break
-    return found

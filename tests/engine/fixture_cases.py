@@ -18,7 +18,7 @@ from dem.record.progress import ProgressWriter
 from dem.run.build import build_recorder
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from validation.bench import FLAT, add, advance_watched, scene_of
+from validation.bench import add, advance_watched, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
@@ -95,24 +95,6 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     }
 
 
-def hang_low(data: dict[str, Any], *, settle: float) -> dict[str, Any]:
-    """A U hung over the outermost bar along y of the lower hook's grid, clear of the others and of the floor."""
-    scene = scene_of(data)
-    engine = build(scene)
-    grid, particle = scene.hooks.crosses[0], scene.particle
-    middle = HANGING.apply(particle.centres[particle.links == 1])
-    top = grid.height + grid.side / 2 + particle.radius
-    far = grid.bars[-1].middle[0]
-    add(engine, (far, far / 2, top - middle[:, 2].max() + 1e-5), HANGING)
-    damped(engine, 0.3)
-    engine.advance(round(settle / engine.time_step))
-    return {
-        "rest": mean_hook_forces(engine, 200),
-        "far": far,
-        "weight": particle.boxes.mass * scene.gravity_m_per_s2,
-    }
-
-
 def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
     """A U round both hooks, one barb below the lower and one above the upper, which is raised until a contact is deep.
 
@@ -143,37 +125,6 @@ def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
         "held": [(held.smarticle, held.between, held.apart) for held in strain.held],
         "raised": engine.fixtures.upper_height - upper.height,
         "said": said,
-    }
-
-
-def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, Any]:
-    """A bar's end inside the mouth of a U that lies on the floor draws it along by its middle link."""
-    scene = scene_of(data)
-    engine = build(scene, radius=0.2)
-    particle = scene.particle
-    cross = scene.hooks.crosses[0]
-    lowest = particle.centres[:, 2].min() - particle.radius
-    middle = particle.centres[particle.links == 1][:, 1].mean()
-    # y runs from the middle link to the mouth: the link is ahead of the bar's end, which moves in -y.
-    end = -cross.length / 2
-    add(engine, (0, end - particle.radius - middle - 1e-5, -lowest), FLAT)
-    engine.advance(round(0.05 / engine.time_step))
-    for bar in engine.fixtures.hooks[0]:
-        engine._omega.bodies[bar].state.vel = engine._yade.vector(0, -speed, 0)
-    engine.advance(round(0.5 * distance / speed / engine.time_step))
-    forces: list[np.ndarray] = []
-    steps = round(0.5 * distance / speed / engine.time_step)
-    before = engine.fixtures.hook_sums
-    start = engine.state().positions[0]
-    advance_watched(engine, steps, lambda: forces.append(engine.container_force()))
-    state = engine.state()
-    return {
-        "hook": (engine.fixtures.hook_sums - before)[0] / steps,
-        "floor": np.mean(forces, axis=0),
-        "moved": state.positions[0] - start,
-        "expected": speed * steps * engine.time_step,
-        "spin": state.link_spins[0, 1],
-        "weight": particle.boxes.mass * scene.gravity_m_per_s2,
     }
 
 
@@ -301,25 +252,4 @@ def inventory(data: dict[str, Any]) -> dict[str, Any]:
         "hooks": len(engine.fixtures.hooks),
         "sums": engine.fixtures.hook_sums.size,
         "columns": set(Sampler(1.0, {EffectName.HOOKS} if scene.hooks is not None else set()).described),
-    }
-
-
-def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """The phase itself, on one smarticle that lies on the floor."""
-    phase = {"type": "remove-container", "speed_m_per_s": speed, "duration_s": duration}
-    scene = scene_of(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
-    engine = build(scene)
-    lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
-    add(engine, (0, 0, -lowest))
-    bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].begin(scene, 1)
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-    end = engine.fixtures.wall_bottom
-    engine.advance(20)
-    return {
-        "walled": engine.fixtures.walled,
-        "rise": end - bottom,
-        "crept": engine.fixtures.wall_bottom - end if engine.fixtures.walled else 0.0,
-        "enclosed": engine.fixtures.enclosed,
     }

@@ -21,8 +21,6 @@ from scipy.spatial.transform import Rotation
 from dem.engine.yade.kind import contact_law_of, hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
 from validation.bench import Targets, drive
-from validation.known.hinge import upright
-from validation.yade_access import YadeAccess
 from validation.yade_access import bodies_of as bodies
 
 
@@ -254,37 +252,5 @@ def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any
         "angles": engine.state().angles[0] - begun[0],
         "command": engine.motors.readings.commands[0] - begun[0],
         "gap": engine.motors.gaps().max(),
-        "limit": scene.torque_limit,
-    }
-
-
-def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
-    """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
-    scene = cases.scene_of(data)
-    reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
-    height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
-    engine = upright(YadeAccess(), scene, gravity=0.0, height=height)
-    begun = engine.state().angles[0]
-    rows = []
-    for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
-        told = engine.motors.readings
-        rows.append(
-            (
-                time,
-                *told.commands[0],
-                *engine.motors._hinges.torques()[0],
-                *told.halted[0],
-                engine.motors.gaps().max(),
-            )
-        )
-    table = np.array(rows)
-    return {
-        "time": table[:, 0],
-        "commands": table[:, 1:3],
-        "torques": table[:, 3:5],
-        "halted": table[:, 5:7],
-        "gap": table[:, 7] / scene.sphere_diameter,
-        "begun": begun,
-        "angles": engine.state().angles[0],
         "limit": scene.torque_limit,
     }

@@ -13,8 +13,6 @@ import pytest
 from run_files import series
 from scenes import CHAIN, changed
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 STIFFNESS, LIMIT = 0.1, 0.05  # N m/rad, N m
 
@@ -123,9 +121,3 @@ def test_strings_and_servos_go_on_from_a_checkpoint(simulate: Simulate, tmp_path
     # Contacts are added up in another order after a checkpoint, and no more than that.
     assert forces[0].max() > 0.1
     assert forces[1] == pytest.approx(forces[0], abs=1e-6)
-
-
-def test_nothing_of_a_plane_exists_elsewhere(simulate: Simulate, scene_data: Callable[..., dict[str, Any]]) -> None:
-    assert simulate(chain_cases.bodies, scene_data()) == {"felt": 0, "container": 129, "strings": 0}
-    assert simulate(chain_cases.bodies, chain()) == {"felt": 2, "container": 3, "strings": 0}
-    assert simulate(chain_cases.bodies, chain(plane={"width_m": None})) == {"felt": 0, "container": 1, "strings": 0}

@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 from dem.record.columns import EVERY
-from postprocess import measure_run, read_frames, read_run, read_series, summarise_run
-from postprocess.scene_file import read_phases
-
-pytestmark = pytest.mark.engine
+from postprocess import measure_run, read_frames, read_series, summarise_run
 
 PHASES = ["deposit", "relax", "shake", "internal-oscillation"]
 SCENE: dict[str, Any] = {
@@ -91,21 +88,6 @@ def test_series_hold_the_engine_s_numbers_and_the_units_of_their_columns(
     )
     assert series.units == {name: EVERY[name].unit for name in series.data}
     assert "motor_work_J" in series.data
-
-
-def test_manifest_and_scene_tell_of_the_same_run(handed: tuple[Path, list[dict[str, Any]]]) -> None:
-    out, notes = handed
-    run = read_run(out)
-    assert (run.status, run.name, run.count, run.seed) == ("done", "handover", 6, 5)
-    assert [phase.type for phase in run.phases] == PHASES == [phase.type for phase in read_phases(out)]
-    assert (run.smarticle_mass, run.solid_volume) == (notes[-1]["mass"], notes[-1]["volume"])
-    assert run.container_radius == notes[-1]["radius"]
-    assert run.end_time is not None
-    # The last sample is nearer to the end than two samples are to each other.
-    assert 0 <= run.end_time - notes[-1]["time"] < notes[-1]["time"] - notes[-2]["time"]
-    for before, after in zip(run.phases, run.phases[1:], strict=False):
-        assert before.end == after.start
-    assert all(phase.time_step is not None and phase.time_step >= run.time_step > 0 for phase in run.phases)
 
 
 def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]]) -> None:

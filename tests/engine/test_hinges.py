@@ -12,8 +12,6 @@ import hinge_cases
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 VELOCITY, SPIN = (0.1, -0.2, 0.3), (20.0, 35.0, -15.0)
@@ -42,11 +40,7 @@ def shape(aspect_ratio: float, fidelity: str = "draft", angles: Any = (90, 90), 
 @pytest.mark.parametrize(
     ("changes", "spin", "straight_in"),
     [
-        (shape(0.4), (0, 0, 0), 0.3),
-        (shape(0.7, "standard"), (0, 0, 0), 0.3),
-        (shape(0.7, angles=(90, 20)), (0, 0, 0), 0.3),
         (shape(1.0), (0, 0, 0), 0.6),  # faster, the vibration on the shafts halts the motors
-        (shape(0.4), SPIN, 0.3),
         (shape(0.7, "standard", angles=(90, 20)), SPIN, 0.4),
     ],
 )
@@ -65,9 +59,7 @@ def test_free_gait_keeps_momentum_and_its_hinges_together(
     assert np.abs(gait["angles"]).max() < 0.01
 
 
-@pytest.mark.parametrize(
-    ("changes", "share"), [(shape(0.7), 0.03), (shape(0.7, angles=(90, 20)), 0.03), (shape(1.0, "standard"), 0.03)]
-)
+@pytest.mark.parametrize(("changes", "share"), [(shape(0.7, angles=(90, 20)), 0.03)])
 def test_motors_of_a_closed_cycle_do_no_net_work(
     simulate: Simulate, data: SceneData, changes: dict[str, Any], share: float
 ) -> None:
@@ -87,8 +79,7 @@ def test_motors_of_a_closed_cycle_do_no_net_work(
     assert moved > 1e-6
 
 
-@pytest.mark.parametrize("fidelity", ["draft", "standard", "reference"])
-@pytest.mark.parametrize("aspect_ratio", [0.4, 0.7, 1.0])
+@pytest.mark.parametrize(("fidelity", "aspect_ratio"), [("draft", 1.0), ("standard", 0.4), ("reference", 0.7)])
 def test_links_of_one_smarticle_never_touch(
     simulate: Simulate, data: SceneData, fidelity: str, aspect_ratio: float
 ) -> None:
@@ -105,8 +96,7 @@ def test_links_of_one_smarticle_never_touch(
 # -- violence ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), [(0.4, "draft"), (0.7, "standard"), (1.0, "draft")])
-@pytest.mark.parametrize("limit", [None, STRONG])
+@pytest.mark.parametrize(("aspect_ratio", "fidelity", "limit"), [(0.7, "standard", None), (1.0, "draft", STRONG)])
 def test_jump_of_a_command_at_sixty_radians_per_second(
     simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str, limit: float | None
 ) -> None:
@@ -124,8 +114,9 @@ def test_jump_of_a_command_at_sixty_radians_per_second(
     assert least - jump["interval"] * 1.01 < arrived < (1.05 if limit else 1.3) * least
 
 
-@pytest.mark.parametrize("turn", [(0.4, 0.2, -0.7), (1.5, 0.3, 0.1)])
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), [(0.4, "draft"), (0.7, "draft"), (0.7, "standard")])
+@pytest.mark.parametrize(
+    ("aspect_ratio", "fidelity", "turn"), [(0.4, "draft", (0.4, 0.2, -0.7)), (0.7, "standard", (1.5, 0.3, 0.1))]
+)
 def test_smarticle_thrown_at_the_floor_gains_no_energy(
     simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str, turn: Any
 ) -> None:
@@ -141,7 +132,7 @@ def test_smarticle_thrown_at_the_floor_gains_no_energy(
 
 # -- the stable time step ----------------------------------------------------------------------------------------------
 
-STACKS = [(0.4, "draft"), (0.7, "draft"), (1.0, "draft"), (0.4, "standard"), (0.7, "standard"), (1.0, "standard")]
+STACKS = [(1.0, "draft"), (0.4, "standard")]
 
 
 @pytest.mark.parametrize(("aspect_ratio", "fidelity"), STACKS)
@@ -155,15 +146,6 @@ def test_stack_is_quiet_below_the_stable_step(
     # As for welded smarticles (test_contact.py): they chatter at some mm/s where the step is too large.
     assert stack["fastest"] < 1e-4
     assert stack["gap"] < 0.01
-
-
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), STACKS[::2])
-def test_stack_bursts_above_the_stable_step(
-    simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str
-) -> None:
-    case = hinge_cases.stack
-    stack = simulate(case, data(shape(aspect_ratio, fidelity)), layers=6, times_stable=2.0, settle=0.1, watch=0.02)
-    assert stack["fastest"] == math.inf
 
 
 # -- checkpoints -------------------------------------------------------------------------------------------------------

@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from run_files import series
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 MU, G = 0.4, 9.81
@@ -46,40 +44,6 @@ def test_a_lifted_wall_drags_by_friction(simulate: Simulate, scene_data: SceneDa
     assert rubbed["speed"].max() < 0.3
     assert acceleration == pytest.approx(MU * G, rel=5e-3)
     assert rubbed["force"] == pytest.approx(-MU * rubbed["weight"], rel=5e-3)
-
-
-@pytest.mark.parametrize("speed", [None, 0.2])
-def test_a_pile_melts_and_the_run_goes_on(
-    simulate: Simulate, scene_data: SceneData, tmp_path: Path, speed: float | None
-) -> None:
-    data = scene_data({"count": 30, "container.radius_m": 0.0135})
-    data["phases"] = [
-        {"type": "deposit"},
-        {"type": "remove-container", "duration_s": 0.3, "speed_m_per_s": speed},
-        {"type": "relax", "duration_s": 0.1},
-    ]
-    answer = simulate(cases.run, data, str(tmp_path / "run"))
-    assert answer["error"] is None, answer
-    found = series(tmp_path / "run")
-    poured, melting, last = (found["phase"] == k for k in range(3))
-    assert found["outside_count"][poured].max() == 0
-    assert found["outside_count"][last].min() > 0  # measured, not refused
-    assert found["com_height_m"][last][-1] < 0.95 * found["com_height_m"][poured][-1]
-    assert np.isfinite(found["packing_fraction"][poured][-1])
-    assert np.isnan(found["packing_fraction"][melting][2:]).all()
-    assert np.isnan(found["packing_fraction"][last]).all()
-    weight = 30 * 7850 * 1.27e-3 * 0.5e-3 * 0.0117 * 2.4 * G
-    assert found["container_force_N"][last][-5:].mean(axis=0)[2] == pytest.approx(-weight, rel=0.02)
-
-
-def test_a_wall_that_is_not_clear_stays_where_it_is(simulate: Simulate, scene_data: SceneData) -> None:
-    lifted = simulate(fixture_cases.lift_a_little, scene_data(), speed=0.05, duration=0.06)
-    assert lifted["walled"]
-    assert lifted["rise"] == pytest.approx(0.05 * 0.06, rel=0.02)
-    assert lifted["crept"] == 0
-    assert not lifted["enclosed"]
-    cleared = simulate(fixture_cases.lift_a_little, scene_data(), speed=0.6, duration=0.1)
-    assert not cleared["walled"]
 
 
 def test_a_mould_of_tiers_shapes_the_pile(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:

@@ -23,9 +23,6 @@ from run_files import frame_files, series
 
 from dem.scene.reading import load_scene, scene_hash
 
-pytestmark = pytest.mark.engine
-
-Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 ROOT = Path(__file__).resolve().parents[2]
 RUN = (
@@ -194,26 +191,6 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
     assert rows["max_speed_m_per_s"][shaken].max() > 0.05
 
 
-def test_force_of_a_layer_that_still_falls_is_not_counted(finished: tuple[Path, dict[str, Any]]) -> None:
-    out, data = finished
-    rows, mass = series(out), cases.scene_of(data).smarticle.boxes.mass
-    (poured,) = np.flatnonzero(np.diff(rows["count"]) == 5)[1:] + 1
-    assert rows["count"][poured - 1 : poured + 1].tolist() == [5, 10]
-    # Five lie on the floor; the other five have fallen for less than 8 ms, and start a whole sphere above.
-    force = rows["container_force_N"][poured, 2]
-    # The first layer has landed but may still rock, by a few per cent of its weight; charging the second one for the
-    # part of the interval before it was poured would add half of its weight.
-    assert force == pytest.approx(-5 * mass * 9.81, rel=0.1)
-
-
-def test_bars_without_barbs_settle(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:
-    # l/w = 0 is in the range that must work.
-    data = scene_data({"smarticle.aspect_ratio": 0, "count": 20, "phases": [{"type": "deposit"}]})
-    data["phases"][0]["settle"] = {"timeout_s": 2.0}
-    answer = simulate(cases.run, data, str(tmp_path / "run"))
-    assert answer["error"] is None, answer["text"]
-
-
 def test_same_seed_gives_the_same_bits_and_another_seed_others(
     worker: Any, scene_data: SceneData, tmp_path: Path
 ) -> None:
@@ -283,17 +260,3 @@ def test_disk_that_fills_up_ends_the_run_with_one_line(
         assert len(meshio.read(path).points) > 0
     assert len(series(out)["time_s"]) > 1
     assert not [path for path in out.rglob("*") if "partial" in path.name]
-
-
-def test_a_limit_of_file_sizes_is_told_and_is_no_internal_error(scene_data: SceneData, tmp_path: Path) -> None:
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(yaml.safe_dump(scene_data()))
-    # Enough for a frame, and not for the state that YADE writes with a library of its own.
-    command = ["bash", "-c", 'ulimit -f 20; exec "$@"', "bash", sys.executable, "-m", "smarticles", "run", str(scene)]
-    said = subprocess.run(
-        [*command, "--out", str(tmp_path / "run")], capture_output=True, text=True, check=False, timeout=TIMEOUT
-    )
-    assert said.returncode == 1
-    (line,) = said.stderr.splitlines()
-    assert "the state cannot be written (" in line
-    assert "the checkpoint before is whole" in line

@@ -16,8 +16,6 @@ import pytest
 from processes import complete, differing, gate, results
 from slurm_here import SlurmHere, slurm_here
 
-pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]
-
 SCENE = """\
 schema_version: 1
 seed: 1

@@ -14,8 +14,6 @@ from run_files import frame_files, series
 from dem.plan.steps import time_steps
 from dem.scene.reading import parse_scene
 
-pytestmark = pytest.mark.engine
-
 SceneData = Callable[..., dict[str, Any]]
 Simulate = Callable[..., dict[str, Any]]
 REST = [{"type": "deposit", "per_layer": 4}, {"type": "relax", "duration_s": 0.05}]
@@ -65,9 +63,3 @@ def test_samples_stay_on_their_grid_when_the_step_changes(runs: dict[str, tuple[
         assert off[phases == phase].max() <= step / 2 + 1e-12
     assert off[phases == 2].max() > 1e-9
     assert times[-1] > 0.1
-
-
-def test_yade_that_stops_by_itself_is_an_error_and_no_steps_are_none(simulate: Simulate, scene_data: SceneData) -> None:
-    found = simulate(cases.stopping, scene_data())
-    assert found["steps"] == 7
-    assert found["text"].startswith("YADE stopped at step 7 of 12 (t = 0.000")

@@ -124,13 +124,3 @@ def test_spheres_follow_their_links(first: float, second: float, seed: int) -> N
     rigid, _ = flying(exact.boxes, seed)
     carried = State(made.boxes, rigid.link_positions, rigid.link_rotations, rigid.link_velocities, rigid.link_spins)
     assert carried.spheres(made) == pytest.approx(rigid.spheres(exact), abs=1e-15)
-
-
-def test_no_smarticles_have_no_momentum() -> None:
-    none = np.empty((0, 3, 3))
-    state = State(make_boxes(), none, np.empty((0, 3, 3, 3)), none, none)
-    assert state.count == 0
-    assert state.momentum.tolist() == [0, 0, 0]
-    assert state.kinetic_energy == 0
-    assert state.vertices.shape == (0, 4, 3)
-    assert state.angles.shape == (0, 2)

@@ -9,7 +9,7 @@ import pytest
 from scenes import small
 
 from dem.engine.lammps.child import NEEDED, Child, explain, lammps_version
-from dem.engine.lammps.ranks import RANKS, check_ranks, ranks
+from dem.engine.lammps.ranks import check_ranks
 from dem.errors import InputError, RunError
 from dem.run.run import run_scene
 
@@ -47,19 +47,6 @@ def test_what_is_missing_is_named_and_no_directory_is_left(
     with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
         run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
     assert not (tmp_path / "run").exists()
-
-
-def test_the_version_is_that_of_the_program(programs: Programs) -> None:
-    programs(lmp=said("2 Aug 2023 - Update 1"), mpirun="")
-    assert lammps_version() == "2 Aug 2023 - Update 1"
-
-
-@pytest.mark.parametrize("style", NEEDED)
-def test_a_lammps_without_its_packages_is_refused(programs: Programs, style: str) -> None:
-    programs(lmp=said(without=style), mpirun="")
-    with pytest.raises(RunError, match=r"LAMMPS 29 Sep 2021 was built without .*packages GRANULAR and RIGID") as caught:
-        lammps_version()
-    assert style in str(caught.value)
 
 
 @pytest.mark.parametrize("script", ["echo liblammps.so.0: cannot open >&2; exit 127", "echo something else"])
@@ -117,13 +104,6 @@ def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(program
     assert "signal 9 (Killed)" in kept.read_text()
     kept.unlink()
     kept.parent.rmdir()
-
-
-def test_ranks_are_one_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(RANKS, raising=False)
-    assert ranks() == 1
-    monkeypatch.setenv(RANKS, "3")
-    assert ranks() == 3
 
 
 def test_more_ranks_than_cores_are_refused_but_for_those_of_a_batch_system(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,12 +137,6 @@ def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
     assert np.array_equal(*poses)
 
 
-def test_a_layer_that_does_not_come_down_is_told() -> None:
-    scene = small({"gravity_m_per_s2": 1e-4})
-    with pytest.raises(RunError, match=r"a layer of 5 had not come down 2 s after .* phases\.0\.landed_speed_m_per_s"):
-        run_phase(scene, EngineDouble.of(scene, 1e-3), 0)
-
-
 @pytest.mark.parametrize(
     ("drift", "unbalanced", "said"),
     [(0.1, 0.0, "speed 0.1 m/s (limit 0.02 m/s)"), (0.0, 0.3, "unbalanced force 0.3 (limit 0.05)")],
@@ -160,21 +154,7 @@ def test_a_pile_that_does_not_settle_is_told_with_its_residuals(
     assert said in str(caught.value)
 
 
-def test_what_does_not_fit_is_told_with_how_many_did() -> None:
-    # On the double nobody lies on another: it is the reach of those that stand that leaves no room for a layer more.
-    scene = small({"container.height_m": 0.035})
-    with pytest.raises(RunError, match=r"10 smarticles do not fit: after 5 the next layer would reach .* lower count"):
-        run_phase(scene, EngineDouble.of(scene, DT), 0)
-
-
 # -- container ---------------------------------------------------------------------------------------------------------
-
-
-def test_shaking_tells_amplitude_and_frequency_and_stops() -> None:
-    scene, engine = begin({"type": "shake", "duration_s": 0.1, "frequency_hz": 25, "peak_acceleration_g": 3})
-    run_phase(scene, engine)
-    amplitude = 3 * 9.81 / (2 * np.pi * 25) ** 2
-    assert engine.told == [("shake", pytest.approx(amplitude), 25), ("stop",)]
 
 
 def test_the_floor_alone_is_shaken_within_its_wall() -> None:
@@ -264,14 +244,3 @@ def test_looks_that_are_told_at_once(at_once: int) -> None:
     assert len(ends[0][0]) == round(0.01 / scene.fidelity.control_interval_s) + 1
     np.testing.assert_array_equal(ends[0][0], ends[1][0])
     assert ends[0][1] == pytest.approx(ends[1][1], abs=1e-9)
-
-
-def test_a_chain_that_has_parted_is_noticed_whatever_is_told_at_once() -> None:
-    ends = []
-    for looks in (1, 64):
-        scene = chain({"phases.1.distance_m": 0.05, "phases.1.speed_m_per_s": 0.5})
-        engine = EngineDouble.of(scene, scene.fidelity.control_interval_s)
-        engine.motors.looks_at_once = looks
-        run_phase(scene, engine, 0)
-        ends.append(run_phase(scene, engine, 1))
-    assert ends[0] == pytest.approx(ends[1], abs=1e-9)

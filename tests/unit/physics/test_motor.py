@@ -47,29 +47,6 @@ def test_jump_of_the_target_is_followed_at_the_speed_limit(sign: int) -> None:
     assert (np.diff(seen[whole + 1 :]) == 0).all()
 
 
-def test_slow_schedule_is_followed_exactly_and_each_barb_its_own() -> None:
-    motors = Motors(replace(HALT, torque_limit=1.0), np.array([[0.1, 0.2], [0.3, 0.4]]))
-    for look in range(1, 6):
-        targets = np.array([[0.1 + 1e-4 * look, 0.2 - 2e-4 * look], [0.3, 0.4 + 3e-4 * look]])
-        torques = motors.look(np.array([[0.1, 0.2], [0.3, 0.4]]), targets, PERIOD, STEP)
-        assert motors.commands == pytest.approx(targets, rel=1e-14)
-        assert torques == pytest.approx(3e-3 * (targets - [[0.1, 0.2], [0.3, 0.4]]), abs=1e-18)
-        assert (motors.torques == torques).all()
-
-
-def test_a_motor_that_halts_falls_behind_its_schedule_by_what_it_did_not_go() -> None:
-    motors = held(HALT, 0.0, 0.1, 40)
-    # It stopped at the first look that found τ_max, 1.6e-5 N m / 3e-3 N m/rad, in steps of 6 rad/s for one period.
-    stopped = math.ceil(1.6e-5 / 3e-3 / (6 * PERIOD)) * 6 * PERIOD
-    assert motors.schedule == pytest.approx(np.full((1, 2), 0.1))
-    assert motors.schedule - motors.commands == pytest.approx(np.full((1, 2), 0.1 - stopped), rel=1e-12)
-    again = Motors(HALT, np.zeros((1, 2)))
-    again.restore(motors.memory)
-    assert again.memory == motors.memory
-    motors.engage(np.full((1, 2), 0.3))
-    assert (motors.schedule == motors.commands).all()
-
-
 # -- the halting law ---------------------------------------------------------------------------------------------------
 
 
@@ -101,25 +78,6 @@ def test_halting_motor_gives_way_at_once_and_goes_on_when_freed() -> None:
     motors.look(motors.commands.copy(), np.full((1, 2), 1.0), PERIOD, STEP)
     assert not motors.halted.any()
     assert motors.commands[0, 0] > stopped[0, 0]
-
-
-def test_halting_motor_that_is_overpowered_holds_its_command() -> None:
-    # A load that turns the barb against the motor: any torque is taken, none moves the command away.
-    motors = Motors(HALT, np.zeros((1, 2)))
-    for look in range(100):
-        torques = motors.look(np.full((1, 2), -1e-3 * look), np.full((1, 2), 0.5), PERIOD, STEP)
-    assert torques == pytest.approx(3e-3 * (motors.commands + 0.099), rel=1e-12)
-    assert (torques > 10 * HALT.torque_limit).all()
-    assert (motors.commands < 0.02).all()
-
-
-def test_one_barb_halts_alone() -> None:
-    motors = Motors(HALT, np.zeros((2, 2)))
-    angles = np.zeros((2, 2))
-    for look in range(40):
-        angles[0, 1] = 1.15e-3 * look  # this one is free to follow
-        motors.look(angles.copy(), np.full((2, 2), 1.0), PERIOD, STEP)
-    assert motors.halted.tolist() == [[True, False], [True, True]]
 
 
 def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> None:
@@ -186,24 +144,6 @@ def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
 # -- work --------------------------------------------------------------------------------------------------------------
 
 
-def test_work_against_a_held_command_is_the_springs() -> None:
-    # The command stays; the barb is turned by hand along any path: ∫ k (c - α) dα depends on its ends alone.
-    motors = Motors(HALT, np.zeros((1, 2)))
-    path = np.array([0.0, 0.001, 0.004, -0.002, -0.003, 0.002, 0.002, 0.002])
-    for angle in path:
-        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
-    assert motors.work == pytest.approx(np.full((1, 2), -3e-3 * 0.002**2 / 2), rel=1e-12)
-
-
-def test_work_of_a_slipping_motor_is_limit_times_way() -> None:
-    motors = Motors(SLIP, np.zeros((1, 2)))
-    for angle in np.linspace(0, 0.5, 2001):  # wound up after 5.3 mrad
-        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
-    wound = 1.6e-5 / 3e-3
-    expected = -(1.6e-5 * (0.5 - wound) + 1.6e-5 * wound / 2)
-    assert motors.work == pytest.approx(np.full((1, 2), expected), rel=1e-3)
-
-
 @pytest.mark.parametrize("law", [replace(HALT, torque_limit=1.0), SLIP])
 def test_work_is_the_energy_that_a_barb_gains(law: MotorLaw) -> None:
     # A barb of its own, integrated as YADE does: velocities half a step after angles, the torque at every step, a look
@@ -264,13 +204,6 @@ def test_memory_through_json_keeps_every_bit(law: MotorLaw) -> None:
             first, second = getattr(motors, name), getattr(again, name)
             assert first.dtype == second.dtype, name
             assert first.tobytes() == second.tobytes(), name
-
-
-def test_memory_is_a_copy() -> None:
-    motors = Motors(HALT, np.zeros((1, 2)))
-    memory = motors.memory
-    held(HALT, 0.0, 1.0, 10, motors)
-    assert memory["commands"] == [[0.0, 0.0]]
 
 
 # -- servos ------------------------------------------------------------------------------------------------------------

@@ -6,10 +6,9 @@ import json
 from typing import Any
 
 import pytest
-from scenes import chain, small
+from scenes import small
 
 from dem.engine.effect import Adds
-from dem.engine.yade.construction import ORDER
 from dem.plan.effects import EFFECTS, decide
 from dem.plan.outlook import plan
 from dem.record.columns import (
@@ -97,35 +96,9 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(
     assert json.loads(json.dumps(planned.to_dict()))["effects"][0]["adds"]["engines"] == list(plain.engines)
 
 
-@pytest.mark.parametrize(
-    ("contact", "off"),
-    [
-        ({"friction_smarticle": 0, "friction_wall": 0}, "friction"),
-        ({"restitution": 1}, "restitution"),
-    ],
-)
-def test_numbers_of_the_contact_law_that_are_nothing_are_said_to_be_off(contact: dict[str, Any], off: str) -> None:
-    assert on(small(PLAIN | {"contact": contact})) == ALWAYS - {off}
-
-
-def test_shaking_comes_before_the_motion_that_it_drives() -> None:
-    engines = plan(small({"phases": [DEPOSIT, {"type": "shake"}]})).engines
-    assert engines == ORDER
-    assert engines.index("HarmonicMotionEngine") == engines.index("NewtonIntegrator") - 1
-
-
 def test_every_column_belongs_to_one_effect() -> None:
     declared = [name for effect in EFFECTS for name in effect.adds.series]
     tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
     assert sorted(declared) == sorted(name for table in tables for name in table)
     assert len(set(declared)) == len(declared)
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
-
-
-def test_the_plan_tells_plane_strings_and_servos() -> None:
-    text = plan(chain({"motor.strength_spread": 0.1})).to_text()
-    assert "two walls 100 mm apart" in text
-    assert "h/H = 0.62" in text
-    assert "strings" in text
-    assert "servo" in text
-    assert text.splitlines()[0].endswith("in a plane")

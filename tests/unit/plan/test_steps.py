@@ -74,11 +74,6 @@ def test_time_step_divides_the_recording_intervals(fidelity: str, series: float)
         assert dt > 0.9 * wanted  # no smaller than needed
 
 
-def test_given_time_step_is_taken_exactly_where_it_divides() -> None:
-    assert time_step(small({"fidelity": {"time_step_s": 1e-5}})) == pytest.approx(1e-5, rel=1e-12)
-    assert time_step(small({"fidelity": {"time_step_s": 3e-5}})) == pytest.approx(0.004 / 134, rel=1e-12)
-
-
 def test_given_time_step_above_the_stable_one_is_refused_with_both() -> None:
     scene = small({"fidelity": {"time_step_s": 0.001}})
     stable = stable_step(scene)
@@ -118,12 +113,6 @@ def test_phases_before_the_motors_have_the_step_of_a_scene_without() -> None:
     assert time_steps(scene) == (*time_steps(without), shortest, shortest)
     assert time_steps(without) == (time_step(without),) * 2
     assert time_steps(scene)[0] > 1.5 * shortest
-
-
-@pytest.mark.parametrize("changes", [{"fidelity": {"time_step_s": 1e-5}}, {"phases": [{"type": "deposit"}]}])
-def test_a_step_by_hand_or_no_motors_make_all_phases_alike(changes: dict[str, object]) -> None:
-    scene = small({"phases": [{"type": "deposit"}, SWING], **changes})
-    assert set(time_steps(scene)) == {time_step(scene)}
 
 
 def test_a_servo_must_look_at_every_step() -> None:

@@ -15,15 +15,12 @@ from synthetic import SyntheticRun, mesh_of, write_manifest, write_run
 from dem.body.chain import Chain
 from dem.body.particle import HINGE_CLEARANCE, INWARDS, Boxes, Particle, SphereChain
 from dem.body.state import State
-from dem.record.frames import FrameWriter, read_frames
+from dem.record.frames import FrameWriter
 from dem.record.manifest import manifest_data, read_run
 from dem.scene.reading import dump_scene
-from postprocess.export.bodies import Bodies
-from postprocess.export.fields import BY_NAME, link_values
 from postprocess.geometry import chains
 from postprocess.measures.contacts import chain_of
 from postprocess.pictures.canvas import link_boxes
-from postprocess.pictures.strings import read_strings
 
 W, L, T1, BARB, BODY = 0.0467, 0.042, 0.021, 0.0095, 0.0213
 SPREAD = np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])  # m/s, of barb 1, middle link, barb 2
@@ -89,22 +86,6 @@ def test_boxes_are_as_thick_as_their_links() -> None:
     # The body shows below the hinges, barbs beside them.
     assert high - low == pytest.approx([W + BARB, L + BODY / 2, T1])
     assert mesh.triangulate().volume * 1e-9 == pytest.approx(T1 * (W * BODY + 2 * L * BARB), rel=1e-6)
-
-
-def test_exported_bodies_and_speeds_know_it(run: Path) -> None:
-    manifest, frame = read_run(run), read_frames(run)[-1]
-    mesh = Bodies.read(manifest, ["smarticles"], []).at(frame)["smarticles"]
-    assert np.ptp(mesh.points[:, 1]) == pytest.approx(LAYOUT.width)
-    masses = robot().link_masses
-    expected = np.linalg.norm(masses @ SPREAD) / masses.sum()
-    assert link_values(BY_NAME["speed_m_per_s"], frame, manifest)[0] == pytest.approx([expected] * 3)
-
-
-def test_strings_are_tied_on_the_axis(run: Path) -> None:
-    strings = read_strings(read_run(run))
-    assert strings is not None
-    (frame,) = read_frames(run)
-    assert strings.lines(frame)[:, 0, 1] == pytest.approx([0, 0], abs=1e-12)
 
 
 @pytest.mark.parametrize("angles", [(90.0, 90.0), (30.0, 100.0)])

@@ -16,7 +16,7 @@ from dem.body.chain import Tie
 from dem.body.placement import Poses
 from dem.engine.effect import EffectName
 from dem.physics.strings import StringLaw
-from dem.run.sampler import COLUMNS_OF, Sampler
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 
 RADIUS, DT = 0.0234, 1e-4
@@ -59,12 +59,6 @@ def test_columns_hold_what_the_engine_says() -> None:
     assert row["packing_fraction"] == pytest.approx(3 * boxes.volume / (math.pi * RADIUS**2 * 0.022))
 
 
-def test_an_empty_container_has_a_row() -> None:
-    row = sample(Sampler(RADIUS, set(EffectName) - {EffectName.HOOKS, EffectName.STRINGS}), engine_with([]))
-    assert row["count"] == row["kinetic_energy_J"] == row["max_speed_m_per_s"] == 0
-    assert math.isnan(row["com_height_m"])
-
-
 def force(engine: EngineDouble, steps: int = 40) -> np.ndarray:
     """Mean force on the container over some steps."""
     sampler = Sampler(RADIUS)
@@ -78,12 +72,6 @@ def test_force_at_rest_is_the_weight_downwards() -> None:
     engine.advance(1000)
     assert engine.touches().all()
     assert force(engine) == pytest.approx([0, 0, -2 * engine.particle.boxes.mass * 9.81], rel=1e-12)
-
-
-def test_force_in_free_fall_is_zero() -> None:
-    engine = engine_with([0.1, 0.2])
-    engine.velocities[:, 0] = 0.2
-    assert np.abs(force(engine)).max() < 1e-9 * engine.particle.boxes.mass * 9.81
 
 
 def test_force_of_an_impact_is_its_momentum_whenever_it_came() -> None:
@@ -185,8 +173,3 @@ def test_the_account_of_energies_closes_over_fall_impact_and_shaking() -> None:
     (falling, _), (landed, still), (_, worked) = moved
     assert falling == still == 0 < landed
     assert abs(worked) > 1e-3 * scale
-
-
-@pytest.mark.parametrize("effect", COLUMNS_OF)
-def test_an_effect_adds_its_own_columns_and_no_other(effect: EffectName) -> None:
-    assert Sampler(1.0, {effect}).described == Sampler(1.0).described | COLUMNS_OF[effect]

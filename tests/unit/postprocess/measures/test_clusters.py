@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from dem.errors import InputError
 from postprocess import measure_run
-from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.clusters import (
     contact_clusters,
     entanglement_clusters,
@@ -40,10 +38,6 @@ def test_the_largest_cluster_is_a_share_of_all(shape):
     assert clusters.labels.tolist() == [1, 1, 1, 0, 0, 0, 0, 0, 2, 3]
 
 
-def test_apart_there_is_no_cluster_to_speak_of(shape):
-    assert contact_clusters(row(shape, 2 * D * np.arange(10)), D).largest == 0.1
-
-
 def test_hooked_smarticles_are_entangled_and_touching_ones_need_not_be(shape):
     u = shape(1.0, 0.7)
     # A second U stands across the plane of the first one: its middle link passes between the barbs.
@@ -54,13 +48,6 @@ def test_hooked_smarticles_are_entangled_and_touching_ones_need_not_be(shape):
     assert contact_clusters([u, beside], 0.02).largest == 1
     # Whether the one passed through or the one that passes is asked first does not matter.
     assert entanglement_clusters([across, u, u + np.array([9.0, 0, 0])]).sizes.tolist() == [2, 1]
-
-
-def test_nothing_has_no_cluster(shape):
-    with pytest.raises(UndefinedMeasureError, match="at least 1 smarticle: got 0"):
-        contact_clusters(np.empty((0, 4, 3)), D)
-    with pytest.raises(InputError, match="distance must be above 0 m"):
-        contact_clusters([shape()], 0.0)
 
 
 # -- what they span --------------------------------------------------------------------------------------------------

@@ -51,16 +51,6 @@ def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> Non
     assert not strong_contacts([2.0] * count).any()
 
 
-def test_one_force_alone_participates_for_one_of_all() -> None:
-    assert force_participation([1.0, *[1e-12] * 9]) == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize("wrong", [[1.0, 0.0], [1.0, -2.0], [math.nan], [[1.0]]])
-def test_what_is_no_force_is_refused(wrong: object) -> None:
-    with pytest.raises(InputError, match=r"normal forces must be \(M,\) finite numbers above 0 N"):
-        strong_contacts(wrong)  # type: ignore[arg-type]
-
-
 def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
     with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
         force_participation([])
@@ -87,35 +77,3 @@ def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) 
     assert not [name for name in measure_run(run).columns if "force" in name and "chain" in name]
     with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
         read_forces(read_frames(run)[0])
-
-
-def test_nobody_touching_is_no_error(run: Path) -> None:
-    write_forces(run, pressed([], []))
-    frame = read_frames(run)[-1]
-    assert len(read_forces(frame).contacts.normal) == 0
-    contacts, *rest = MEASURE.columns(frame, read_run(run)).values()
-    assert contacts == 0
-    assert np.isnan(rest).all()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("normal_force_N", "normal_force_X", "cell data 'normal_force_N' is missing"),
-        ("</VTKFile>", "", "truncated or not VTK"),
-    ],
-)
-def test_a_damaged_file_is_named(run: Path, old: str, new: str, message: str) -> None:
-    write_forces(run, pressed([(0, 1)], [1.0]))
-    file = run / "forces" / "force_000000.vtu"
-    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    with pytest.raises(InputError, match=message):
-        read_forces(read_frames(run)[0])
-
-
-def test_numbers_of_smarticles_that_there_are_not_are_refused(run: Path) -> None:
-    write_forces(run, pressed([(0, 1)], [1.0]))
-    few = write_run(run.parent / "few", SyntheticRun(count=1, frames_per_phase=1, phases=("relax",)))
-    (run / "forces").rename(few / "forces")
-    with pytest.raises(InputError, match="'first_smarticle' holds numbers of nothing that there is"):
-        read_forces(read_frames(few)[0])

@@ -2,7 +2,6 @@ import json
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 
 import postprocess
@@ -115,23 +114,6 @@ def test_measures_take_any_shape(make_run, scene, write_frame, angles):
     assert row[["phi second-highest-com [-]", "phi top-percentile [-]", "phi voxel [-]"]].notna().all()
 
 
-def test_costly_definitions_only_where_asked_for(make_run):
-    directory = make_run([(0, 0.0), (1, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
-    taken = {
-        mode: measure_run(directory, definitions=["voxel"], costly=mode)["phi voxel [-]"].notna()
-        for mode in ("never", "phase-end", "every-frame")
-    }
-    assert taken["never"].tolist() == [False] * 5
-    assert taken["phase-end"].tolist() == [False, False, True, False, True]
-    assert taken["every-frame"].tolist() == [False, True, True, True, True]
-
-
-def test_run_without_series(make_run):
-    table = measure_run(make_run(series=False), definitions=CHEAP)
-    assert len(table) == 3
-    assert "kinetic energy [J]" not in table
-
-
 def test_escaped_smarticles_are_counted(make_run):
     table = measure_run(make_run([(0, 0.0), (1, -0.1)]), definitions=CHEAP)
     assert table["escaped [-]"].tolist() == [0, 6]
@@ -168,36 +150,9 @@ def test_packing_before_and_after_activity(make_run):
     assert shorter.after.value == table["phi top-percentile [-]"][5]
 
 
-def test_packing_change_needs_activity(make_run):
-    with pytest.raises(InputError, match=r"no frame of phase 2 \(shake\) yet"):
-        packing_change(make_run([(0, 0.0), (1, 0.0)]))
-    with pytest.raises(InputError, match="no activity with a phase before it"):
-        packing_change(make_run(), activity=["pull"])
-    with pytest.raises(InputError, match="last must be 1 frame or more: got 0"):
-        packing_change(make_run(), last=0)
-
-
-def test_phase_unknown_to_the_manifest(make_run):
-    with pytest.raises(InputError, match=r"phases that run\.json does not have"):
-        measure_run(make_run([(0, 0.0), (9, 0.0)]))
-
-
-def test_unknown_definition_is_refused_before_any_work(tmp_path):
-    with pytest.raises(InputError, match=r"unknown definition .* 'guess'"):
-        measure_run(tmp_path, definitions=["guess"])
-
-
 def test_truncated_frame_stops_the_table(make_run):
     directory = make_run()
     path = directory / "frames" / "frame_000001.vtu"
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(InputError, match="frame_000001"):
         measure_run(directory)
-
-
-def test_summary_of_chosen_phases_is_that_of_all_of_them(run):
-    every = summarise_run(run, definitions=CHEAP)
-    chosen = summarise_run(run, definitions=CHEAP, phases={1, 2})
-    assert chosen["phase"].tolist() == [1, 2]
-    pd.testing.assert_frame_equal(chosen, every[every["phase"].isin([1, 2])].reset_index(drop=True))
-    assert summarise_run(run, definitions=CHEAP, phases=set()).empty

@@ -9,8 +9,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from postprocess import measure_run, measures, summarise_run
-from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
-from postprocess.measures.registry import frame_measures, registered
+from postprocess.measures.registry import registered
 
 SOURCE = """
 from postprocess.measures.registry import FrameMeasure, Quantity
@@ -57,18 +56,3 @@ def test_columns_that_are_there_already_are_refused(add_measure) -> None:
     add_measure("contacts mean")
     with pytest.raises(ValueError, match=r"measures share a header: contacts mean \[-\]"):
         registered()
-
-
-def test_every_measure_has_a_name_and_units() -> None:
-    assert len(registered()) > 8
-    for measure in registered():
-        assert measure.name
-        assert measure.quantities
-        assert all(quantity.label and quantity.unit for quantity in measure.quantities)
-
-
-def test_definitions_come_last_in_the_order_asked_for() -> None:
-    names = [measure.name for measure in frame_measures(["voxel", "second-highest-com"])]
-    assert names[-2:] == ["phi voxel", "phi second-highest-com"]
-    costly = {m.definition for m in frame_measures(list(DEFINITIONS)) if m.costly and m.definition}
-    assert costly == set(COSTLY_DEFINITIONS)

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dem.errors import InputError
 from dem.record.frames import FrameSequence
 from postprocess.measures import motors
 from postprocess.measures.motors import MEASURES, sampled, sampled_work
@@ -39,21 +38,10 @@ def test_the_torque_is_that_at_the_end_of_each_way() -> None:
     assert sampled_work(angles, torques) == pytest.approx(0.5 * 2.0 + 0.25 * 4.0)
 
 
-def test_less_than_two_samples_tell_nothing_and_shapes_must_agree() -> None:
-    assert np.isnan(sampled_work(np.zeros((1, 4, 2)), np.zeros((1, 4, 2))))
-    with pytest.raises(InputError, match=r"one shape: got \(2, 4, 2\) and \(2, 3, 2\)"):
-        sampled_work(np.zeros((2, 4, 2)), np.zeros((2, 3, 2)))
-
-
 def test_samples_are_the_frames_at_multiples_from_the_first() -> None:
     # Frames fall on the step that is nearest to their time.
     times = (np.arange(12) * 0.05 + 0.3 + np.tile([0.0, 3e-5, -4e-5], 4)).tolist()
     assert sampled(frames(times)) == [0, 2, 4, 6, 8, 10]
-
-
-def test_frames_that_fall_elsewhere_are_no_samples() -> None:
-    assert sampled(frames([0.0, 0.04, 0.08, 0.12, 0.16, 0.2])) == []
-    assert sampled(frames([])) == []
 
 
 class Swinging(FrameSequence):

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from synthetic import SyntheticRun, write_run
 from synthetic.hooked import AFTER_REST, write_hooked_run
-from synthetic.strained import LENGTH, SPEED, write_strained_run
+from synthetic.strained import write_strained_run
 
 from postprocess import measure_run, summarise_run
 from postprocess.measures.strain import AT_PEAK, FRACTURE, PEAK, WIDENING, YIELD
@@ -36,42 +36,10 @@ def test_a_chain_has_its_force_and_strain(tmp_path: Path) -> None:
     assert row[WIDENING] == pytest.approx(0.1 * HIGHEST, rel=1e-3)
 
 
-def test_of_a_chain_that_is_still_pulled_the_fracture_is_not_told(tmp_path: Path) -> None:
-    run = write_strained_run(tmp_path / "a", force)
-    (run / "done.json").unlink()
-    row = summarise_run(run).iloc[0]
-    assert row[PEAK] == pytest.approx(3 * HIGHEST, rel=1e-3)
-    assert np.isnan(row[FRACTURE])
-
-
-def test_a_chain_that_no_string_pulled_yet_has_no_such_columns(tmp_path: Path) -> None:
-    row = summarise_run(write_strained_run(tmp_path / "a", np.zeros_like)).iloc[0]
-    assert PEAK not in row
-
-
 def test_a_plane_has_nothing_that_needs_a_height_or_a_container(tmp_path: Path) -> None:
     columns = set(measure_run(write_strained_run(tmp_path / "a", force)).columns)
     assert {"smarticles [-]", "contacts mean [-]", "pulled string force x [N]", "chain length [m]"} <= columns
     assert not [name for name in columns if any(word in name for word in ("phi", "height", "crossings", "cluster"))]
-
-
-def test_measure_shows_what_a_chain_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = write_strained_run(tmp_path / "a", force)
-    header, name, row, *legend = told(capsys, run)
-    assert [word for word in header.split("  ") if word] == [
-        *("phase", " t [s]", "smarticles", "peak F [N]", "strain at it", "at fracture", "widening")
-    ]
-    assert name == f"{run}:"
-    assert row.split() == ["strain", "3.00", "2", "1.800", "0.600", "0.600", "0.060"]
-    assert any(line.startswith("peak F: largest force of the pulled string") for line in legend)
-    assert not [line for line in legend if "φ" in line or "⟨N⟩" in line]
-
-
-def test_measure_shows_each_frame_of_a_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    header, _, *rows = told(capsys, write_strained_run(tmp_path / "a", force), "--frames")
-    assert header.split("  ")[-3:] == ["F [N]", "length [mm]", "width [mm]"]
-    strain = SPEED * 0.749 / LENGTH
-    assert rows[0].split()[-3:] == [f"{3 * strain:.3f}", f"{1e3 * LENGTH * (1 + strain):.1f}", "63.1"]
 
 
 def test_a_chain_beside_a_pile_leaves_what_it_has_not_blank(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,22 +26,6 @@ def test_a_pure_power_gives_its_order_and_limit(order, sign):
     assert found.value(16e-6) == pytest.approx(3.0 + sign * 0.25 * 2**order, abs=1e-4)
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_with_the_exact_value_two_steps_are_enough(order):
-    found = observed_order([1e-5, 2e-5], [1.0 - 0.01, 1.0 - 0.01 * 2**order], exact=1.0)
-    assert found.order == pytest.approx(order)
-    assert math.isnan(found.standard_error)
-    assert found.local_orders == pytest.approx([order])
-    assert found.value(4e-5) == pytest.approx(1.0 - 0.01 * 4**order)
-
-
-def test_steps_need_no_order_and_no_constant_ratio():
-    steps = [3e-6, 7e-6, 1e-6, 5e-6, 2e-6]
-    found = observed_order(steps, [5.0 - 1e10 * h**2 for h in steps])
-    assert found.order == pytest.approx(2, abs=1e-4)
-    assert found.limit == pytest.approx(5.0, abs=1e-5)
-
-
 def test_first_and_second_order_are_told_apart_in_spite_of_noise():
     noise = 1e-3 * np.random.default_rng(1).standard_normal(8)
     steps = np.geomspace(1.0, 0.1, 8)
@@ -55,21 +39,6 @@ def test_a_mixture_lies_between_and_its_local_orders_fall_to_the_lower_one():
     found = observed_order(STEPS, 1.0 + 1e4 * STEPS + 5e9 * STEPS**2)
     assert 1 < found.order < 2
     assert 2 > found.local_orders[0] > found.local_orders[1] > 1
-
-
-@pytest.mark.parametrize("exact", [None, 1.0])
-def test_what_does_not_depend_on_the_step_has_no_order(exact):
-    found = observed_order(STEPS, [1.0, 1.0, 1.0, 1.0 + 1e-16], exact=exact)
-    assert math.isnan(found.order)
-    assert found.limit == 1.0
-    assert not found.monotone
-
-
-def test_what_jumps_to_and_fro_has_no_order():
-    found = observed_order(STEPS, [1.0, 2.0, 1.0, 2.0])
-    assert math.isnan(found.order)
-    assert not found.monotone
-    assert all(map(math.isnan, found.local_orders))
 
 
 @pytest.mark.parametrize(
