@@ -28,7 +28,6 @@ from studies import (
     friction,
     gravish,
     landscape,
-    melting,
     sensitivity,
 )
 from studies.base.shipped import Shipped
@@ -115,8 +114,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     fracture.CODE,
     landscape.SHIPPED,
     finite_size.SHIPPED,
-    melting.SHIPPED,
-    melting.CODE,
     casting.SHIPPED,
     casting.CODE,
     collapse.SHIPPED,

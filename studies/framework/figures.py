@@ -252,6 +252,59 @@ class Histories:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Times:
+    """Columns of the table `times`, a panel each: means over seeds, lowest to highest seed as a band.
+
+    Attributes:
+        name: Of the files.
+        quantities: Label of the y axis by column.
+        x: Column of the time.
+        x_label: Of the axis.
+        split: Makes the series of the runs; its look has a colour.
+        rows: Selects the runs that are drawn.
+        spans: What the y axis shows at least, by column, lest a small change look large.
+        told: Lines for the footer.
+    """
+
+    name: str
+    quantities: Mapping[str, str]
+    x: str
+    x_label: str
+    split: Split
+    rows: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    told: Sequence[str] = ()
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw a line and a band for each series."""
+        runs, times = self.rows(analysis.runs), analysis.tables.get("times")
+        if times is None or runs.empty:
+            return []
+        by_run = dict(iter(times[times["run"].isin(runs["run"])].groupby("run")))
+        width = plots.bin_width([float(one[self.x].max()) for one in by_run.values()])
+        columns = min(len(self.quantities), 3)
+        rows = -(-len(self.quantities) // columns)
+        figure = style.blank_figure(min(columns, 2) * style.COLUMN_WIDTH, 0.5 + 1.7 * rows)
+        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        for axes, (quantity, label) in zip(grid.flat, self.quantities.items(), strict=False):
+            for series in self.split(runs):
+                seeds = [
+                    History(times=one[self.x].to_numpy(), values=one[quantity].to_numpy(), active=0.0)
+                    for one in (by_run[name] for name in series.rows["run"] if name in by_run)
+                ]
+                if seeds:
+                    plots.draw_history(axes, seeds, width, colour=series.look["color"], label=series.label)
+            axes.set_ylabel(label)
+            least, most = self.spans.get(quantity, (axes.dataLim.y0, axes.dataLim.y1))
+            axes.set_ylim(min(axes.dataLim.y0, least), max(axes.dataLim.y1, most))
+        for axes in grid[-1]:
+            axes.set_xlabel(self.x_label)
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+        told = f"Line: mean over seeds of means over {width:.2g} s; {plots.BAND}."
+        return plots.finished(figure, path, [*self.told, told], analysis.footer)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scatter:
     """A quantity against another one: every run as a small marker, means over seeds as large ones.
 

@@ -364,7 +364,8 @@ def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
 def means_by(table: pd.DataFrame, quantity: str, by: str, form: str) -> str:
     """`0.4: 1.02, 0.7: 1.05`: means at each value of a column."""
     means = table.groupby(by)[quantity].mean().dropna()
-    return ", ".join(f"{value:g}: {one:{form}}" for value, one in means.items()) or "none"
+    cells = {value if isinstance(value, str) else f"{value:g}": one for value, one in means.items()}
+    return ", ".join(f"{value}: {one:{form}}" for value, one in cells.items()) or "none"
 
 
 def ranked(means: Mapping[str, float], form: str = ".3g") -> str:

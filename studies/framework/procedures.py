@@ -67,7 +67,7 @@ def prepared_by(run: RunManifest, *then: str) -> str:
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
     """Samples of one procedure; of the internal oscillation those that procedures are compared at."""
     chosen = table[table[PROCEDURE] == procedure]
-    return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL else chosen
+    return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL and THETA in chosen else chosen
 
 
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:

@@ -113,6 +113,11 @@ class Collected:
             return pd.DataFrame([{ENGINE: run.manifest.engine, **row} for run in self.runs for row in run.rows])
         return pd.DataFrame([row for run in self.runs for row in run.rows])
 
+    def times(self) -> pd.DataFrame | None:
+        """Histories of all runs, one below the other; None where no run has one."""
+        tables = [pd.DataFrame({"run": run.name, **run.history}) for run in self.runs if run.history]
+        return pd.concat(tables, ignore_index=True) if tables else None
+
     def refuse_mixture(
         self,
         quantity: str,

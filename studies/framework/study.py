@@ -80,8 +80,8 @@ class Study:
     Attributes:
         name: For the command line, and in provenance.
         title: Of its text.
-        measure: Measures one finished run: its row of the table of runs, or several. An InputError lists the run as
-            missing.
+        measure: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a
+            history. An InputError lists the run as missing.
         keys: Columns that name a point: one combination of the sweep's variables.
         quantities: Columns that are averaged over seeds.
         findings: What is judged, in the paper's order.
@@ -104,7 +104,7 @@ class Study:
 
     name: str
     title: str
-    measure: Callable[[RunManifest], Row | Sequence[Row]]
+    measure: Callable[[RunManifest], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]
     quantities: Sequence[Quantity]
     findings: Sequence[Finding]
@@ -147,7 +147,7 @@ class Study:
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
         self.reject_unlike(found)
-        tables = self.tabulate(runs_table(found))
+        tables = self.tabulate(runs_table(found), found.times())
         judged = self.judge(tables)
         tables["findings"] = findings_table(judged)
         manifests, missing = found.manifests, found.missing
@@ -179,8 +179,10 @@ class Study:
 
     def measured(self, run: RunManifest) -> MeasuredRun:
         """Measure one finished run."""
-        rows = self.measure(run)
-        return MeasuredRun(manifest=run, rows=[rows] if isinstance(rows, Mapping) else rows)
+        measured = self.measure(run)
+        if isinstance(measured, MeasuredRun):
+            return measured
+        return MeasuredRun(manifest=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
         """Reject runs that must not be averaged or compared.
@@ -205,7 +207,7 @@ class Study:
         cells = ((key.label, key.text(run.row[key.column])) for key in self.keys)
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
-    def tabulate(self, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
         """Make all tables of the table of runs: `runs`, `points`, `engines` if there are several, and extra ones."""
         runs = sort_rows(runs, self.order, self.keys)
         extra = self.extra(runs)
@@ -216,6 +218,8 @@ class Study:
                 columns = [quantity.column for quantity in self.quantities]
                 samples = by_engine(runs, self.samples)
                 tables["engines"] = compared_engines(samples, [key.column for key in self.keys], columns)
+        if times is not None:
+            tables["times"] = times
         return tables | dict(extra)
 
     def points(self, samples: pd.DataFrame) -> pd.DataFrame:

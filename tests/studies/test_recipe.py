@@ -21,7 +21,7 @@ SCRIPTS = [name for name, study in STUDIES.items() if isinstance(study, Script)]
 ON_YADE = ["procedures-links-100"]
 """Further results of a study: the name of the study is that of the folder up to the first such ending."""
 
-ROUNDING = 3e-4  # tables have six digits, and a standard error is a small difference of them
+ROUNDING = 1e-3  # tables have six digits, and a standard error is a small difference of them
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
