@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -21,7 +21,12 @@ from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
 from dem.record.manifest import RunManifest
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 PERIOD = 1.0  # s of wall time between two writings of a series that grows
+# What the columns of a series of vectors are, by their number.
+_COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
@@ -135,6 +140,17 @@ class Series:
         """(n,) float64 [s], simulated time of each sample."""
         times: NDArray[np.float64] = self.data["time_s"]
         return times
+
+    def table(self) -> pd.DataFrame:
+        """The series as a table: one row per sample, units in its column names."""
+        import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
+
+        columns = {name: self[name] for name in ("time_s", "phase")}
+        for name, values in self.data.items():
+            parts = values[:, None] if values.ndim == 1 else values
+            marks = _COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
+            columns |= {f"{name}{mark}": part for mark, part in zip(marks, parts.T, strict=True)}
+        return pd.DataFrame(columns)
 
     def nearest(self, time: float) -> int:
         """Index of the sample nearest in time.
