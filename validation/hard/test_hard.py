@@ -9,9 +9,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from validation.case import Size
 from validation.conftest import Tables
-from validation.hard.cases import CASES, checked
+from validation.hard.cases import CASES, Size, checked
 from validation.hard.kills import SAME, kills
 from validation.hard.onset import SETTINGS, climb, onsets
 
