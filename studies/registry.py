@@ -21,7 +21,6 @@ from dem.errors import InputError, nearest
 from studies import (
     casting,
     chain,
-    collapse,
     engines,
     finite_size,
     fracture,
@@ -116,7 +115,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     finite_size.SHIPPED,
     casting.SHIPPED,
     casting.CODE,
-    collapse.SHIPPED,
     chain.SHIPPED,
     chain.BODIES,
     engines.SHIPPED,

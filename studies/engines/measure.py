@@ -13,9 +13,9 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import read_series
 from postprocess.measures import strain
+from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.base.collapse.column import REMAINING, collapse_of, column_history, vibration
 from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
 from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
 from studies.framework.runs import ENGINE

@@ -63,6 +63,8 @@ class Series:
     shift: float = 0.0
 
 
+_MOST_COLUMNS = 3
+
 Split = Callable[[pd.DataFrame], list[Series]]
 """Makes the series of a table of points or runs."""
 
@@ -212,14 +214,17 @@ class Histories:
         """Draw a line and a band for each series that has histories."""
         runs = self.rows(analysis.runs)
         values = [None] if self.panels is None else sorted(runs[self.panels].unique())
-        figure = style.blank_figure(max(len(values), 1) * style.COLUMN_WIDTH, 2.8)
-        grid = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
+        columns = min(len(values), _MOST_COLUMNS)
+        lines = -(-len(values) // columns)
+        figure = style.blank_figure(min(columns * style.COLUMN_WIDTH, 7.0), 2.8 if lines == 1 else 2.2 * lines)
+        grid = figure.subplots(lines, columns, sharey=True, squeeze=False)
         missing, unit, width = 0, "s" if self.width is None else "", 0.0
-        for axes, value in zip(grid, values, strict=True):
-            part = runs if value is None else runs[runs[self.panels] == value]
+        split = self.split(runs)
+        for axes, value in zip(grid.flat, values, strict=False):
             drawn: list[tuple[Series, list[History]]] = []
-            for series in self.split(part):
-                found = [self._read(analysis, str(run)) for run in series.rows["run"]]
+            for series in split:
+                rows = series.rows if value is None else series.rows[series.rows[self.panels] == value]
+                found = [self._read(analysis, str(run)) for run in rows["run"]]
                 missing += found.count(None)
                 drawn.append((series, [one for one in found if one is not None]))
             ends = [one.active for _, histories in drawn for one in histories if one.active > 0]
@@ -233,11 +238,15 @@ class Histories:
             axes.set_xlabel(self.x_label)
             if value is not None:
                 axes.set_title(self.panel.format(self.panel_scale * value))
-        grid[0].set_ylabel(self.y_label)
+        for axes in grid.flat[len(values) :]:
+            axes.set_visible(False)
+        for axes in grid[:, 0]:
+            axes.set_ylabel(self.y_label)
         if len(values) == 1:
-            plots.legend_above(grid[0])
+            plots.legend_above(grid[0, 0])
         else:
-            figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+            fullest = max(grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
+            figure.legend(*fullest.get_legend_handles_labels(), loc="outside upper center", ncols=4)
         told = [f"Line: mean over seeds of means over {width:.2g} {unit}".rstrip() + f"; {plots.BAND}.", *self.told]
         if missing:
             told.append(f"Without a recorded history: {missing} runs.")

@@ -9,7 +9,7 @@ make findings of the usual kinds; any other function of a table that gives an `O
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -159,15 +159,26 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """One effect that is clearly wrong refutes a finding; with `Effect.more` of the one that needs most."""
-    verdicts = [effect.verdict for effect in effects]
-    for verdict in (Verdict.NOT_FOUND, Verdict.NO_DATA):
-        if verdict in verdicts:
-            return verdict, math.nan
-    if not effects:
-        return Verdict.NO_DATA, math.nan
-    needed = [effect.more for effect in effects if effect.verdict == Verdict.NOT_RESOLVED]
-    return (Verdict.NOT_RESOLVED, float(np.max(needed))) if needed else (Verdict.FOUND, math.nan)
+    """Judge by all effects, with `Effect.more` of the one that needs most."""
+    verdict = all_of(effect.verdict for effect in effects)
+    needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
+    return verdict, float(np.max(needed)) if needed else math.nan
+
+
+def all_of(verdicts: Iterable[Verdict]) -> Verdict:
+    """Judge a finding that says several things: one that is clearly wrong refutes it."""
+    found = list(verdicts)
+    order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
+    return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
+
+
+def within(value: float, half_width: float, margin: float) -> Verdict:
+    """Judge whether a number with its 95 % half-width is as near to 0 as a margin, both ways beyond its error."""
+    if math.isnan(value):
+        return Verdict.NO_DATA
+    if abs(value) + half_width <= margin:
+        return Verdict.FOUND
+    return Verdict.NOT_FOUND if abs(value) - half_width > margin else Verdict.NOT_RESOLVED
 
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:

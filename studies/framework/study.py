@@ -248,7 +248,10 @@ class Study:
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
         """Header and rows of the short table of points."""
         points = self.shown(tables["points"])
-        named = {**cells_of(self.keys), "seeds": lambda point: str(point[SEEDS])}
+        named = {
+            **cells_of([key for key in self.keys if key.column in points]),
+            "seeds": lambda point: str(point[SEEDS]),
+        }
         return short_table(points, told_by_engine(points, named), self.quantities)
 
     def draw(self, output: Path, analysis: Analysis) -> list[Path]:

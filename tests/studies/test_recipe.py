@@ -18,7 +18,7 @@ from templates.sweep.sweep_file import load_sweep
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 SCRIPTS = [name for name, study in STUDIES.items() if isinstance(study, Script)]
-ON_YADE = ["procedures-links-100"]
+ON_YADE = ["procedures-links-100", "collapse-yade"]
 """Further results of a study: the name of the study is that of the folder up to the first such ending."""
 
 ROUNDING = 1e-3  # tables have six digits, and a standard error is a small difference of them

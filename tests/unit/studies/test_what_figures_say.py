@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 import studies
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
-from studies.collapse.reference import told_points
 from studies.framework.plots import draw_bounds, draw_means, finished, marker
 from studies.framework.provenance import told_gaps, told_reference
 from studies.framework.runs import BARS, told_numbers
@@ -170,7 +169,6 @@ def test_references_tell_where_they_have_no_point() -> None:
     assert told_gaps({"φ_0": [0.55], "φ_f": [0.55]}) == "no φ_0 at l/w = 0.55; no φ_f at l/w = 0.55"
     assert told_reference([0.4, 0.7], ("phi_0", "phi_f")).endswith("at every l/w shown.")
     assert told_reference([0.4, 0.5, 0.85], ("phi_f",)).endswith("no φ_f at l/w = 0.85.")
-    assert told_points([0.13, 0.5]).endswith("no Δ at l/w = 0.5.")
 
 
 def test_seeds_that_follow_each_other_are_told_as_a_range() -> None:

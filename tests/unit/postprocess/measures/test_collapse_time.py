@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dem.errors import InputError
-from studies.base.collapse.collapse_time import collapse_time
+from postprocess.measures.collapse import collapse_time
 
 START, END = 0.0072, 0.0011  # m
 
@@ -19,8 +19,8 @@ def heights(times, tau, beta, *, end=END, noise=0.0, seed=1, correlated=1):
     return np.clip(curve + noise * START * np.repeat(shocks, correlated)[: len(times)], 0, None)
 
 
-@pytest.mark.parametrize("tau", [0.1, 0.6, 1.9])
-@pytest.mark.parametrize("beta", [0.5, 1.0, 1.8])
+@pytest.mark.parametrize("tau", [0.1, 1.9])
+@pytest.mark.parametrize("beta", [0.5, 1.8])
 @pytest.mark.parametrize("known", [{"start": START, "end": END}, {"end": END}, {"start": START}, {}])
 def test_a_curve_without_noise_gives_its_own_time(tau, beta, known):
     times = np.arange(1, 301) * 0.02
@@ -36,12 +36,12 @@ def test_a_curve_without_noise_gives_its_own_time(tau, beta, known):
 def test_errors_cover_the_truth(correlated):
     times = np.arange(1, 91) / 30
     pulls = []
-    for seed in range(40):
+    for seed in range(24):
         noisy = heights(times, 0.7, 0.8, end=0.0, noise=0.04, seed=seed, correlated=correlated)
         found = collapse_time(times, noisy, start=START, end=0.0)
         assert found.outcome == "collapsed"
         pulls.append((found.time - 0.7) / found.error)
-    # Of 40 pulls of unit width the root mean square is within 1 ± 0.11; correlated residuals are known less well, and
+    # Of 24 pulls of unit width the root mean square is within 1 ± 0.15; correlated residuals are known less well, and
     # errors without their correlation would make it 2.
     assert abs(np.mean(pulls)) < 0.4
     assert 0.7 < np.sqrt(np.mean(np.square(pulls))) < 1.45
@@ -87,14 +87,6 @@ def test_a_collapse_faster_than_the_sampling_is_not_taken_for_a_slow_one():
     found = collapse_time(times, heights(times, 0.005, 1.0, end=0.0), start=START, end=0.0)
     assert found.outcome == "collapsed"
     assert found.time < found.error == pytest.approx(1 / 30)
-
-
-def test_the_unit_of_heights_does_not_matter():
-    times = np.arange(1, 91) / 30
-    one = collapse_time(times, heights(times, 0.7, 0.8, noise=0.03))
-    other = collapse_time(times, 1e3 * heights(times, 0.7, 0.8, noise=0.03))
-    assert other.time == pytest.approx(one.time, rel=1e-6)
-    assert other.end == pytest.approx(1e3 * one.end, rel=1e-6)
 
 
 T, H = np.arange(1, 21) * 0.1, np.ones(20)
