@@ -19,7 +19,6 @@ import yaml
 
 from dem.errors import InputError, nearest
 from studies import (
-    casting,
     chain,
     engines,
     finite_size,
@@ -113,8 +112,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     fracture.CODE,
     landscape.SHIPPED,
     finite_size.SHIPPED,
-    casting.SHIPPED,
-    casting.CODE,
     chain.SHIPPED,
     chain.BODIES,
     engines.SHIPPED,
