@@ -20,7 +20,6 @@ import yaml
 from dem.errors import InputError, nearest
 from studies import (
     chain,
-    engines,
     finite_size,
     fracture,
     friction,
@@ -114,7 +113,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     finite_size.SHIPPED,
     chain.SHIPPED,
     chain.BODIES,
-    engines.SHIPPED,
 )
 
 STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(

@@ -10,7 +10,7 @@ import pandas as pd
 import yaml
 
 from dem.record.manifest import read_run
-from studies.engines.study import Engines
+from studies.engines import STUDY
 from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep
@@ -29,7 +29,7 @@ def test_a_scene_for_yade_is_run_on_links_and_measured(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     manifest = read_run(run)
     assert (manifest.engine, "links" in manifest.versions, "yade" in manifest.versions) == ("links", True, False)
-    report = Engines().analyse([run], tmp_path / "out", note="a test", command="test")
+    report = STUDY.analyse([run], tmp_path / "out", note="a test", command="test")
     runs = pd.read_csv(report.files["runs.csv"], comment="#")
     assert runs["engine"].tolist() == ["links"]
     assert 0.0 < runs["static phi second-highest-com [-]"].iloc[0] < 0.5
