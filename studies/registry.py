@@ -21,7 +21,6 @@ from dem.errors import InputError, nearest
 from studies import (
     chain,
     finite_size,
-    fracture,
     friction,
     gravish,
     landscape,
@@ -107,8 +106,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     friction.COMPACTION,
     sensitivity.SHIPPED,
     sensitivity.SECTION,
-    fracture.SHIPPED,
-    fracture.CODE,
     landscape.SHIPPED,
     finite_size.SHIPPED,
     chain.SHIPPED,

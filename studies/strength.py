@@ -246,7 +246,7 @@ def _works(table: pd.DataFrame) -> str:
     return "; ".join(f"{name} {_ranked(table, quantity, ALL)}" for quantity, name in names.items())
 
 
-def _other_order(table: pd.DataFrame) -> Outcome:
+def other_order(table: pd.DataFrame) -> Outcome:
     """Find pairs of procedures that differ clearly both in ⟨N⟩ and in peak force, in one sense or in opposite ones."""
     pairs: dict[bool, list[str]] = {True: [], False: []}
     effects = []
@@ -269,7 +269,8 @@ def _other_order(table: pd.DataFrame) -> Outcome:
     return Outcome(note=note, verdict=verdict)
 
 
-def _harder_but_brittle(table: pd.DataFrame) -> list[Effect]:
+def harder_but_brittle(table: pd.DataFrame) -> list[Effect]:
+    """Compare peak force and displacement at the peak after shape change with those after internal oscillation."""
     one, other = (bool(of(table, name)[HELD_FAST].any()) for name in (SHAPE, INTERNAL))
     harder, sooner = (less(table, quantity, SHAPE, INTERNAL) for quantity in (PEAK, RAISED))
     unknown = one or other
@@ -340,7 +341,7 @@ FINDINGS = (
     Finding(
         id="other-order-than-crossings",
         says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
-        outcome=_other_order,
+        outcome=other_order,
         rows=over_heights,
         found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
         "clearly in the same sense",
@@ -349,7 +350,7 @@ FINDINGS = (
         id="harder-but-brittle",
         says="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
-        outcome=_harder_but_brittle,
+        outcome=harder_but_brittle,
         rows=over_heights,
         found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
@@ -409,7 +410,8 @@ FIGURES = (
         panels=UPPER,
         panel="hook {:g} mm above the floor",
         panel_scale=1e3,
-        width=0.5,  # mm: the side of the hook's bars
+        width=0.5,  # the side of the hook's bars
+        unit="mm",
         x_label="hook raised by [mm]",
         y_label=r"force on the hook $F/(n W_\mathrm{s})$ [-]",
     ),

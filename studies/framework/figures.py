@@ -193,6 +193,7 @@ class Histories:
         panel: Title of a panel, with `{}` for its value.
         panel_scale: Factor of that value.
         width: Of the intervals that are averaged over; None: a hundredth of the longest activity.
+        unit: Of that width.
         level: Horizontal line.
         told: Lines for the footer.
     """
@@ -207,18 +208,21 @@ class Histories:
     panel: str = "{:g}"
     panel_scale: float = 1.0
     width: float | None = None
+    unit: str = "s"
     level: float = 0.0
     told: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw a line and a band for each series that has histories."""
         runs = self.rows(analysis.runs)
+        if runs.empty:
+            return []
         values = [None] if self.panels is None else sorted(runs[self.panels].unique())
         columns = min(len(values), _MOST_COLUMNS)
         lines = -(-len(values) // columns)
         figure = style.blank_figure(min(columns * style.COLUMN_WIDTH, 7.0), 2.8 if lines == 1 else 2.2 * lines)
         grid = figure.subplots(lines, columns, sharey=True, squeeze=False)
-        missing, unit, width = 0, "s" if self.width is None else "", 0.0
+        missing, width = 0, 0.0
         split = self.split(runs)
         for axes, value in zip(grid.flat, values, strict=False):
             drawn: list[tuple[Series, list[History]]] = []
@@ -247,7 +251,7 @@ class Histories:
         else:
             fullest = max(grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
             figure.legend(*fullest.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-        told = [f"Line: mean over seeds of means over {width:.2g} {unit}".rstrip() + f"; {plots.BAND}.", *self.told]
+        told = [f"Line: mean over seeds of means over {width:.2g} {self.unit}; {plots.BAND}.", *self.told]
         if missing:
             told.append(f"Without a recorded history: {missing} runs.")
         return plots.finished(figure, path, told, analysis.footer)
