@@ -24,7 +24,6 @@ from studies import (
     friction,
     gravish,
     landscape,
-    sensitivity,
 )
 from studies.base.shipped import Shipped
 
@@ -104,8 +103,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     friction.SHIPPED,
     friction.CONTACTS,
     friction.COMPACTION,
-    sensitivity.SHIPPED,
-    sensitivity.SECTION,
     landscape.SHIPPED,
     finite_size.SHIPPED,
     chain.SHIPPED,

@@ -15,11 +15,11 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.shaken import WHEN
 from studies.base.study import Analysis, Tables
 from studies.framework.plots import draw_combinations
 from studies.framework.provenance import GRAVISH, Reference, told_reference
 from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table
+from studies.framework.shaken import WHEN
 from studies.friction.contact_effects import (
     CALLED,
     DEVIATION,

@@ -11,10 +11,10 @@ import numpy as np
 from postprocess.report import figures
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.points import marked
-from studies.base.shaken import STAGES
 from studies.framework.plots import BAND, History, binned, draw_means, finished, marker
 from studies.framework.provenance import DIGITISING_ERROR, SHAKE_TIME, read_reference, reference_at, told_reference
 from studies.framework.runs import MeasuredRun
+from studies.framework.shaken import STAGES
 from studies.friction.measure import FRICTION, WINDOW, history_of
 from studies.friction.steel import AS_IT_COMES, CLEANED, spanned
 from studies.friction.tables import DEVIATION, MARGIN, PHI, REFERENCE, STAGE

@@ -13,10 +13,10 @@ from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from postprocess.scene_file import Settings, read_scene
 from postprocess.statistics.columns import ASPECT
-from studies.base.shaken import measured_row, packing_history, told_shaken
 from studies.framework.plots import History
 from studies.framework.provenance import SHAKE_TIME
 from studies.framework.runs import DEFINITION, Collected, MeasuredRun, told_seeds
+from studies.framework.shaken import measured_row, packing_history, told_shaken
 
 FRICTION = "friction [-]"
 

@@ -17,10 +17,10 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, told_number
 from studies.base.questions import Question, QuestionStudy, questions_lines
-from studies.base.shaken import WHEN, told_shaken
 from studies.base.study import Analysis, Tables
 from studies.framework.provenance import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.framework.runs import DEFINITION, Collected, MeasuredRun, runs_table, told_seeds
+from studies.framework.shaken import WHEN, told_shaken
 from studies.friction import figures
 from studies.friction.findings import answers, told_crossing
 from studies.friction.measure import FRICTION, TIMES, WINDOW, at_time, friction_run, refuse_repeats

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def _load(*, quick: bool) -> Gravish:
     from postprocess.measures.packing import DEFINITIONS  # noqa: PLC0415
-    from studies.base.shaken import QUICK_DEFINITIONS  # noqa: PLC0415
+    from studies.framework.shaken import QUICK_DEFINITIONS  # noqa: PLC0415
     from studies.gravish.study import Gravish  # noqa: PLC0415  (pandas, matplotlib)
 
     return Gravish(QUICK_DEFINITIONS if quick else tuple(DEFINITIONS))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from postprocess.report import figures
-from studies.base.shaken import SHAKEN, packing_history
 from studies.framework.engines import TOLD, engines_of, judging, of_engine
 from studies.framework.plots import (
     ASPECT_LABEL,
@@ -26,6 +25,7 @@ from studies.framework.plots import (
 )
 from studies.framework.provenance import told_reference
 from studies.framework.runs import ENGINES
+from studies.framework.shaken import SHAKEN, packing_history
 
 if TYPE_CHECKING:
     import pandas as pd

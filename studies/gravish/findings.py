@@ -16,9 +16,9 @@ from postprocess.statistics.columns import ASPECT, SEEDS
 from postprocess.statistics.points import mean_columns, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.base.questions import Question, YesNo
-from studies.base.shaken import SHAKEN, STAGES, measured_quantities
 from studies.framework.provenance import COLUMNS, DIGITISING_ERROR, reference_at
 from studies.framework.runs import DEFINITION
+from studies.framework.shaken import SHAKEN, STAGES, measured_quantities
 
 ACCEPTED_DEVIATION = 10.0
 """Mean absolute deviation from Gravish's points that the study accepts [%]."""

@@ -20,7 +20,6 @@ from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import told_number
 from studies.base.questions import Question, QuestionStudy
-from studies.base.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
 from studies.base.study import Analysis, Tables
 from studies.framework.engines import (
     TOLD,
@@ -34,6 +33,7 @@ from studies.framework.engines import (
 )
 from studies.framework.provenance import GRAVISH, SHAKE_TIME, Reference, read_reference
 from studies.framework.runs import DEFINITION, ENGINE, Collected, MeasuredRun, runs_table, told_bars, told_seeds
+from studies.framework.shaken import SHAKEN, STAGES, WHEN, measured_row, told_shaken
 from studies.gravish import figures
 from studies.gravish.findings import (
     answers,
