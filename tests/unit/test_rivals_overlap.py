@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scenes import SMALL
 from scipy.spatial.transform import Rotation
 
-from benchmarks.rivals.overlap import Bars, deepest, distances
-from benchmarks.rivals.solids import SHAPES, solid_of
+from benchmarks.rivals.overlap import SHAPES, Bars, deepest, distances, solid_of
 from dem.body.state import State
 from dem.scene.reading import parse_scene
 

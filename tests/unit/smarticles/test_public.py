@@ -67,7 +67,9 @@ def test_every_name_is_there_and_the_stub_tells_the_same() -> None:
 
 
 def test_an_unknown_name_is_refused_and_the_known_ones_are_named() -> None:
-    with pytest.raises(AttributeError, match=r"'nothing'; known: .*load_scene, measure, measures, read, read_sweep, run, sweep"):
+    with pytest.raises(
+        AttributeError, match=r"'nothing'; known: .*load_scene, measure, measures, read, read_sweep, run, sweep"
+    ):
         _ = smarticles.nothing  # type: ignore[attr-defined]
 
 
