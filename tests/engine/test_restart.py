@@ -26,7 +26,7 @@ phases:
 
 @pytest.mark.parametrize("engine", ["yade", "links"])
 def test_kills_at_random_moments_change_no_bit(tmp_path: Path, engine: str) -> None:
-    rows = kills(engine, 1, 2, tmp_path, seed=1)
+    rows = kills(engine, 2, tmp_path, seed=1)
     assert [row[SAME] for row in rows] == ["yes", "yes"]
     assert all(row["files [1]"] > 20 for row in rows)
 

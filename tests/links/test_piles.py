@@ -50,7 +50,7 @@ def test_the_same_twice_and_however_steps_are_grouped() -> None:
 @pytest.mark.parametrize("law", ["halt", "slip"])
 def test_looks_told_one_by_one_or_at_once(law: str) -> None:
     one, other, again = (
-        builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law)), 8, settle=200)
+        builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law)), 8)
         for _ in range(3)
     )
     for made in (one, other):
