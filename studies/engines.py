@@ -226,7 +226,8 @@ def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     rows: list[dict[str, object]] = []
     for one in REFINED:
         limit = by_seed(shaken, one, LINKS)
-        scale = 100 / abs(float(limit.mean())) if len(limit) else math.nan
+        base = abs(float(limit.mean())) if len(limit) else 0.0
+        scale = 100 / base if base else math.nan
         for variant in sorted(set(shaken[VARIANT]), key=pitch_of):
             values = by_seed(shaken, one, str(variant))
             effect = mean_over_seeds([] if variant == LINKS else (values - limit).dropna().tolist())
@@ -280,7 +281,7 @@ def _draw_differences(path: Path, analysis: Analysis) -> list[Path]:
     axes.axvline(0.0, color=style.BLACK, linewidth=0.6)
     axes.set_yticks(range(len(shown)), shown["quantity"] if len(shown) else [])
     axes.set_ylim(len(shown) - 0.4, -0.6)
-    axes.set_xlabel("links less YADE over YADE's mean [%]")
+    axes.set_xlabel("links less YADE over YADE [%]")
     if len(shown):
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
     return finished(figure, path, ["Bands: margins, chosen beforehand."], analysis.footer)

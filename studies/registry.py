@@ -20,7 +20,6 @@ import yaml
 from dem.errors import InputError, nearest
 from studies import (
     chain,
-    finite_size,
     friction,
     gravish,
     landscape,
@@ -104,7 +103,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     friction.CONTACTS,
     friction.COMPACTION,
     landscape.SHIPPED,
-    finite_size.SHIPPED,
     chain.SHIPPED,
     chain.BODIES,
 )

@@ -1,4 +1,4 @@
-"""What a quantity of piles of one shape comes to as they grow: q = q_∞ + a N^(-p), with p = 1/3, surface over volume.
+"""Fit what a quantity of piles of one shape comes to as they grow: q = q_∞ + a N^(-1/3), surface over volume.
 
 The scatter from seed to seed falls with the size of a pile, and a few seeds of one size hardly know it. It is taken as
 a power of N that all sizes share, fitted to what seeds differ by within sizes alone, so that it knows nothing of the
@@ -12,33 +12,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import fdtrc, fdtri, stdtrit
 
-from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.seeds import CONFIDENCE, Slope
-from studies.finite_size.measure import COUNT, DEFINITIONS, MOVING, STAGES, crossings, phi
 
 Floats = NDArray[np.float64]
 
 POWER = 1 / 3
-SCALED = (
-    *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),
-    MOVING,
-    *(crossings(stage) for stage in STAGES),
-)
-"""Quantities that are fitted."""
-
-QUANTITY, BULK, BULK_BAR = "quantity", "bulk [-]", "bulk 95 % [-]"
-SLOPE, SLOPE_BAR = "a [-]", "a 95 % [-]"
-EXCESS, REFUSED = "left over scatter [-]", "p of the law [-]"
-POWER_BEST, POWER_LOW, POWER_HIGH = "power [-]", "power from [-]", "power to [-]"
-FALL, SIZES, RUNS = "scatter falls as N to the [-]", "sizes [-]", "runs [-]"
-
-_FALLS = np.arange(0.0, 2.01, 0.02)
 POWERS = np.arange(0.02, 1.501, 0.01)
 """Powers that are tried; an interval that ends there may be longer."""
+
+_FALLS = np.arange(0.0, 2.01, 0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,10 +40,6 @@ class Scatter:
     fall: float
     freedom: int
 
-    def weights(self, counts: Floats) -> Floats:
-        """Of runs of so many smarticles each [1]."""
-        return counts**self.fall
-
     def error(self, count: float, runs: int) -> float:
         """Half-width of the 95 % interval of a mean over runs of one size; NaN where no scatter is known."""
         if not self.freedom:
@@ -67,7 +48,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scaling:
+class SizeLaw:
     """q = bulk + slope N^(-1/3), fitted to runs.
 
     Attributes:
@@ -99,11 +80,11 @@ class Scaling:
 
     def at(self, count: float) -> float:
         """The quantity of so many smarticles."""
-        return self.bulk + self.slope * _inverse_root(count)
+        return self.bulk + self.slope * math.pow(count, -POWER)
 
     def bias(self, count: float) -> Slope:
         """The quantity of so many smarticles less that of a pile without end."""
-        share = _inverse_root(count)
+        share = math.pow(count, -POWER)
         half = self.error(0, share)
         return Slope(value=self.slope * share, standard_error=half / self._quantile, half_width=half, count=self.runs)
 
@@ -112,17 +93,8 @@ class Scaling:
         return float(stdtrit(max(self.scatter.freedom, 1), (1 + CONFIDENCE) / 2))
 
 
-def _inverse_root(count: float) -> float:
-    return math.exp(-POWER * math.log(count))
-
-
 def scatter_of(counts: Floats, values: Floats) -> Scatter:
-    """The scatter within sizes, by maximum likelihood.
-
-    Args:
-        counts: (n,) smarticles of each run.
-        values: (n,) finite.
-    """
+    """Fit the scatter within sizes, by maximum likelihood; arguments as those of `size_law`."""
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     squares = np.bincount(place, (values - (np.bincount(place, values) / members)[place]) ** 2)
@@ -138,8 +110,8 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
     return Scatter(variance=float(variances[best]), fall=float(_FALLS[best]), freedom=freedom)
 
 
-def scaling(counts: Floats, values: Floats) -> Scaling:
-    """The law fitted to runs of two sizes at least.
+def size_law(counts: Floats, values: Floats) -> SizeLaw:
+    """Fit the law to runs of two sizes at least.
 
     Args:
         counts: (n,) smarticles of each run.
@@ -155,10 +127,12 @@ def scaling(counts: Floats, values: Floats) -> Scaling:
         refused = float(fdtrc(sizes - 2, scatter.freedom, excess))
         powers = _powers(counts, values, scatter)
     larger = max(excess, 1.0) if math.isfinite(excess) else 1.0
-    return Scaling(
+    matrix = np.stack([np.ones(len(counts)), counts**-POWER], axis=1)
+    inverse: Floats = np.linalg.inv(matrix.T @ (matrix * (counts**scatter.fall)[:, None])).astype(np.float64)
+    return SizeLaw(
         bulk=bulk,
         slope=slope,
-        covariance=_inverse(counts, scatter) * scatter.variance * larger,
+        covariance=inverse * scatter.variance * larger,
         scatter=scatter,
         excess=excess,
         refused=refused,
@@ -173,18 +147,11 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     means = np.bincount(place, values) / members
-    weights = members * scatter.weights(sizes)
+    weights = members * sizes**scatter.fall
     matrix = np.stack([np.ones(len(sizes)), sizes**-power], axis=1)
     root = np.sqrt(weights)
     found, *_ = np.linalg.lstsq(matrix * root[:, None], means * root, rcond=None)
     return float(found[0]), float(found[1]), float(weights @ (means - matrix @ found) ** 2)
-
-
-def _inverse(counts: Floats, scatter: Scatter) -> Floats:
-    """(2, 2) of the law's normal equations."""
-    matrix = np.stack([np.ones(len(counts)), counts**-POWER], axis=1)
-    inverse = np.linalg.inv(matrix.T @ (matrix * scatter.weights(counts)[:, None]))
-    return np.asarray(inverse, dtype=np.float64)
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
@@ -194,44 +161,3 @@ def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, fl
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
     kept = POWERS[(left - left.min()) / larger <= fdtri(1, scatter.freedom, CONFIDENCE)]
     return float(POWERS[left.argmin()]), float(kept[0]), float(kept[-1])
-
-
-def fitted(runs: pd.DataFrame, aspect: float, quantity: str) -> Scaling | None:
-    """The law of one quantity at one l/w; nothing below two sizes."""
-    part = runs[(runs[ASPECT] == aspect) & np.isfinite(runs[quantity])]
-    if part[COUNT].nunique() < 2:
-        return None
-    return scaling(part[COUNT].to_numpy(dtype=np.float64), part[quantity].to_numpy(dtype=np.float64))
-
-
-def scalings(runs: pd.DataFrame) -> pd.DataFrame:
-    """One row per l/w and quantity: the law, whether it holds, and which power does.
-
-    Args:
-        runs: Rows of `measure.size_row`.
-    """
-    rows = []
-    for aspect in sorted(runs[ASPECT].unique()):
-        for quantity in SCALED:
-            law = fitted(runs, aspect, quantity)
-            if law is None:
-                continue
-            rows.append(
-                {
-                    ASPECT: aspect,
-                    QUANTITY: quantity,
-                    SIZES: law.sizes,
-                    RUNS: law.runs,
-                    BULK: law.bulk,
-                    BULK_BAR: law.error(1, 0),
-                    SLOPE: law.slope,
-                    SLOPE_BAR: law.error(0, 1),
-                    EXCESS: law.excess,
-                    REFUSED: law.refused,
-                    POWER_BEST: law.powers[0],
-                    POWER_LOW: law.powers[1],
-                    POWER_HIGH: law.powers[2],
-                    FALL: law.scatter.fall,
-                }
-            )
-    return pd.DataFrame(rows)
