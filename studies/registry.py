@@ -21,7 +21,6 @@ from dem.errors import InputError, nearest
 from studies import (
     chain,
     friction,
-    gravish,
     landscape,
 )
 from studies.base.shipped import Shipped
@@ -98,7 +97,6 @@ def _scripts() -> list[Script]:
 
 
 _FOLDERS: tuple[Shipped, ...] = (
-    gravish.SHIPPED,
     friction.SHIPPED,
     friction.CONTACTS,
     friction.COMPACTION,

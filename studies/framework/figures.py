@@ -112,6 +112,7 @@ class Means:
         marks: Values of x with a vertical line.
         ticks: Whether the axis has ticks at the values of x alone.
         share_y: Whether panels have one y axis.
+        reference: Published values by the column that they are set against: places in the unit of x, and values.
         told: Lines for the footer.
     """
 
@@ -125,6 +126,7 @@ class Means:
     marks: Sequence[float] = ()
     ticks: bool = False
     share_y: bool = False
+    reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
     told: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
@@ -153,6 +155,9 @@ class Means:
     def _panel(self, axes: Any, quantity: Quantity, points: pd.DataFrame) -> None:
         for x in self.marks:
             axes.axvline(x, color=style.GREY, linewidth=0.6, linestyle=(0, (2, 2)))
+        if quantity.column in self.reference:
+            look = {**plots.marker("o", style.ORANGE, style.ORANGE), "linestyle": "none"}
+            plots.draw_means(axes, *self.reference[quantity.column], None, look=look, label="experiment")
         known = points[points[quantity.column].notna()]
         positive = True
         for number, engine in enumerate(engines_of(known) or ("",)):

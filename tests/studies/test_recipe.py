@@ -18,7 +18,7 @@ from templates.sweep.sweep_file import load_sweep
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 SCRIPTS = [name for name, study in STUDIES.items() if isinstance(study, Script)]
-ON_YADE = ["procedures-links-100", "collapse-yade"]
+ON_YADE = ["procedures-links-100", "collapse-yade", "gravish-yade"]
 """Further results of a study: the name of the study is that of the folder up to the first such ending."""
 
 OLDER = ["sensitivity", "sensitivity-section"]
@@ -27,7 +27,7 @@ OLDER = ["sensitivity", "sensitivity-section"]
 JUDGED = {
     path.parent.name: path
     for table in [*SCRIPTS, *ON_YADE]
-    for path in (RESULTS / table / "findings.csv", RESULTS / table / "answers.csv")
+    for path in (RESULTS / table / f"{name}.csv" for name in ("verdicts", "findings", "answers"))
     if path.is_file()
 }
 """Published verdicts; those of `engines` are in its tables."""

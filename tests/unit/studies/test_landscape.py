@@ -367,7 +367,7 @@ def shipped() -> list[Point]:
 
 def test_over_two_hundred_points_of_the_papers_counts(shipped: list[Point]) -> None:
     folder = Path(studies.__file__).parent
-    with (folder / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (folder / "savoie_counts.csv").open(encoding="utf-8") as file:
         counts = {float(row["l_over_w"]): (int(row["n"]), int(row["per_layer"])) for row in csv.DictReader(file)}
     assert len(shipped) == len({point.name for point in shipped}) == 204
     for point in shipped:

@@ -41,7 +41,7 @@ def points(*, quick: bool) -> list[Point]:
 
 
 def test_the_full_study_is_the_papers() -> None:
-    with (FOLDER / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (FOLDER / "savoie_counts.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     found = [point for point in points(quick=False) if not point.again]
     # Seed by seed, so that an interrupted study has all aspect ratios.
@@ -157,7 +157,7 @@ def test_the_study_of_engines_pairs_every_run() -> None:
 
 def test_the_counts_are_those_of_the_reference() -> None:
     """The layers of the source times the number per layer are its counts."""
-    with (FOLDER / "gravish" / "savoie_counts.csv").open(encoding="utf-8") as file:
+    with (FOLDER / "savoie_counts.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             assert int(row["layers"]) * int(row["per_layer"]) == int(row["n"])
 
