@@ -227,30 +227,3 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
         * scene.motor.speed_limit_rad_per_s
         * scene.fidelity.control_interval_s,
     }
-
-
-def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any]:
-    """Barb 1 is turned about its hinge by hand while the motor holds; torque on it at every step."""
-    scene, engine = floating(data)
-    engine.motors.articulate()
-    hold_all(engine)
-    begun = engine.state().angles
-    state = engine.state()
-    normal, hinge = state.link_rotations[0, 1, :, 2], state.vertices[0, 1]
-    barb, torques = bodies(engine)[0], []
-    spin = -normal * speed  # inwards for barb 1 is about the negative normal
-    barb.angVel = engine._yade.vector(*spin)
-    interval = scene.fidelity.control_interval_s
-    for step in range(round(angle / speed / engine.time_step)):
-        if step % round(interval / engine.time_step) == 0:
-            engine.motors.actuate(begun[None], interval)
-        barb.vel = engine._yade.vector(*np.cross(spin, vec(barb.pos) - hinge))
-        engine.advance(1)
-        torques.append(engine.motors._hinges.torques()[0, 0])
-    return {
-        "torques": np.array(torques),
-        "angles": engine.state().angles[0] - begun[0],
-        "command": engine.motors.readings.commands[0] - begun[0],
-        "gap": engine.motors.gaps().max(),
-        "limit": scene.torque_limit,
-    }

@@ -79,16 +79,6 @@ def test_a_servo_gives_no_energy(simulate: Simulate, damping: float) -> None:
     assert free["gap"] < 1e-4
 
 
-def test_nothing_leaves_the_plane_and_a_chain_is_its_own_image_turned_by_half(simulate: Simulate) -> None:
-    pulled = simulate(chain_cases.strained, chain(), strain=0.15)
-    assert pulled["heights"] < 1e-12
-    assert pulled["tilts"] < 1e-12
-    assert pulled["turns"] == 0
-    # Barbs have opened by some degrees, and those of the one smarticle as those of the other.
-    assert (np.pi / 2 - pulled["angles"]).min() > 0.05
-    assert pulled["angles"][0] == pytest.approx(pulled["angles"][1], abs=2e-3)
-
-
 def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path: Path) -> None:
     # Walls that the chain soon leans on, since it turns and widens a little.
     data = chain(plane={"width_m": 0.0624})

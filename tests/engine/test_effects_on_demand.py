@@ -144,14 +144,6 @@ def test_the_comparison_sees_the_smallest_change(run: Callable[[dict[str, Any]],
     assert len(differing(run(data(SHAKE)), run(stronger))) > 10
 
 
-FINE = {"base": "draft", "time_step_s": 2e-5}  # the time step of welded and of hinged smarticles
-
-
-def test_hinges_and_motors_that_are_yet_to_come_change_no_bit(run: Callable[[dict[str, Any]], Path]) -> None:
-    welded = data(SHAKE, fidelity=FINE)
-    assert differing(run(welded), run(data(SHAKE, HOLD, fidelity=FINE)), until=3) == []
-
-
 # -- found on the way ----------------------------------------------------------------------------------------------
 
 

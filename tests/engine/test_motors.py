@@ -47,14 +47,3 @@ def test_blocked_motor_halts_holds_and_comes_free(simulate: Simulate, data: Scen
         assert (later[0] > commands[-1]).all()
         assert later[-1] == pytest.approx(blocked["goal"], abs=1e-12)
         assert not blocked["halted"][mark:].any()
-
-
-@pytest.mark.parametrize("speed", [-3.0])
-def test_slipping_motor_holds_its_limit_while_it_is_turned(simulate: Simulate, data: SceneData, speed: float) -> None:
-    turned = simulate(hinge_cases.forced, data({"motor.law": "slip"}), speed=speed, angle=0.3 * np.sign(speed))
-    assert turned["angles"][0] == pytest.approx(0.3 * np.sign(speed), rel=0.01)
-    # At every step, from when the shaft is wound up: τ_max/k = 5 mrad. Between two looks it would rise by 11 %.
-    slipping = turned["torques"][len(turned["torques"]) // 20 :]
-    expected = -np.sign(speed) * turned["limit"]
-    assert slipping == pytest.approx(np.full_like(slipping, expected), rel=0.01)
-    assert turned["command"] == pytest.approx(np.zeros(2), abs=1e-12)

@@ -40,10 +40,3 @@ def test_recorded_force_is_the_mean_over_every_step(simulate: Simulate, scene_da
     assert shaken["steps"][:, 2].mean() < 0  # downwards
     # Exact but for rounding of momenta.
     assert shaken["balance"] == pytest.approx(shaken["steps"], abs=1e-6 * weight)
-
-
-def test_the_floor_moves_alone_where_it_is_asked_to(simulate: Simulate, scene_data: SceneData) -> None:
-    together, alone = (simulate(cases.shake, scene_data(), periods=1.3, walls=walls) for walls in (True, False))
-    assert np.ptp(alone["z"]) == pytest.approx(2 * alone["amplitude"], rel=0.01)
-    assert np.array_equal(alone["z"], together["z"])
-    assert (alone["wall_moved"], together["wall_moved"]) == (0.0, pytest.approx(together["z"][-1]))

@@ -9,7 +9,7 @@ from typing import Any
 import cases
 import numpy as np
 import pytest
-from run_files import frame_files, series
+from run_files import series
 
 from dem.plan.steps import time_steps
 from dem.scene.reading import parse_scene
@@ -32,22 +32,6 @@ def runs(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> dict[str,
         assert answer["error"] is None, answer["text"]
         found[name] = tmp_path / name, data
     return found
-
-
-def test_until_motors_act_bits_are_those_of_a_scene_without(runs: dict[str, tuple[Path, dict[str, Any]]]) -> None:
-    (swung, _), (alone, _) = runs["swung"], runs["left alone"]
-    one, other = series(swung), series(alone)
-    both = other.keys() & one.keys()
-    before = one["phase"] < 2
-    assert before.sum() == len(other["phase"]) > 50
-    assert {"com_height_m", "kinetic_energy_J", "container_force_N"} <= both
-    for name in both - {"phase"}:
-        assert one[name][before].tobytes() == other[name].tobytes(), name
-    frames = [{path.name: path.read_bytes() for path in frame_files(run)} for run in (swung, alone)]
-    shared = sorted(frames[1])[:-1]
-    assert len(shared) > 10
-    # Frames of a scene with motors tell their torques as well; positions are in both.
-    assert frames[0].keys() > set(shared)
 
 
 def test_samples_stay_on_their_grid_when_the_step_changes(runs: dict[str, tuple[Path, dict[str, Any]]]) -> None:

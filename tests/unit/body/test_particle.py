@@ -244,25 +244,3 @@ def test_chain_mean_width_by_bringing_random_chains_into_touch(pitch: float) -> 
     # Scatter of 10 000 draws of spread ~0.1 is 0.001.
     assert chain_mean_width(pitch) == pytest.approx(measured, abs=5e-3)
     assert chain_mean_width(pitch) < 1
-
-
-@pytest.mark.parametrize("angles", [(90.0, 90.0), (0.0, 0.0), (105.0, -15.0), (30.0, 70.0)])
-def test_links_make_up_the_smarticle(angles: tuple[float, float]) -> None:
-    particle = make_particle(0.7, angles=angles)
-    boxes = particle.boxes
-    assert boxes.link_masses.sum() == pytest.approx(boxes.mass, rel=1e-14)
-    assert boxes.link_masses @ boxes.link_centres == pytest.approx(np.zeros(3), abs=1e-18)
-    # The links' own tensors, moved to the common centre of mass, add up to the smarticle's principal one.
-    total = np.zeros((3, 3))
-    for mass, moments, centre, frame in zip(
-        boxes.link_masses, boxes.link_inertias, boxes.link_centres, boxes.link_rotations, strict=True
-    ):
-        assert np.linalg.det(frame) == pytest.approx(1)
-        total += frame @ np.diag(moments) @ frame.T + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    assert total == pytest.approx(np.diag(boxes.inertia), rel=1e-12, abs=1e-22)
-    # Spheres lie along their links: across only by the rows, and between the ends.
-    frames = boxes.link_rotations[particle.links]
-    world = np.einsum("sij,sj->si", frames, particle.local_centres) + boxes.link_centres[particle.links]
-    assert world == pytest.approx(particle.centres, abs=1e-15)
-    assert particle.local_centres[:, 1] == pytest.approx(0, abs=1e-15)
-    assert (np.abs(particle.local_centres[:, 0]) <= boxes.lengths[particle.links] / 2 + 1e-12).all()

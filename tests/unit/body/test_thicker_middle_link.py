@@ -55,27 +55,6 @@ def test_mass_centre_and_inertia_are_those_of_three_boxes_written_out() -> None:
     assert boxes.link_inertias == pytest.approx(np.array([barb * own[0], middle * own[1], barb * own[0]]), rel=1e-12)
 
 
-@pytest.mark.parametrize("body", [0.0096, 0.0142, 0.0190, 0.0213, 0.0233])
-@pytest.mark.parametrize("rows", [1, 2])
-def test_spheres_fill_the_body_from_face_to_face(body: float, rows: int) -> None:
-    d = BARB
-    particle = with_spheres(robot(body), rows=rows, diameter=d)
-    plain = with_spheres(robot(None), rows=rows, diameter=d)
-    own = particle.centres[particle.links == 1] - (particle.boxes.vertices[1] + particle.boxes.vertices[2]) / 2
-    across = np.unique(own[:, 1].round(12))
-    # Spheres as thick as barbs: their surfaces are the faces, and nothing as thick fits between two rows.
-    assert across[-1] + d / 2 == pytest.approx(body / 2, rel=1e-9)
-    assert across[0] - d / 2 == pytest.approx(-body / 2, rel=1e-9)
-    assert np.abs(across).min() < 1e-12  # on the hinges' axis, where motors sit
-    assert np.diff(across).max() <= d * (1 + 1e-9)
-    # Every row is the chain of the plain one, from hinge to hinge, and as high.
-    assert len(own) == len(across) * (plain.links == 1).sum()
-    assert own[:, 0].min() == pytest.approx(-W / 2)
-    assert own[:, 0].max() == pytest.approx(W / 2)
-    assert len(np.unique(own[:, 2].round(12))) == rows
-    assert particle.reach >= np.linalg.norm(particle.centres, axis=1).max() + d / 2
-
-
 @given(
     a1=st.floats(-15, 105),
     a2=st.floats(-15, 105),

@@ -155,17 +155,6 @@ def test_what_cannot_be_carried_over_is_refused_by_name(
     assert not (tmp_path / "deck").exists()
 
 
-def test_a_pour_is_refused_with_what_to_do_instead(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"phases\.0 \(deposit\): a pour \(run it here, and begin with take-over"):
-        write_deck(parse_scene(SMALL, source="x"), tmp_path / "deck")
-
-
-def test_poses_that_overlap_as_spheres_are_refused(tmp_path: Path) -> None:
-    scene = scene_of(source(tmp_path / "run", apart=0.004, low=0.01, high=0))
-    with pytest.raises(InputError, match=r"^phases\.0\.run: \d+ pairs of spheres in frame 0 .* more than 0\.05 diam"):
-        write_deck(scene, tmp_path / "deck")
-
-
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source(tmp_path / "run")
     file = tmp_path / "on.yaml"

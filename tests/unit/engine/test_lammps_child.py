@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from scenes import small
 
-from dem.engine.lammps.child import NEEDED, Child, explain, lammps_version
+from dem.engine.lammps.child import NEEDED, Child, explain
 from dem.engine.lammps.ranks import check_ranks
 from dem.errors import InputError, RunError
 from dem.run.run import run_scene
@@ -47,13 +47,6 @@ def test_what_is_missing_is_named_and_no_directory_is_left(
     with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
         run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
     assert not (tmp_path / "run").exists()
-
-
-@pytest.mark.parametrize("script", ["echo liblammps.so.0: cannot open >&2; exit 127", "echo something else"])
-def test_a_program_that_is_no_lammps_is_told_with_what_it_says(programs: Programs, script: str) -> None:
-    programs(lmp=script, mpirun="")
-    with pytest.raises(RunError, match=r"lmp: is no LAMMPS that starts \((liblammps|something else)"):
-        lammps_version()
 
 
 KILLED = """\

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from numpy.typing import NDArray
 from scenes import small
 
 from dem.phases.gaits.drive import Drive, actuated, drive
-from dem.scene.reading import dump_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.motion import Triangle
 
@@ -71,13 +69,6 @@ def test_shape_change_by_hand(active: Active) -> None:
     assert np.ptp(angles, axis=(1, 2)) == pytest.approx(0)
 
 
-def test_shape_change_leads_each_barb_back_to_where_it_began(active: Active) -> None:
-    driven = drive(active(SHAPE_CHANGE, smarticle__angles_deg=[80, 40]), 1)
-    assert targets(driven, 0, 0.75, 1.5, 3)[:, 0] == pytest.approx(
-        np.array([[80, 40], [40, 20], [0, 0], [80, 40]]), abs=1e-9
-    )
-
-
 def test_oscillation_by_hand(active: Active) -> None:
     driven = drive(active({**OSCILLATION, "theta_deg": 20}), 1)
     quarter = math.radians(10) / 6
@@ -106,16 +97,6 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
 # -- who moves, from where, when -----------------------------------------------------------------------------------
 
 
-def test_a_phase_may_cut_its_motion(active: Active) -> None:
-    ramp = {"type": "ramp", "to_deg": 0, "duration_s": 2}
-    scene = active({"type": "actuate", "barbs": ramp, "duration_s": 1}, {"type": "relax"}, SHAPE_CHANGE)
-    driven = drive(scene, 1)
-    assert driven.duration == 1
-    assert targets(driven, -1, 1, 1.5)[:, 0, 0] == pytest.approx([90, 45, 45])  # times beyond the phase: its ends
-    # The next actuated phase begins there, and leads back there.
-    assert targets(drive(scene, 3), 0, 1.5, 3)[:, 0, 0] == pytest.approx([45, 0, 45])
-
-
 def test_inactive_smarticles_keep_their_last_target(active: Active) -> None:
     ramp = {"type": "ramp", "to_deg": 30, "duration_s": 1}
     half = {"type": "actuate", "barbs": ramp, "active_fraction": 0.5}
@@ -131,12 +112,6 @@ def test_inactive_smarticles_keep_their_last_target(active: Active) -> None:
     assert targets(second, 0, 0.5)[:, :, 1] == pytest.approx(np.array([begun, middle]))
     end = np.where(first.active | second.active, 30.0, 90.0)
     assert targets(last, 0, 0.75, 3)[:, :, 0] == pytest.approx(np.array([end, end / 2, end]))
-
-
-@pytest.mark.parametrize(("fraction", "expected"), [(1.0, 20), (0.5, 10), (0.26, 5), (0.24, 5), (0.05, 1)])
-def test_share_of_active_smarticles(active: Active, fraction: float, expected: int) -> None:
-    driven = drive(active({**OSCILLATION, "active_fraction": fraction}, count=20), 1)
-    assert driven.active.sum() == expected
 
 
 def test_draws_follow_from_the_seed_alone(active: Active) -> None:
@@ -180,22 +155,3 @@ def test_random_offsets_are_spread_evenly_over_a_period(active: Active) -> None:
     after = active(phase, SHAPE_CHANGE, count=2000)
     assert np.array_equal(drive(after, 2).targets(0), driven.targets(5))
     assert drive(after, 2).targets(3) == pytest.approx(driven.targets(5))
-
-
-# -- scene files ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "phase",
-    [
-        SHAPE_CHANGE,
-        OSCILLATION,
-        {"type": "actuate", "barbs": {"type": "ramp", "to_deg": 0, "duration_s": 1}},
-        {"type": "actuate", "barb_1": {"type": "hold"}, "barb_2": {"type": "hold"}, "duration_s": 1},
-    ],
-)
-def test_dump_comes_back_to_the_same_scene(active: Active, phase: dict[str, Any]) -> None:
-    scene = active(phase)
-    again = parse_scene(yaml.safe_load(dump_scene(scene)), source="dump")
-    assert again == scene
-    assert scene_hash(again) == scene_hash(scene)

@@ -65,15 +65,6 @@ def test_speed_depends_on_where_the_phase_before_ended(scene_data: SceneData) ->
     assert refused(scene_data, some, back).startswith("phases.2.barbs.duration_s: 0.2 s makes 7.854 rad/s")
 
 
-def test_a_swing_that_is_cut_before_it_leaves_the_range(scene_data: SceneData) -> None:
-    # Down first: a half cycle of 0.5 s would have to pass before the swing goes above its centre.
-    phase = actuate({**SINE, "amplitude_deg": 20, "cycles_offset": 0.5}, duration_s=0.5)
-    checked(scene_data, phase)
-    assert "makes the barbs reach 110°" in refused(scene_data, {**phase, "duration_s": 0.8})
-    # With random offsets any part of the period may come first.
-    assert "makes the barbs reach 110°" in refused(scene_data, {**phase, "offsets": "random"})
-
-
 def test_crossing_barbs(scene_data: SceneData) -> None:
     inward = actuate({"type": "ramp", "to_deg": 105, "duration_s": 1})
     message = (
@@ -113,16 +104,6 @@ def test_first_sphere_of_a_barb_against_the_middle_link(scene_data: SceneData) -
     finest = {**NARROW, "pitch": 0.05}
     assert "stay below 98°" in refused(scene_data, inward_to(99), fidelity=finest)
     checked(scene_data, inward_to(98), fidelity=finest)
-
-
-@pytest.mark.parametrize("rows", [1, 2])
-@pytest.mark.parametrize("pitch", [0.1, 0.25, 0.4])
-@pytest.mark.parametrize("width", [0.0117, 0.0083, 0.0061])
-def test_pitch_that_is_named_is_wide_enough(scene_data: SceneData, width: float, pitch: float, rows: int) -> None:
-    changes = {"smarticle__middle_length_m": width, "smarticle__aspect_ratio": 1}
-    message = refused(scene_data, inward_to(105), fidelity={"rows": rows, "pitch": pitch}, **changes)
-    named = float(message.rpartition("at least ")[2])
-    checked(scene_data, inward_to(105), fidelity={"rows": rows, "pitch": named}, **changes)
 
 
 # -- what is not refused, but said ---------------------------------------------------------------------------------

@@ -185,18 +185,6 @@ def test_a_run_goes_on_from_its_checkpoint_without_its_source(
     assert np.array_equal(*ends)
 
 
-def test_a_source_that_has_changed_is_noticed(pour: Path, tmp_path: Path) -> None:
-    (tmp_path / "pinned.yaml").write_text(dump_scene(scene_of(pour), tmp_path), encoding="utf-8")
-
-    def move(mesh: meshio.Mesh) -> None:
-        mesh.points[:, 0] += 1e-9
-
-    rewrite(pour, -1, move)
-    scene = load_scene(tmp_path / "pinned.yaml")
-    with pytest.raises(InputError, match=r"^phases\.0\.sha256: frame \d+ of .* has other poses .* leave sha256 out"):
-        run_scene(scene, tmp_path / "on", command="test", progress=False)
-
-
 # -- what is refused ---------------------------------------------------------------------------------------------------
 
 
@@ -214,15 +202,6 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
         assert line.startswith("phases.0")
     assert refused(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
     assert refused(pour, {"run": ""}).startswith("phases.0.run: ")
-
-
-def test_damaged_frames(pour: Path) -> None:
-    path = read_frames(pour).paths[-1]
-    path.write_bytes(path.read_bytes()[:-200])
-    line = refused(pour)
-    assert line.startswith(f"phases.0.frame: cannot read frame {path}: truncated")
-    (pour / "frames.pvd").unlink()
-    assert refused(pour).startswith("phases.0.run: cannot read list of frames")
 
 
 @pytest.mark.parametrize(
@@ -244,25 +223,6 @@ def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) 
     told = refused(pour, **changes)
     assert told.startswith(line)
     assert "; " in told
-
-
-def test_barbs_that_stand_apart_are_refused(pour: Path) -> None:
-    def bend(mesh: meshio.Mesh) -> None:
-        # One tip of one smarticle moves by 0.1 mm.
-        mesh.points[3] += 1e-4 * (mesh.points[1] - mesh.points[2]) / 0.0117
-
-    rewrite(pour, -1, bend)
-    line = refused(pour)
-    assert line.startswith("smarticle.angles_deg: (90, 90) here, but the barbs of frame")
-    assert line.endswith("smarticles of a scene begin in one shape: take a frame in which all barbs stand alike")
-
-
-def test_a_pile_that_is_not_poured_to_the_end(pour: Path) -> None:
-    frames = read_frames(pour)
-    few = next(k for k, frame in enumerate(frames) if frame.count < 10)
-    line = refused(pour, {"frame": few})
-    assert line.startswith(f"count: 10 here, but frame {few} of {pour}")
-    assert f"holds {frames[few].count} of 10, poured so far; use the same, or another frame" in line
 
 
 def test_a_wall_that_is_too_low_and_a_hook_in_the_pile(pour: Path) -> None:

@@ -29,24 +29,6 @@ def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors 
     return motors
 
 
-# -- speed -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_jump_of_the_target_is_followed_at_the_speed_limit(sign: int) -> None:
-    law = replace(HALT, torque_limit=1.0)
-    motors = Motors(law, np.zeros((2, 2)))
-    seen = []
-    for _ in range(30):
-        motors.look(np.zeros((2, 2)), np.full((2, 2), sign * 0.02), PERIOD, STEP)
-        seen.append(motors.commands[1, 0])
-    steps = np.diff([0.0, *seen])
-    whole = int(0.02 // (6 * PERIOD))
-    assert steps[:whole] == pytest.approx(np.full(whole, sign * 6 * PERIOD), rel=1e-12)
-    assert seen[-1] == sign * 0.02
-    assert (np.diff(seen[whole + 1 :]) == 0).all()
-
-
 # -- the halting law ---------------------------------------------------------------------------------------------------
 
 
@@ -165,19 +147,6 @@ def test_work_is_the_energy_that_a_barb_gains(law: MotorLaw) -> None:
     early = law.stiffness * 3.0**2 * STEP / 2 * 1000 * PERIOD
     assert early > 4 * np.ptp(energies)
     assert np.array(works) == pytest.approx(np.array(energies), abs=0.1 * np.ptp(energies))
-
-
-def test_engaging_forgets_torque_but_not_work() -> None:
-    motors = held(HALT, 0.5, 1.0, 40)
-    motors.look(np.full((1, 2), 0.502), np.full((1, 2), 1.0), PERIOD, STEP)
-    work = motors.work.copy()
-    assert (work > 0).all()
-    motors.engage(np.full((1, 2), 0.7))
-    assert (motors.commands == 0.7).all()
-    assert (motors.torques == 0).all()
-    assert not motors.halted.any()
-    motors.look(np.full((1, 2), 0.7), np.full((1, 2), 0.7), PERIOD, STEP)
-    assert (motors.work == work).all()  # the way in between was not the motor's
 
 
 # -- memory ------------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Whatever a scene file says, reading and planning it ends within a second: in a plan, or in one clear line.
 
-Scenes are the shipped ones with any value in any place, keys dropped, added and nested, and scenes made from the JSON
-schema. `ANY_SCENES=20000 pytest tests/unit/plan/test_any_scene.py` tries so many of each kind instead of a few hundred.
+Scenes are the shipped ones with any value in any place, keys dropped, added and nested. `ANY_SCENES=20000 pytest
+tests/unit/plan/test_any_scene.py` tries so many of each kind instead of a few hundred.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
@@ -89,48 +89,7 @@ ANYTHING = st.recursive(
 )
 
 
-def from_schema(node: dict[str, Any], depth: int = 0) -> st.SearchStrategy[Any]:
-    """What a part of the schema allows."""
-    if "$ref" in node:
-        if depth > 6:  # motions hold motions
-            return st.just({"type": "hold", "duration_s": 1.0})
-        node = SCHEMA["$defs"][node["$ref"].rpartition("/")[2]]
-    choices = [from_schema(one, depth + 1) for several in ("anyOf", "oneOf") for one in node.get(several, ())]
-    choices += [st.just(value) for value in [*node.get("enum", ()), *([node["const"]] if "const" in node else [])]]
-    return st.one_of(choices) if choices else OF_TYPE.get(node.get("type"), lambda *_: ANYTHING)(node, depth)
-
-
-def _object(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
-    needed = node.get("required", [])
-    parts = {key: from_schema(value, depth + 1) for key, value in node.get("properties", {}).items()}
-    optional = {key: part for key, part in parts.items() if key not in needed}
-    return st.fixed_dictionaries({key: parts[key] for key in needed}, optional=optional)
-
-
-def _array(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
-    items = [from_schema(one, depth + 1) for one in node.get("prefixItems", [])]
-    return st.tuples(*items).map(list) if items else st.lists(from_schema(node["items"], depth + 1), max_size=3)
-
-
-def _number(node: dict[str, Any], depth: int) -> st.SearchStrategy[Any]:
-    low, high = node.get("minimum", -1e6), node.get("maximum", node.get("exclusiveMaximum", 1e6))
-    if node["type"] == "integer":
-        return st.integers(int(low), int(high))
-    within = st.floats(low, high) | st.floats(low, max(low, min(1.0, high)))
-    return within if node.get("default") is None else within | st.just(node["default"])
-
-
-OF_TYPE: dict[Any, Callable[[dict[str, Any], int], st.SearchStrategy[Any]]] = {
-    "object": _object,
-    "array": _array,
-    "number": _number,
-    "integer": _number,
-    "boolean": lambda *_: st.booleans(),
-    "string": lambda *_: st.text(max_size=10),
-    "null": lambda *_: st.none(),
-}
-PARTS = [(set(part.get("properties", {})), part) for part in [SCHEMA, *SCHEMA["$defs"].values()]]
-KEYS = sorted({key for keys, _ in PARTS for key in keys})
+KEYS = sorted({key for part in [SCHEMA, *SCHEMA["$defs"].values()] for key in part.get("properties", {})})
 
 
 def places(data: Any, here: Place = ()) -> Iterator[Place]:
@@ -165,9 +124,7 @@ def broken(draw: st.DrawFn) -> Any:
             return data
         *above, last = draw(st.sampled_from(found))
         parent = value_at(data, tuple(above))
-        what = draw(
-            st.sampled_from(["put", "put", "scale", "scale", "drop", "add", "nest", "twice", "of another", "schema"])
-        )
+        what = draw(st.sampled_from(["put", "put", "scale", "scale", "drop", "add", "nest", "twice", "of another"]))
         value = parent[last]
         if what == "drop":
             del parent[last]
@@ -185,10 +142,6 @@ def broken(draw: st.DrawFn) -> Any:
         elif what == "of another":
             other = draw(st.sampled_from(SHIPPED))
             parent[last] = deepcopy(value_at(other, draw(st.sampled_from(list(places(other))))))
-        elif what == "schema":
-            fitting = [part for keys, part in PARTS if last in keys]
-            if fitting:
-                parent[last] = draw(from_schema(draw(st.sampled_from(fitting))["properties"][last], depth=3))
         else:
             parent[last] = draw(ANYTHING)
     return data

@@ -138,38 +138,6 @@ def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
     assert len(kind.built) == 1
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"seed": 2}, "seed 1 there, 2 here; resume with"),
-        (
-            {"seed": 2, "count": 12, "engine": "links", "gravity_m_per_s2": 5},
-            "engine yade there, links here; seed 1 there",
-        ),
-    ],
-)
-def test_a_finished_run_of_another_scene_is_not_called_done(
-    kind: KindDouble, tmp_path: Path, changes: dict[str, Any], told: str
-) -> None:
-    run(scene_of("rested"), tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    with pytest.raises(InputError, match="was made from another scene: ") as caught:
-        run(scene_of("rested", **changes), tmp_path, resume=True)
-    assert told in str(caught.value)
-    assert "run the changed scene in another directory" in str(caught.value)
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
-    assert len(kind.built) == 1
-
-
-def test_a_scene_changed_in_the_run_directory_is_told_as_that(kind: KindDouble, tmp_path: Path) -> None:
-    run(scene_of("rested"), tmp_path)
-    path = tmp_path / "scene.yaml"
-    path.write_text(path.read_text().replace("seed: 1", "seed: 5"))
-    with pytest.raises(InputError, match=r"scene.yaml is not the scene that this run was made from .* put it back"):
-        run(load_scene(path), tmp_path, resume=True)
-    assert len(kind.built) == 1
-
-
 def test_another_scene_or_another_version_does_not_go_on(
     kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

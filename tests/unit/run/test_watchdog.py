@@ -85,13 +85,6 @@ def test_each_cause_stops_the_run(harm: Callable[[State], None], text: str) -> N
     assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
 
 
-def test_many_smarticles_are_counted_and_the_first_named() -> None:
-    positions = np.full((8, 3), -0.01)
-    state = State.rigid(BOXES, positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
-    with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
-        check(state)
-
-
 def test_broken_hinge_is_named_with_its_gap() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, gap=2e-4)
     gaps = np.full((4, 2), 1e-6)

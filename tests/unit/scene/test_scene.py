@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from pydantic import BaseModel
 from scenes import chain, small
 
 from dem.plan.steps import time_step
@@ -100,14 +99,6 @@ def test_the_default_engine_is_neither_written_nor_hashed_and_another_is_both() 
     assert parse_scene(yaml.safe_load(dump_scene(other)), source="dump") == other
 
 
-def test_what_a_shake_moves_is_neither_written_nor_hashed_where_it_is_the_container() -> None:
-    plain, named, alone = small(), small({"phases.2.moves": "container"}), small({"phases.2.moves": "floor"})
-    assert "moves" not in dump_scene(named)
-    assert scene_hash(named) == scene_hash(plain) == PLAIN_HASH
-    assert scene_hash(alone) != scene_hash(plain)
-    assert parse_scene(yaml.safe_load(dump_scene(alone)), source="dump") == alone
-
-
 def test_hash_is_stable_over_notation_and_sensitive_to_everything(scene_data: SceneData) -> None:
     scene = small()
     assert re.fullmatch(r"[0-9a-f]{64}", scene_hash(scene))
@@ -135,36 +126,6 @@ def test_seeds_for_purposes_come_from_the_seed_alone() -> None:
     drawn = {derive_seed(seed, purpose) for seed in range(500) for purpose in ("deposit", "shake")}
     assert len(drawn) == 1000
     assert max(drawn) > 2**63  # all 64 bits are used: seeds of a sweep do not collide
-
-
-def models(*made_of: Any) -> list[type[BaseModel]]:
-    """All models that types are made of, themselves included; a sequence of motions may hold sequences."""
-    seen: list[type[BaseModel]] = []
-    waiting = list(made_of)
-    while waiting:
-        annotation = waiting.pop()
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            if annotation not in seen:
-                seen.append(annotation)
-                waiting += [field.annotation for field in annotation.model_fields.values()]
-        else:
-            waiting += get_args(annotation)
-    return seen
-
-
-def test_names_and_units_agree() -> None:
-    suffixes = {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad"}
-    suffixes |= {"_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s", "_N_m": "N m"}
-    suffixes |= {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
-    suffixes |= {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad", "_hz": "Hz", "_N": "N", "_m": "m", "_s": "s"}
-    checked = set()
-    for model in models(Scene):
-        for name, field in model.model_fields.items():
-            unit = next((unit for suffix, unit in suffixes.items() if name.endswith(suffix)), None)
-            if unit is not None:
-                assert f"[{unit}]" in (field.description or ""), f"{model.__name__}.{name}"
-                checked.add(unit)
-    assert checked == set(suffixes.values())
 
 
 def test_strengths_are_drawn_from_the_seed_within_the_spread() -> None:

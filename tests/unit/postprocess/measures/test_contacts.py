@@ -1,15 +1,12 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import HINGE_CLEARANCE, Boxes, Particle, SphereChain
-from dem.errors import InputError
-from postprocess import contact_pairs, measure_run, neighbours_in_contact, pairs_in_contact, read_frames, read_run
+from postprocess import contact_pairs, neighbours_in_contact
 from postprocess.geometry import chains
-from postprocess.measures.contacts import chain_of, pairs_of_spheres, segment_distances, without_support
+from postprocess.measures.contacts import pairs_of_spheres, segment_distances, without_support
 
 
 def oracle_distance(p0, p1, q0, q1):
@@ -69,17 +66,6 @@ def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
     ]
 
 
-def test_tables_have_the_spread_of_the_contacts_and_the_rattlers(make_run):
-    """The frames of the fixture tell 0 to 5 contacts of six smarticles."""
-    run = make_run()
-    row = measure_run(run, costly="never").iloc[2]
-    assert row["contacts SD [-]"] == pytest.approx(np.std(np.arange(6)))
-    assert row["contacts most [-]"] == 5
-    assert row["without contact [-]"] == pytest.approx(1 / 6)
-    # The one without a contact hangs in the air.
-    assert row["rattlers [-]"] == pytest.approx(1 / 6)
-
-
 # -- what engines see ------------------------------------------------------------------------------------------------
 
 
@@ -121,18 +107,3 @@ def test_beads_rest_in_the_gaps_of_the_other_chain():
     # Head to head they do so at one, and spheres of one smarticle do not count.
     assert len(pairs_of_spheres(np.array([beads, beads + np.array([0.0, 0.99, 0.0])]), 1.0).i) == 1
     assert len(pairs_of_spheres(0.5 * beads[None], 1.0).i) == 0
-
-
-def test_the_shapes_of_a_run_are_those_of_its_scene(make_run):
-    """YADE's chains have a pitch, the strands of links have none."""
-    run = make_run()
-    (run / "scene.yaml").write_text("fidelity: {rows: 2, pitch: 1.3}\n", encoding="utf-8")
-    manifest = read_run(run)
-    chain = chain_of(manifest)
-    assert (chain.rows, chain.pitch) == (2, pytest.approx(1.3 * manifest.sphere_diameter))
-    assert chain_of(dataclasses.replace(manifest, engine="links")).pitch == 0
-    pairs = pairs_in_contact(read_frames(run)[-1], manifest)
-    assert (pairs.i < pairs.j).all()
-    (run / "scene.yaml").write_text("fidelity: {rows: two}\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"fidelity\.rows must be a finite number above 0: got 'two'"):
-        chain_of(manifest)

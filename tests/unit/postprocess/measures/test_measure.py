@@ -1,11 +1,8 @@
-import json
-
 import h5py
 import numpy as np
 import pytest
 
 import postprocess
-from dem.errors import InputError
 from postprocess import (
     link_crossings,
     measure_run,
@@ -19,30 +16,6 @@ from postprocess.measures.packing import COSTLY_DEFINITIONS
 
 CHEAP = [name for name in postprocess.DEFINITIONS if name not in COSTLY_DEFINITIONS]
 PHI = "phi second-highest-com [-]"
-
-
-def test_no_packing_fraction_where_no_one_cylinder_is_filled(make_run):
-    """After the wall is gone, and in a mould of tiers, the radius says nothing of the pile's volume."""
-    run = make_run([(0, 0.0), (0, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
-    manifest = json.loads((run / "run.json").read_text())
-    assert measure_run(run, costly="never")[PHI][1:].notna().all()
-    manifest["phases"][1]["type"] = "remove-container"
-    (run / "run.json").write_text(json.dumps(manifest))
-    table = measure_run(run, costly="never")
-    assert table["phase"].tolist() == [0, 0, 1, 2, 2]
-    assert table[PHI].notna().tolist() == [False, True, False, False, False]  # the first has one smarticle
-    free = table.columns[table.columns.str.contains("cluster|spread|sloughed|tilt")]
-    assert len(free) == 6
-    assert table.loc[table["phase"] == 0, free].isna().all(axis=None)
-    assert table.loc[table["phase"] > 0, free].notna().all(axis=None)
-    assert (table["spread radius 50 % [m]"] < table["spread radius 95 % [m]"]).sum() == 3
-    manifest |= {"container_tiers": 2}
-    manifest["phases"][1]["type"] = "relax"
-    (run / "run.json").write_text(json.dumps(manifest))
-    table = measure_run(run, costly="never")
-    assert table[PHI].isna().all()
-    # A run that keeps its wall has no columns for a pile without one.
-    assert not table.columns.str.contains("cluster|spread|sloughed|tilt").any()
 
 
 def test_one_row_per_frame_with_every_measure(make_run):
@@ -114,11 +87,6 @@ def test_measures_take_any_shape(make_run, scene, write_frame, angles):
     assert row[["phi second-highest-com [-]", "phi top-percentile [-]", "phi voxel [-]"]].notna().all()
 
 
-def test_escaped_smarticles_are_counted(make_run):
-    table = measure_run(make_run([(0, 0.0), (1, -0.1)]), definitions=CHEAP)
-    assert table["escaped [-]"].tolist() == [0, 6]
-
-
 def test_summary_averages_the_last_frames_of_each_phase(make_run):
     plan = [(0, 0.0), (1, 0.0), *((2, 0.001 * k) for k in range(5))]
     directory = make_run(plan)
@@ -148,11 +116,3 @@ def test_packing_before_and_after_activity(make_run):
     assert change.before.standard_error > 0
     shorter = packing_change(directory, last=1, definition="top-percentile")
     assert shorter.after.value == table["phi top-percentile [-]"][5]
-
-
-def test_truncated_frame_stops_the_table(make_run):
-    directory = make_run()
-    path = directory / "frames" / "frame_000001.vtu"
-    path.write_bytes(path.read_bytes()[:300])
-    with pytest.raises(InputError, match="frame_000001"):
-        measure_run(directory)

@@ -67,16 +67,6 @@ def test_every_definition_names_itself_and_finds_the_lattice_density(pile):
         assert result.height == pytest.approx(6 * 0.8, rel=0.1)
 
 
-def test_second_highest_centre_of_mass_by_hand(shape):
-    flat = shape(1.0)
-    vertices = [flat + np.array([0, 0, z]) for z in (1.0, 9.0, 3.0, 2.0)]
-    result = packing_fraction(vertices, radius=2.0, solid_volume=0.1, floor_z=0.5)
-    assert result.definition == "second-highest-com"
-    assert result.height == pytest.approx(2.5)
-    # No factor for the radius: r² as given.
-    assert result.value == pytest.approx(4 * 0.1 / (math.pi * 4 * 2.5))
-
-
 @pytest.mark.parametrize("rotation", [(0, 0, 0), (0.5, 0.1, 1.3)])
 def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
     turn = Rotation.from_rotvec(rotation).as_matrix()
@@ -120,19 +110,6 @@ def test_voronoi_cells_fill_the_container(scene):
     # The wall is a polygon around the circle, so the sum comes out a little high.
     assert local.volumes.sum() == pytest.approx(container.volume, rel=0.05)
     assert local.volumes.sum() >= container.volume
-
-
-@pytest.mark.parametrize("definition", DEFINITIONS)
-def test_too_few_smarticles_have_no_packing_fraction(shape, definition):
-    for vertices in (np.empty((0, 4, 3)), [shape()]):
-        with pytest.raises(UndefinedMeasureError, match="at least 2 smarticles"):
-            phi(vertices, definition)
-
-
-@pytest.mark.parametrize("definition", DEFINITIONS)
-def test_pile_below_its_floor_is_refused(pile, definition):
-    with pytest.raises(UndefinedMeasureError, match="no height above its floor"):
-        phi(pile, definition, floor_z=50.0)
 
 
 @pytest.mark.parametrize("definition", ["voxel", "voronoi"])

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from synthetic import SyntheticRun
-from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, weight, write_hooked_run
+from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 
 from dem.errors import InputError
 from dem.record.manifest import read_run
@@ -18,7 +18,6 @@ from postprocess.measures.pull import (
     moving_mean,
     peak,
     read_pull,
-    weight_of_one,
 )
 from postprocess.measures.table import summarise_run
 
@@ -91,32 +90,6 @@ def test_a_hook_is_free_when_its_force_is_gone_for_good(pulled):
     fallen = APEX + BASE * (1 - FREE * (1 - WINDOW / BASE / 4))
     assert freed(pull) == pytest.approx(fallen, abs=2 * INTERVAL)
     assert pull.left == pytest.approx(0, abs=1e-12)
-
-
-def test_a_hook_that_catches_again_is_not_free_before(pulled):
-    again = 1.6
-    pull = pulled(lambda time: triangle(time) + np.where(np.abs(time - again) < 0.1, 0.5 * HEIGHT, 0.0))
-    assert freed(pull) == pytest.approx(again + 0.1, abs=WINDOW)
-
-
-def test_columns_are_over_the_weight_of_all(tmp_path):
-    run = synthetic(count=12)
-    load = 3 * weight(run)  # three of them hang on it
-    directory = write_hooked_run(tmp_path / "run", run, lambda time: np.full_like(time, load))
-    manifest = read_run(directory)
-    assert weight_of_one(manifest) == pytest.approx(weight(run))
-    found = summarise_run(directory).iloc[2]
-    assert found["hook peak force over n W_s [-]"] == pytest.approx(3 / 12)
-    assert found["hook load at the end [smarticles]"] == pytest.approx(3)
-    assert found["hook work [J]"] == pytest.approx(load * DISTANCE)
-
-
-def test_measure_gives_the_pull_with_its_phase(tmp_path):
-    directory = write_hooked_run(tmp_path / "run", synthetic(), triangle)
-    table = summarise_run(directory).set_index("phase type")
-    assert table.loc["pull-hook", "hook work [J]"] == pytest.approx(HEIGHT * BASE * SPEED, rel=1e-4)
-    assert math.isnan(table.loc["relax", "hook work [J]"])
-    assert "upper hook force z [N]" in table.columns
 
 
 def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):

@@ -154,23 +154,6 @@ def test_frames_are_regular_and_listed(finished: tuple[Path, dict[str, Any]]) ->
     assert last[..., 2].min() > frames[-1].cell_data["floor_z_m"][0][0]
 
 
-def test_series_is_regular_and_agrees_with_the_frames(finished: tuple[Path, dict[str, Any]]) -> None:
-    out, data = finished
-    rows, scene = series(out), cases.scene_of(data)
-    end = read_json(out / "done.json")["time_s"]
-    assert rows["time_s"] == pytest.approx(0.008 * np.arange(len(rows["time_s"])), rel=1e-9)
-    assert rows["time_s"][-1] > end - 0.0081
-    frame = meshio.read(frame_files(out)[-1])
-    time_s = frame.cell_data["time_s"][0][0]
-    (k,) = np.flatnonzero(np.isclose(rows["time_s"], time_s, atol=1e-9))
-    points = frame.points.reshape(-1, 4, 3)
-    centres = np.average((points[:, 1:] + points[:, :-1]) / 2, axis=1, weights=[0.7, 1, 0.7])
-    heights = centres[:, 2] - rows["container_z_m"][k]
-    assert rows["com_height_m"][k] == pytest.approx(heights.mean(), rel=1e-9)
-    phi = 10 * scene.smarticle.boxes.volume / (np.pi * 0.0234**2 * np.sort(heights)[-2])
-    assert rows["packing_fraction"][k] == pytest.approx(phi, rel=1e-9)
-
-
 def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
     rows, scene = series(out), cases.scene_of(data)
