@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal
 
 from validation.check import Check
@@ -36,8 +35,8 @@ class Hard:
     name: str
     run: Callable[..., list[Check]]
     short: Mapping[str, Any] | None = field(default_factory=dict)
-    long: Mapping[str, Any] = MappingProxyType({})
-    absent: Mapping[str, str] = MappingProxyType({})
+    long: Mapping[str, Any] = field(default_factory=dict)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
 
 def checked(name: str, engine: str, size: Size, out: Path) -> tuple[list[Check], float]:
