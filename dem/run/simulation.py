@@ -83,6 +83,8 @@ class Simulation:
             # What was just loaded has been looked at, and knows its contacts from the next step on.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
+        if self.recorder.residual:
+            self.warn(self.recorder.residual)
         return self._performed
 
     def _run_phase(self) -> None:

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine.interface import Saved
 from dem.engine.links.engine import LinksEngine
+from dem.engine.links.stepping import MOST
 from dem.errors import InputError
 from dem.physics.motor import Motors
 
@@ -220,6 +221,18 @@ def test_nothing_passes_through_unseen(speed: float) -> None:
     passed = state.positions[1, 2] < state.positions[0, 2]
     seen = bool(made.overlaps(limit).deep.any())
     assert passed <= seen
+
+
+def test_a_fast_spin_is_taken_in_short_steps() -> None:
+    made = builds.engine(dt=1e-4)
+    made.add(builds.at([0, 0, 1.0]))
+    made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 60
+    made.advance(10)
+    # 60 rad/s moves a tip by less than a tenth of a diameter in a step.
+    assert made._world.totals[MOST] == 1.0
+    made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 6000
+    made.advance(10)
+    assert made._world.totals[MOST] > 10.0
 
 
 def test_an_easing_motor_is_that_of_the_other_engine() -> None:
