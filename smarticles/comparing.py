@@ -125,7 +125,7 @@ def _begun(path: Path) -> pd.DataFrame:
 
 
 def _made_by(run: RunManifest) -> dict[str, Any]:
-    return {"engine": run.engine, **run.versions, "threads": run.threads, "status": run.status}
+    return {"engine": run.engine, **run.versions, "threads": run.threads, "status": run.status.state}
 
 
 def _sweeps(one: Folder, other: Folder) -> Comparison:

@@ -19,7 +19,6 @@ import yaml
 
 from dem.errors import InputError, nearest
 from studies import (
-    chain,
     friction,
     landscape,
 )
@@ -87,11 +86,10 @@ def _scripts() -> list[Script]:
         name, quick = file.stem.replace("_", "-"), QUICK in variants
         found.append(Script(name=name, module=file.stem, quick=quick))
         found += [
-            Script(
-                name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and "yade" not in variant
-            )
-            for variant in variants
+            Script(name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and not on_yade)
+            for variant, changes in variants.items()
             if variant != QUICK
+            for on_yade in [(changes.get("constants") or {}).get("engine") == "yade"]  # which takes no minutes
         ]
     return found
 
@@ -101,8 +99,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     friction.CONTACTS,
     friction.COMPACTION,
     landscape.SHIPPED,
-    chain.SHIPPED,
-    chain.BODIES,
 )
 
 STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(

@@ -10,9 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import damping_ratio, restitution_of
 from validation.check import Answer
-from validation.engines import BALL_MASS, BALL_RADIUS, engine_access
 from validation.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
-from validation.yade_access import ball
 
 
 @pytest.mark.parametrize(("measured", "ok"), [(1.009, True), (1.011, False), (0.0, False), (math.nan, False)])
@@ -24,24 +22,6 @@ def test_a_check_passes_within_its_tolerance_only(measured: float, ok: bool) -> 
 def test_an_error_is_relative_to_the_scale_where_theory_is_zero() -> None:
     check = Answer("q [m]", 0.0, 0.02, 0.01, scale=2.0)
     assert check.error == 0.01
-
-
-def test_ball_has_one_sphere_and_the_inertia_of_a_solid_one() -> None:
-    one = ball()
-    assert one.centres == pytest.approx(np.zeros((1, 3)))
-    assert one.radius == BALL_RADIUS
-    assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
-    assert one.boxes.inertia == pytest.approx(np.full(3, 0.4 * BALL_MASS * BALL_RADIUS**2), rel=1e-12)
-
-
-def test_stub_and_roller_stand_for_the_ball() -> None:
-    access = engine_access("links")
-    stub, roller = access.ball(), access.roller()
-    for one in (stub, roller):
-        assert one.boxes.mass == pytest.approx(BALL_MASS, rel=1e-12)
-    assert access.ball_turn.apply(access.ends(stub))[:, 2].min() - stub.radius == pytest.approx(-BALL_RADIUS)
-    assert roller.boxes.inertia[0] == pytest.approx(0.4 * BALL_MASS * BALL_RADIUS**2, rel=1e-12)
-    assert roller.radius == BALL_RADIUS
 
 
 # -- the theory itself -------------------------------------------------------------------------------------------------

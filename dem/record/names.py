@@ -21,7 +21,6 @@ SPHERE = "sphere"
 FORCE = "force"
 """Noun of the pictures of forces at contacts."""
 
-MANIFEST_FORMAT = 1
 SERIES_FORMAT = 1
 CHECKPOINT_FORMAT = 4
 

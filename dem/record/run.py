@@ -5,23 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import yaml
 
-from dem.record.document import Document
+from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import PhaseRecord, RunManifest, read_run
-from dem.record.names import CHECKPOINT, DONE, FAILED, PROGRESS, SCENE, SERIES
+from dem.record.names import CHECKPOINT, DONE, FAILED, MANIFEST, OF_SWEEP, PROGRESS, SCENE, SERIES
 from dem.record.rundir import in_use
 from dem.record.series import Series, read_series
 
 State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
 """`interrupted` closed its files when asked to stop; `stopped` was killed; `queued` waits for a job of a cluster."""
-
-_REMEDY = "give the directory of a run made by `smarticles run`"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,13 +63,15 @@ class Run:
         return str(self.path)
 
     @cached_property
-    def manifest(self) -> RunManifest:
+    def manifest(self) -> Manifest:
         """What made the run.
 
         Raises:
             InputError: The directory or its `run.json` is missing, damaged or of another format.
         """
-        return read_run(self.path)
+        if not (self.path / MANIFEST).is_file():
+            _reject_place(self.path)
+        return Manifest.read(self.path / MANIFEST)
 
     @cached_property
     def scene(self) -> SceneData:
@@ -85,15 +84,27 @@ class Run:
         try:
             content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
         except (OSError, ValueError, yaml.YAMLError) as error:
-            cannot_read("scene", path, error, _REMEDY)
+            cannot_read("scene", path, error, REMEDY)
         if not isinstance(content, dict):
-            cannot_read("scene", path, "it must be a mapping", _REMEDY)
+            cannot_read("scene", path, "it must be a mapping", REMEDY)
         return SceneData(path, "", content)
 
     @cached_property
-    def phases(self) -> tuple[PhaseRecord, ...]:
-        """The phases in order; times where the run is done."""
-        return self.manifest.phases
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases in order; with times where the run is done.
+
+        Raises:
+            InputError: `run.json` and `done.json` are not of one run.
+        """
+        planned = self.manifest.phases
+        if not (self.path / DONE).exists():
+            return planned
+        done = Done.read(self.path / DONE).phases
+        if [(phase.index, phase.type) for phase in done] != [(phase.index, phase.type) for phase in planned]:
+            cause = f"its phases differ from those of run.json: {[phase.type for phase in done]}"
+            cannot_read("manifest", self.path / DONE, cause, REMEDY)
+        steps = [phase.time_step_s for phase in planned]
+        return tuple(phase.model_copy(update={"time_step_s": step}) for phase, step in zip(done, steps, strict=True))
 
     @cached_property
     def frames(self) -> FrameSequence:
@@ -133,27 +144,26 @@ class Run:
         if not self.path.is_dir() or not any(self.path.iterdir()):
             return Status(state="missing")
         # A resumed run may have left an older failed.json behind.
-        if (done := self._data(DONE)) is not None:
+        if (self.path / DONE).exists():
+            done = Done.read(self.path / DONE)
+            return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
+        said = Progress.read(self.path / PROGRESS) if (self.path / PROGRESS).exists() else Progress()
+        if not (self.path / FAILED).exists():
             return Status(
-                state="done",
-                time_s=done.number("time_s"),
-                steps=done.integer("steps"),
-                wall_s=done.number("wall_s"),
-                cpu_s=done.number("cpu_s") if "cpu_s" in done.data else None,
+                state="running" if in_use(self.path) else "stopped",
+                phase=said.phase,
+                time_s=said.time_s,
+                wall_s=said.wall_s,
+                checkpoint_s=said.checkpoint_s,
             )
-        failed, progress = self._data(FAILED), self._data(PROGRESS)
-        said = {} if progress is None else progress.data
-        ended = said if failed is None else failed.data
-        state: State = "running" if in_use(self.path) else "stopped"
-        if failed is not None:
-            state = "interrupted" if failed.text("status") == "interrupted" else "failed"
+        failed = Failed.read(self.path / FAILED)
         return Status(
-            state=state,
-            cause=None if failed is None else failed.text("cause"),
-            phase=said.get("phase"),
-            time_s=ended.get("time_s"),
-            wall_s=said.get("wall_s"),
-            checkpoint_s=ended.get("checkpoint_s"),
+            state=failed.status,
+            cause=failed.cause,
+            phase=said.phase,
+            time_s=failed.time_s,
+            wall_s=said.wall_s,
+            checkpoint_s=failed.checkpoint_s,
         )
 
     @property
@@ -161,9 +171,15 @@ class Run:
         """Whether it was stopped, did not fail, and left a checkpoint to go on from."""
         return self.status.state in ("interrupted", "stopped") and (self.path / CHECKPOINT).is_file()
 
-    def _data(self, name: str) -> Document | None:
-        path = self.path / name
-        return Document.read(path) if path.exists() else None
+    @property
+    def lost_series(self) -> str | None:
+        """Warning about a run that is done and whose series is gone; None otherwise."""
+        if self.has_series or not (self.path / DONE).exists():
+            return None
+        return (
+            f"{self.path / SERIES}: is gone, although the run is done, so that all that was recorded in it is missing "
+            f"from tables; put it back, or run {self.path / SCENE} anew elsewhere"
+        )
 
 
 class SceneData(dict[str, Any]):
@@ -174,7 +190,7 @@ class SceneData(dict[str, Any]):
         self._path, self._place = path, place
 
     def __missing__(self, key: str) -> Any:
-        cannot_read("scene", self._path, f"{self._place}{key} is missing", _REMEDY)
+        cannot_read("scene", self._path, f"{self._place}{key} is missing", REMEDY)
 
 
 def _within(path: Path, place: str, value: Any) -> Any:
@@ -200,6 +216,20 @@ class ForceSequence:
 
     def __getitem__(self, index: int) -> RecordedForces:
         return read_forces(self.frames[index])
+
+
+def _reject_place(path: Path) -> NoReturn:
+    """Say what is there instead of a run."""
+    remedy = REMEDY
+    if not path.exists():
+        cause = "no such directory"
+    elif not path.is_dir():
+        cause = "it is a file"
+    elif (path / OF_SWEEP).is_file():
+        cause, remedy = "it is a sweep", f"give one of its runs, {path / 'runs' / 'NAME'}"
+    else:
+        cause = f"it holds no {MANIFEST}"
+    cannot_read("run directory", path, cause, remedy)
 
 
 def open_run(path: Path | str) -> Run:

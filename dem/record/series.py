@@ -19,7 +19,6 @@ from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
-from dem.record.manifest import RunManifest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,17 +161,6 @@ class Series:
             Index into every array.
         """
         return int(np.argmin(np.abs(self.time - time)))
-
-
-def lost_series(run: RunManifest) -> str | None:
-    """What is to be told of a run that is done and whose series is not there; None: there is nothing to tell."""
-    path = run.directory / names.SERIES
-    if run.status != "done" or path.exists():
-        return None
-    return (
-        f"{path}: is gone, although the run is done, so that all that was recorded in it is missing from tables; put "
-        f"it back, or run {run.directory / names.SCENE} anew elsewhere"
-    )
 
 
 def read_series(directory: Path | str) -> Series:

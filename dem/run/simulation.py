@@ -16,6 +16,7 @@ from dem.engine.interface import Engine, Saved
 from dem.errors import RunError
 from dem.phases.phase import Stage
 from dem.record.checkpoint import Checkpoint, write_checkpoint
+from dem.record.document import Phase
 from dem.record.names import CHECKPOINT
 from dem.run.recorder import Recorder
 from dem.scene.reading import scene_hash
@@ -61,11 +62,11 @@ class Simulation:
     _cpu_began: float = field(default_factory=time.process_time)
     _stop_requested: bool = False
 
-    def run(self) -> list[dict[str, Any]]:
+    def run(self) -> tuple[Phase, ...]:
         """Run to the end of the last phase, from wherever the simulation stands.
 
         Returns:
-            One entry per phase for `done.json`.
+            The phases with their times.
 
         Raises:
             RunError: a phase failed.
@@ -85,7 +86,7 @@ class Simulation:
         self.recorder.series.write()
         if self.recorder.residual:
             self.warn(self.recorder.residual)
-        return self._performed
+        return tuple(Phase(**entry) for entry in self._performed)
 
     def _run_phase(self) -> None:
         phase = self.scene.phases[self._phase]

@@ -107,7 +107,7 @@ def has_strain(series: Series) -> bool:
 def _strain_of(run: RunManifest, _: Series, __: int) -> tuple[float, ...]:
     """Measures of a strain test for a table; what its end tells is NaN while the run is not done."""
     found = measured(read_strain_test(run))
-    if run.status != "done":
+    if run.status.state != "done":
         found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
     return tuple(found[name] for name in QUANTITIES)
 

@@ -12,6 +12,7 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.export.bodies import KINDS, ON_REQUEST, Bodies
 from postprocess.export.colours import colour_field, painted, scalars, scale, span
 from postprocess.export.fields import FIELDS, IDENTITY, Field, fields_of, link_values
@@ -82,7 +83,7 @@ class RunView:
     def ended(self) -> bool:
         """Whether no more frames will come, as the run directory tells it now; so also where it is gone."""
         try:
-            return read_run(self.run.directory).status != "unfinished"
+            return open_run(self.run.path).status.state not in ("running", "stopped")
         except InputError:
             return True
 

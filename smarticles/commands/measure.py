@@ -74,8 +74,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
     import pandas as pd  # noqa: PLC0415
 
-    from dem.record.manifest import read_run  # noqa: PLC0415
-    from dem.record.series import lost_series  # noqa: PLC0415
+    from dem.record.run import open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -91,7 +90,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         raise InputError(msg)
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
-    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
+    for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:

@@ -82,7 +82,7 @@ def _scene(directory: Path) -> tuple[Scene | None, str]:
 
 def _lead(run: RunManifest) -> list[tuple[str, str]]:
     lead = [
-        ("status", run.status),
+        ("status", run.status.state),
         ("smarticles", str(run.count)),
         ("l/w", f"{run.aspect_ratio:g}"),
         ("engine", run.engine),
@@ -97,11 +97,11 @@ def _lead(run: RunManifest) -> list[tuple[str, str]]:
 
 
 def _ending(run: RunManifest) -> list[Block]:
-    if run.status == "done":
+    if run.status.state == "done":
         return []
     told = {"failed": "This run failed", "interrupted": "This run was interrupted"}
     cause = f": {run.cause}" if run.cause else ""
-    return [Words(lines=[f"{told.get(run.status, 'This run has not finished')}{cause}."], tone="warning")]
+    return [Words(lines=[f"{told.get(run.status.state, 'This run has not finished')}{cause}."], tone="warning")]
 
 
 def _measures(directory: Path) -> list[Block]:
@@ -127,7 +127,7 @@ def still_blocks(directory: Path, *, caption: str = "") -> list[Block]:
             picture = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
         except (InputError, RunError) as error:
             return [Words(lines=[f"No picture: {error}"], tone="note")]
-    kind = run.phases[-1].type if run.status == "done" else "its last frame"
+    kind = run.phases[-1].type if run.status.state == "done" else "its last frame"
     alt = f"The {run.count} smarticles of {run.name} at the end of {kind}, drawn as their true boxes"
     return [Figure(caption=caption or f"{alt}. Another view or time: smarticles render.", alt=alt, light=picture)]
 

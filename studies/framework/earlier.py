@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import pandas as pd
 
 from dem.errors import InputError
+from dem.plan.steps import time_steps
 from dem.record.manifest import RunManifest
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
@@ -99,12 +99,15 @@ def _manifest(run: Wanted, origin: Mapping[str, Any]) -> RunManifest:
     """What the run said of itself, as far as scene and provenance tell."""
     scene = load_scene(run.scene)
     versions = dict(origin["versions"])
-    planned = manifest(
+    made = manifest(
         scene,
         Path(origin["directory"]),
-        steps=[math.nan] * len(scene.phases),
+        steps=time_steps(scene),
         command=origin["command"],
         made_by=(scene.engine, versions.get(scene.engine, "unknown")),
         threads=1,
     )
-    return replace(planned, started=origin["started"], versions=MappingProxyType(versions), status="done")
+    found = RunManifest(Path(origin["directory"]))
+    # Its directory is not here.
+    vars(found)["manifest"] = made.model_copy(update={"started": origin["started"], "versions": versions})
+    return found

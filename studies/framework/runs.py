@@ -209,21 +209,19 @@ def collect_runs(
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []
     for directory in run_dirs:
-        status = "unusable"
         before = (earlier or {}).get(Path(directory).name)
         if before is not None and not Path(directory).exists():
             runs.append(before)
             continue
         try:
             run = read_run(directory)
-            if run.status != "done":
+            if run.status.state != "done":
                 cause = run.cause or "it has not finished"
-                missing.append(MissingRun(directory=str(directory), status=run.status, cause=cause))
+                missing.append(MissingRun(directory=str(directory), status=run.status.state, cause=cause))
                 continue
             runs.append(measure(run))
         except InputError as error:
-            if not Path(directory, "run.json").exists():
-                status = "not started"
+            status = "unusable" if Path(directory, "run.json").exists() else "not started"
             missing.append(MissingRun(directory=str(directory), status=status, cause=str(error)))
     if not runs:
         why = f"; the first: {missing[0].directory}: {missing[0].cause}" if missing else ""

@@ -293,7 +293,8 @@ class Study:
         for key in self.keys:
             values = [key.text(value) for value in runs[key.column].drop_duplicates().sort_values()]
             parts.append(f"{key.label} {' '.join(filter(None, values))}")
-        parts += [f"{told_range(runs.groupby(ASPECT)[COUNT].first())} smarticles", self._seeds(tables)]
+        counts_by = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
+        parts += [f"{told_range(counts_by)} smarticles", self._seeds(tables)]
         statement = ", ".join(parts)
         if {PROCEDURE, ACTIVE} <= set(runs):
             times = runs[runs[PROCEDURE] != STATIC].groupby(PROCEDURE)[ACTIVE].first()

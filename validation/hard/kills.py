@@ -46,11 +46,7 @@ def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
 
 
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
-    """Wait for its end; the processor time that it took [s].
-
-    Raises:
-        RunError: it failed.
-    """
+    """Wait for its end; the processor time that it took [s]."""
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in {0, -signal.SIGKILL}:
@@ -114,17 +110,7 @@ def _phase_of(out: Path) -> str:
 
 
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
-    """Kill runs of one scene at random moments, and compare each with the whole one; rows of the table.
-
-    Args:
-        engine: its name.
-        number: kills.
-        folder: for the runs; those that gave the same bits are removed.
-        seed: of the scene and of the moments.
-
-    Raises:
-        RunError: a run failed, or left nothing to compare.
-    """
+    """Kill runs of one scene at random moments, and compare each with the whole one; rows of the table."""
     rng, path, whole = random.Random(1000 * seed + 1), folder / f"{seed}.yaml", folder / f"whole-{seed}"
     write_text(path, json.dumps(scene_to_kill(engine, seed)))
     # Twice: the first compiles what is not in the cache yet.

@@ -43,14 +43,7 @@ def _roots(squares: Array) -> list[float]:
 
 
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Error of the height of a ball after one bounce, root mean square over places of the onset in a step [m].
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        restitution: [1].
-        phases: how many such places.
-    """
+    """Error of the height of a ball after one bounce, root mean square over places of the onset in a step [m]."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _stiffer(ball_law(restitution=restitution), number), _gap(number)
@@ -96,14 +89,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Error of where two smarticles are after they collided once [m].
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        smooth: in one plane, elastic and without friction; otherwise tilted, with the law of the scene.
-        phases: places of the onset in a step.
-    """
+    """Error of where two smarticles are after they collided once [m]."""
     law = law_of(scene(access))
     if access.name == "links":
         # The tangential dashpot has no limit until its spring has reached Coulomb's, which takes as long here as one of

@@ -42,15 +42,7 @@ def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: fl
 
 
 def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
-    """A round body thrown along the floor: friction slows it and makes it spin until it rolls.
-
-    Args:
-        access: on the engine.
-        particle: a ball, or a bar that lies across its way.
-        law: with friction.
-        speed: at t = 0, without spin [m/s].
-        dt: time step [s].
-    """
+    """A round body thrown along the floor: friction slows it and makes it spin until it rolls."""
     friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
     lever = particle.radius - access.arm_share * mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
     share = inertia / (mass * lever**2)
@@ -159,11 +151,6 @@ def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5
 
     Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
     acts only at steps that resolve the winding, a few µs.
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        phases: speeds, so that rolling begins anywhere within a step.
     """
     law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
     slowed = FRICTION * G

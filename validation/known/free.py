@@ -25,13 +25,6 @@ ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly ab
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
     """A smarticle thrown upwards in free fall.
 
-    Args:
-        access: on the engine.
-        dt: time step [s].
-        time: of flight [s].
-        throw: speed upwards at t = 0 [m/s].
-        centred: whether its first velocity is that of half a step before t = 0, as the scheme takes it.
-
     Returns:
         (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
         that it has turned [rad].
@@ -76,12 +69,6 @@ def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
 
 def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
     """A smarticle spins freely.
-
-    Args:
-        access: on the engine.
-        dt: time step, a whole fraction of all times [s].
-        spin: (3,) laboratory frame [rad/s].
-        times: (n,) rising [s].
 
     Returns:
         Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].

@@ -69,14 +69,7 @@ def _barb(one: Scene) -> tuple[float, float, float]:
     largest=0.01,
 )
 def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
-    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays.
-
-    Args:
-        access: on the engine.
-        aspect_ratio: l/w [1].
-        fidelity: draft, standard or reference.
-        largest: gap over the sphere diameter that must not be passed [1].
-    """
+    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
@@ -263,14 +256,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad.
-
-    Args:
-        access: on the engine.
-        one: the scene.
-        held: whether the middle link is held; otherwise all links are free, and the barbs turn the same way.
-        dt: time step [s]; None: that of the scene.
-    """
+    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
@@ -323,12 +309,7 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     },
 )
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad].
-
-    Args:
-        access: on the engine.
-        steps: whole fractions of the control period [s].
-    """
+    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad]."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:

@@ -49,13 +49,7 @@ class Touch:
 
 
 def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
-    """Advance until a body has met the floor and left it again.
-
-    Args:
-        access: on the engine.
-        engine: with one welded body on its way down.
-        most: steps to give up after.
-    """
+    """Advance until a body has met the floor and left it again."""
     pressed, deepest = 0, 0.0
     for _ in range(most):
         engine.advance(1)
@@ -92,24 +86,6 @@ def elastic_rebound(access: EngineAccess) -> list[Answer]:
     ]
 
 
-@case(
-    "damped rebound, e = 0.2",
-    "a ball on the floor, its dashpot sized for it",
-    f"spring and dashpot that never pull; {DASHPOT}, integrated",
-    restitution=0.2,
-)
-@case(
-    "damped rebound, e = 0.5",
-    "a ball on the floor, its dashpot sized for it",
-    f"spring and dashpot that never pull; {DASHPOT}, integrated",
-    restitution=0.5,
-)
-@case(
-    "damped rebound, e = 0.9",
-    "a ball on the floor, its dashpot sized for it",
-    f"spring and dashpot that never pull; {DASHPOT}, integrated",
-    restitution=0.9,
-)
 def damped_rebound(access: EngineAccess, restitution: float) -> list[Answer]:
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     law = ball_law(restitution=restitution)
@@ -126,6 +102,15 @@ def damped_rebound(access: EngineAccess, restitution: float) -> list[Answer]:
             "counted in whole steps, and first order"
         ),
     ]
+
+
+for _e in (0.2, 0.5, 0.9):
+    case(
+        f"damped rebound, e = {_e:g}",
+        "a ball on the floor, its dashpot sized for it",
+        f"spring and dashpot that never pull; {DASHPOT}, integrated",
+        restitution=_e,
+    )(damped_rebound)
 
 
 @case("two balls", "head on, in free space, e = 0.5", "the same at the reduced mass; momentum", restitution=0.5)
@@ -155,13 +140,7 @@ def pair_rebound(access: EngineAccess, restitution: float) -> list[Answer]:
     restitution=0.5,
 )
 def bar_rebound(access: EngineAccess, restitution: float, *, resized: bool = False) -> list[Answer]:
-    """An upright bar falls on its end: the force passes through the centre of mass, and the law is a scene's.
-
-    Args:
-        access: on the engine.
-        restitution: that the scene asks for; it holds at the typical effective mass, not at the bar's [1].
-        resized: whether to size the dashpots for the bar's mass, so that it holds here.
-    """
+    """An upright bar falls on its end: the force passes through the centre of mass, and the law is a scene's."""
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed = law_of(one), one.smarticle.boxes.mass, 0.5
     if resized:
@@ -215,17 +194,8 @@ def bars_rebound(access: EngineAccess, restitution: float) -> list[Answer]:
 # -- clump on its tip --------------------------------------------------------------------------------------------------
 
 
-@case("smarticle on a barb's tip, e = 1", TIP, RIGID, restitution=1.0, turn=(0.5, 0.3, 0.1))
-@case("smarticle on a barb's tip, e = 0.7", TIP, RIGID, restitution=0.7, turn=(0.5, 0.3, 0.1))
-@case("smarticle on a corner, e = 0.7", TIP, RIGID, restitution=0.7, turn=(-1.2, 0.4, 0.0))
 def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) -> list[Answer]:
-    """A welded smarticle meets a smooth floor with one sphere.
-
-    Args:
-        access: on the engine.
-        restitution: that the scene asks for [1].
-        turn: rotation vector of its pose [rad].
-    """
+    """A welded smarticle meets a smooth floor with one sphere."""
     one = scene(access, contact={"restitution": restitution, "friction_wall": 0})
     law, boxes, particle, speed = law_of(one), one.smarticle.boxes, one.particle, 0.02
     pose = Rotation.from_rotvec(turn)
@@ -266,6 +236,14 @@ def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) 
     ]
 
 
+for _place, _turn, _e in (
+    ("a barb's tip", (0.5, 0.3, 0.1), 1.0),
+    ("a barb's tip", (0.5, 0.3, 0.1), 0.7),
+    ("a corner", (-1.2, 0.4, 0.0), 0.7),
+):
+    case(f"smarticle on {_place}, e = {_e:g}", TIP, RIGID, restitution=_e, turn=_turn)(tip_impact)
+
+
 FRICTION = 0.4
 
 
@@ -300,12 +278,6 @@ def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, 
     force without limit until the spring has reached it. With s and v the speeds of slip and approach that is at
     t* = μ cn v / (ks s − μ kn v), and the impulse until then exceeds Coulomb's by (cs s − μ cn v/2) t*. A step longer
     than t* never sees it.
-
-    Args:
-        access: on the engine.
-        restitution: [1].
-        dashpot: cs over cn; scenes have 0.9 [1].
-        steps: in an elastic contact [1].
     """
     speed, slip, dt = 0.2, 1.5, CONTACT_TIME / steps
     law = ball_law(restitution=restitution, friction=FRICTION, dashpot=dashpot)

@@ -38,14 +38,7 @@ VELOCITIES = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]])  # m/s
 
 
 def gait(access: EngineAccess, law: str, *, damping: float = 0.0, strength: float) -> tuple[Scene, Engine]:
-    """Two smarticles far apart that spin and drift, and whose motors take hold of the barbs.
-
-    Args:
-        access: on the engine.
-        law: of the motors.
-        damping: of servos [N m s/rad].
-        strength: τ_max [N m].
-    """
+    """Two smarticles far apart that spin and drift, and whose motors take hold of the barbs."""
     motor = {"law": law, "torque_limit_N_m": strength} | ({"damping_N_m_s_per_rad": damping} if damping else {})
     one = scene(access, phases=("shape-change",), motor=motor)
     engine = access.build_hinged(one, gravity=0.0)
@@ -249,13 +242,7 @@ def _sides(vertices: Array) -> tuple[Array, NDArray[np.bool_]]:
     throws=30,
 )
 def thrown_at(access: EngineAccess, *, stiffness: float, throws: int) -> list[Answer]:
-    """Smarticles at 10 m/s and 60 rad/s meet others in free space.
-
-    Args:
-        access: on the engine.
-        stiffness: kn [N/m].
-        throws: how many.
-    """
+    """Smarticles at 10 m/s and 60 rad/s meet others in free space."""
     one = scene(access, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
     law: ContactLaw = law_of(one)
     dt = time_step(one)

@@ -37,6 +37,7 @@ def test_a_scene_that_is_none_is_rejected(text: str, tmp_path: Path) -> None:
 
 
 FAILED = {"status": "failed", "cause": "flew apart", "time_s": 0.5, "checkpoint_s": 0.4}
+DONE = {"status": "done", "time_s": 2, "steps": 9, "wall_s": 3, "phases": []}
 PROGRESS = {"phase": "shake", "time_s": 0.7, "wall_s": 9.0, "checkpoint_s": 0.6}
 
 
@@ -48,7 +49,10 @@ PROGRESS = {"phase": "shake", "time_s": 0.7, "wall_s": 9.0, "checkpoint_s": 0.6}
         ({"progress.json": PROGRESS}, ("stopped", None, 0.7, 0.6)),
         ({"progress.json": PROGRESS, "failed.json": FAILED}, ("failed", "flew apart", 0.5, 0.4)),
         ({"failed.json": {**FAILED, "status": "interrupted"}}, ("interrupted", "flew apart", 0.5, 0.4)),
-        ({"failed.json": FAILED, "done.json": {"time_s": 2, "steps": 9, "wall_s": 3}}, ("done", None, 2, None)),
+        (
+            {"failed.json": FAILED, "done.json": {"time_s": 2, "steps": 9, "wall_s": 3, "phases": []}},
+            ("done", None, 2, None),
+        ),
     ],
 )
 def test_status(files: dict[str, dict[str, object]], wanted: tuple[object, ...], tmp_path: Path) -> None:
