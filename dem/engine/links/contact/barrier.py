@@ -27,6 +27,7 @@ LAST = 0.95  # x from which on u follows its tangent, so that a pile that is tak
 APPROACH = 0.25  # of the room that is left, which a contact may close in a sub-step
 STRIDE, LONGEST = 0.25, 0.5  # radii that a link moves in a sub-step, and from which on a step is divided
 FINEST = 1024  # sub-steps of a step, a power of two
+SLACK = 1.2  # of what is asked for: a step is a tenth shorter than the stable one
 
 
 class Step(NamedTuple):
@@ -102,6 +103,6 @@ def ticks_for(need: float, tick: int) -> int:
         tick: ticks of the step that have passed; sub-steps begin at multiples of their own length.
     """
     ticks = FINEST
-    while ticks > 1 and (ticks * need > FINEST or tick % ticks != 0):
+    while ticks > 1 and (ticks * need > SLACK * FINEST or tick % ticks != 0):
         ticks //= 2
     return ticks

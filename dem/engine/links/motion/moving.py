@@ -76,20 +76,21 @@ def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, s
         step: `need` is written.
     """
     velocity, spin, load, limit = bodies.velocity, bodies.spin, bodies.load, LONGEST * shape.radius
+    per_force, square = step.whole / shape.mass, limit * limit / (3.0 * step.whole * step.whole)
     for i in range(velocity.shape[0]):
         fx, fy, fz = load[i, 0], load[i, 1], load[i, 2]
         if hinged:
             fx = bodies.shares[3 * i, 0] + bodies.shares[3 * i + 1, 0] + bodies.shares[3 * i + 2, 0]
             fy = bodies.shares[3 * i, 1] + bodies.shares[3 * i + 1, 1] + bodies.shares[3 * i + 2, 1]
             fz = bodies.shares[3 * i, 2] + bodies.shares[3 * i + 1, 2] + bodies.shares[3 * i + 2, 2]
-        gain = step.whole * (math.sqrt(fx * fx + fy * fy + fz * fz) / shape.mass + gravity)
-        speed = math.sqrt(velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2)
-        turning = math.sqrt(spin[i, 0] ** 2 + spin[i, 1] ** 2 + spin[i, 2] ** 2)
-        stride = step.whole * (speed + gain + shape.reach * turning)
-        if stride > limit:
-            stride = step.whole * (_fastest_end(shape, bodies, i, hinged) + gain)
-        if stride > limit:
-            step.need[0] = max(step.need[0], stride / (STRIDE * shape.radius))
+        gain = per_force * per_force * (fx * fx + fy * fy + fz * fz)
+        speed = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
+        turning = shape.reach * shape.reach * (spin[i, 0] ** 2 + spin[i, 1] ** 2 + spin[i, 2] ** 2)
+        # A sum of three is at most the root of three times their squares: most are slow, and need no root.
+        if gain + speed + turning > square:
+            stride = step.whole * (_fastest_end(shape, bodies, i, hinged) + math.sqrt(gain) + step.whole * gravity)
+            if stride > limit:
+                step.need[0] = max(step.need[0], stride / (STRIDE * shape.radius))
 
 
 @part
