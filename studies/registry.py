@@ -20,7 +20,6 @@ import yaml
 from dem.errors import InputError, nearest
 from studies import (
     friction,
-    landscape,
 )
 from studies.base.shipped import Shipped
 
@@ -98,7 +97,6 @@ _FOLDERS: tuple[Shipped, ...] = (
     friction.SHIPPED,
     friction.CONTACTS,
     friction.COMPACTION,
-    landscape.SHIPPED,
 )
 
 STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(
