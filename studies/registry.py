@@ -19,7 +19,6 @@ import yaml
 
 from dem.errors import InputError, nearest
 from studies import (
-    friction,
 )
 from studies.base.shipped import Shipped
 
@@ -94,9 +93,6 @@ def _scripts() -> list[Script]:
 
 
 _FOLDERS: tuple[Shipped, ...] = (
-    friction.SHIPPED,
-    friction.CONTACTS,
-    friction.COMPACTION,
 )
 
 STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(

@@ -35,7 +35,7 @@ class Quantity:
 
     def cell(self, point: Mapping[str, float]) -> str:
         """Format the mean of a point with its standard error."""
-        error = point[marked(self.column, "SE")]
+        error = point.get(marked(self.column, "SE"), math.nan)
         return told_number(self.scale * point[self.column], self.form, self.scale * error)
 
 

@@ -77,7 +77,7 @@ def test_tables_follow_from_that_of_runs(table: str) -> None:
     tables = tables_of(table)
     made_of_runs = tables.keys() - {"runs", "engines"}
     published = [name for name in made_of_runs if (RESULTS / table / f"{name}.csv").is_file()]
-    assert published
+    assert published or not (RESULTS / table / "points.csv").is_file()
     for name in published:
         made = pd.read_csv(io.StringIO(tables[name].to_csv(index=False, float_format="%.6g")))
         known = stored(table, f"{name}.csv")
@@ -87,7 +87,7 @@ def test_tables_follow_from_that_of_runs(table: str) -> None:
         for column in numeric:
             # An error is a small difference of means that have six digits, and so is a change in per cent.
             mean = known.get(re.sub(r" (SE|95 %)(?= \[|$)", "", column), known[column])
-            scale = 100.0 if column.endswith("[%]") else float(mean.abs().max())
+            scale = 100.0 if column.endswith("[%]") else float(mean.abs().replace(np.inf, np.nan).max())
             values, wanted = made[column].astype(float), known[column].astype(float)
             atol = TIED if name in ("predictors", "comparisons") else 1e-5 * scale
             np.testing.assert_allclose(values, wanted, rtol=ROUNDING, atol=atol, err_msg=column)
