@@ -1,4 +1,4 @@
-"""The ladder of accuracy: variants of one scene, each with one knob turned, as a sweep.
+"""Make the ladder of accuracy: variants of one scene, each with one knob turned, as a sweep.
 
 A knob has rungs from coarse to fine; the scene itself, the setting `base`, is a rung of every knob, and is run once.
 """
@@ -18,41 +18,59 @@ from dem.errors import InputError, nearest
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import Fidelity, fidelities
-from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE, Rung
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import SEED, Sweep, SweepFile
 
-KNOBS: Mapping[str, str] = MappingProxyType(
-    {
-        "time-step": "time step over the stable one",
-        "stiffness": "stiffness of contacts; the time step follows",
-        "section": "spheres that stand for the section: pitch, and two rows",
-        "restitution": "a property of the material, so a sensitivity and no accuracy",
-        "control": "time between two looks of the motor control; where the scene actuates",
-        "hinge": "stiffness of the hinges' pins; where the scene actuates",
-        "fidelity": "the named fidelities, all knobs together",
-        "engine": "the named fidelities of all engines, against the converged one of links; only where it is asked for",
-    }
-)
+BASE = "base"
+"""Setting of the scene as it stands, which the others are variants of."""
+
+KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
+"""Knobs in order; `smarticles accuracy --help` says what they are."""
+
+ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})
+"""Types of phase in which barbs move."""
+
+ACTIVITIES = ACTUATED | {"shake"}
+"""Types of phase that do something to the pile in its container; packing is compared before and after them."""
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
 """From coarse to fine: links have neither beads nor facets, so that all are compared with their converged answer."""
-# Left as the scene has them: facets, since no knob turns them; a step by hand is refused.
+# Left as the scene has them: facets, since no knob turns them; a step by hand is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
-_FACTORS = (1, 2, 4)
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
-_STRANDS = (1, 2, 3)
 _CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
 """Finer than the finest name on links, in what was found to matter: what the names are compared with."""
-_STEPS = (0.9, 0.45, 0.225)
-_PITCHES = (1.3, 1.0, 0.5)
-_RESTITUTIONS = (0.2, 0.5, 0.7, 0.9)
-_CONTROL_INTERVALS = (4e-4, 2e-4, 1e-4)
 _ROWS = {2: "two", 3: "three", 4: "four"}
-_MOST_ROWS = max(_ROWS)
 _MOST_SEEDS = 1000
-_SWEEP, _TEMPLATE = Path("accuracy.yaml"), Path("accuracy.yaml.j2")
+_TEMPLATE = Path("accuracy.yaml.j2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """One value of one knob.
+
+    Attributes:
+        knob: One of `KNOBS`.
+        value: The value, as text.
+        unit: Its unit, or empty.
+        setting: Name of the variant of the scene that has it; runs are named SETTING_seedN.
+    """
+
+    knob: str
+    value: str
+    unit: str
+    setting: str
+
+    @property
+    def label(self) -> str:
+        """Value and unit."""
+        return f"{self.value} {self.unit}".rstrip()
+
+    @property
+    def sensitivity(self) -> bool:
+        """Whether the knob belongs to what is modelled: its rungs differ from the scene itself, and do not err."""
+        return self.knob == "restitution"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,17 +96,16 @@ class Ladder:
 
     def references(self) -> dict[str, Rung]:
         """What each knob's rungs are compared with: its finest rung, or the scene itself for a sensitivity."""
-        found = {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
-        return {knob: found[knob] for knob in self.knobs}
+        return {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
 
 
 def default_seeds(scene: Scene) -> tuple[int, ...]:
-    """The seeds that a ladder has unless it is told: twenty where they are cheap, three on YADE."""
+    """Give the seeds of a ladder: twenty where they are cheap, three on YADE."""
     return tuple(range(1, 21 if scene.smooth else 4))
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Seeds from `1,2,3` or `1-20`.
+    """Parse seeds from `1,2,3` or `1-20`.
 
     Raises:
         InputError: there is none, one is no whole number from 0, or one is given twice.
@@ -104,15 +121,15 @@ def parse_seeds(text: str) -> tuple[int, ...]:
             msg = f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}"
             raise InputError(msg)
         seeds += range(int(first), int(last or first) + 1)
-    for seed in seeds:
-        if seeds.count(seed) > 1:
-            msg = f"--seeds {text}: {seed} is given twice, and would count twice; leave one out"
-            raise InputError(msg)
+    twice = next((seed for seed in seeds if seeds.count(seed) > 1), None)
+    if twice is not None:
+        msg = f"--seeds {text}: {twice} is given twice, and would count twice; leave one out"
+        raise InputError(msg)
     return tuple(seeds)
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
-    """Knobs from `time-step,section`, in the order of `KNOBS`.
+    """Parse knobs from `time-step,section`, in the order of `KNOBS`.
 
     Raises:
         InputError: there is none, or one is unknown.
@@ -129,60 +146,54 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """The ladder of a scene.
+    """Make the ladder of a scene; a rung that it cannot have, such as two rows in a square section, is left out.
 
     Args:
         scene: the base scene.
         source: its file, for messages.
-        knobs: keys of `KNOBS`; None: all that the scene calls for.
-
-    Returns:
-        The ladder. A rung that the scene cannot have, such as two rows in a section that is square, is left out.
+        knobs: some of `KNOBS`; None: all that the scene calls for.
 
     Raises:
         InputError: the scene has no activity, a time step by hand, or nothing that a knob asked for could turn.
     """
     types = [phase.type for phase in scene.phases]
+    driven = bool(ACTUATED & set(types))
+    idle = next((knob for knob in knobs or () if knob in _OF_MOTORS and not driven), None)
+    msg = ""
     if not ACTIVITIES & set(types):
         msg = (
             f"{source}: phases: {', '.join(types)}: no activity whose result accuracy could be told by; "
             f"add a phase of type {', '.join(sorted(ACTIVITIES))}"
         )
-        raise InputError(msg)
-    if scene.fidelity.time_step_s is not None:
+    elif scene.fidelity.time_step_s is not None:
         msg = (
             f"{source}: fidelity.time_step_s: a step of {scene.fidelity.time_step_s:g} s by hand does not follow the "
             "knobs; leave it out and give time_step_fraction"
         )
-        raise InputError(msg)
-    driven = bool(ACTUATED & set(types))
-    for knob in knobs or ():
-        if knob in _OF_MOTORS and not driven:
-            msg = f"--knobs: {knob} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
-            raise InputError(msg)
-    if scene.smooth and "hinge" in (knobs or ()):
+    elif idle is not None:
+        msg = f"--knobs: {idle} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
+    elif scene.smooth and "hinge" in (knobs or ()):
         msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
+    if msg:
         raise InputError(msg)
-    chosen = knobs or [
-        knob
-        for knob in KNOBS
-        if (driven or knob not in _OF_MOTORS) and not (scene.smooth and knob == "hinge") and knob != "engine"
-    ]
-    base = _variables(scene)
+    useless = {"engine", *(() if driven else _OF_MOTORS), *(["hinge"] if scene.smooth else [])}
+    turned = {key: getattr(scene.fidelity, key) for key in Fidelity.model_fields if key not in _FIXED}
+    base = {"engine": scene.engine, **turned, "restitution": scene.contact.restitution}
     template = _template(scene)
     settings: dict[str, Mapping[str, Value]] = {BASE: base}
     scenes: dict[str, Scene] = {BASE: scene}
     rungs: list[Rung] = []
     left_out: list[str] = []
-    for knob in chosen:
+    for knob in knobs or [knob for knob in KNOBS if knob not in useless]:
         for value, unit, name, changes in _rungs(knob, base, smooth=scene.smooth):
             values = {**base, **changes}
             # The name of a fidelity decides nothing by itself.
-            knobs_only = {key: value for key, value in values.items() if key != "base"}
-            setting = next((known for known, there in settings.items() if _same(knobs_only, there)), name)
+            decisive = {key: one for key, one in values.items() if key != "base"}
+            setting = next((known for known, there in settings.items() if _same(decisive, there)), name)
             if setting not in settings:
+                data = {**values, "title": scene.name, SEED: scene.seed}
                 try:
-                    scenes[setting] = _scene(template, scene, values, source)
+                    scenes[setting] = parse_scene(render_yaml(template, data, source), source=source)
                 except InputError as error:
                     left_out.append(f"{knob} {value}: {error}")
                     continue
@@ -197,7 +208,7 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
 
 
 def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -> Ladder:
-    """The ladder without settings whose run is expected to take longer; the scene itself always stays.
+    """Leave out settings whose run is expected to take longer than so many seconds; the scene itself always stays.
 
     Args:
         ladder: the ladder.
@@ -205,7 +216,7 @@ def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -
         most_s: what a run may take [s].
     """
     dear = {setting for setting, wall in expected_s.items() if wall > most_s and setting != BASE}
-    told = [
+    lines = [
         f"{rung.knob} {rung.label}: a run is expected to take {expected_s[rung.setting] / 3600:.2g} h, "
         f"more than {most_s / 3600:.2g} h"
         for rung in ladder.rungs
@@ -215,19 +226,13 @@ def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -
         ladder,
         rungs=tuple(rung for rung in ladder.rungs if rung.setting not in dear),
         settings=MappingProxyType({name: values for name, values in ladder.settings.items() if name not in dear}),
-        left_out=(*ladder.left_out, *told),
+        left_out=(*ladder.left_out, *lines),
         scenes=MappingProxyType({name: scene for name, scene in ladder.scenes.items() if name not in dear}),
     )
 
 
 def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
-    """The sweep of a ladder: every setting once per seed, all settings with the first seed first.
-
-    Args:
-        scene: the base scene; its own seed does not matter.
-        ladder: its ladder.
-        seeds: the seeds.
-    """
+    """Make the sweep of a ladder: every setting once per seed, all settings with the first seed first."""
     data = {
         "schema_version": 1,
         "name": "accuracy",
@@ -238,22 +243,12 @@ def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
         "repeats": {"seeds": list(seeds), "seed_by_seed": True},
     }
     return Sweep(
-        path=_SWEEP,
+        path=Path("accuracy.yaml"),
         text=yaml.safe_dump(data, sort_keys=False, allow_unicode=True),
         content=SweepFile.model_validate(data),
         template=_TEMPLATE,
         template_text=_template(scene),
     )
-
-
-def _variables(scene: Scene) -> dict[str, Value]:
-    """What the knobs turn, as the scene has it."""
-    turned = [key for key in Fidelity.model_fields if key not in _FIXED]
-    return {
-        "engine": scene.engine,
-        **{key: getattr(scene.fidelity, key) for key in turned},
-        "restitution": scene.contact.restitution,
-    }
 
 
 def _template(scene: Scene) -> str:
@@ -265,10 +260,6 @@ def _template(scene: Scene) -> str:
     text = str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
     # A variable that stands alone keeps its type.
     return re.sub(r"'(\{\{ \w+ \}\})'", r"\1", text)
-
-
-def _scene(template: str, scene: Scene, values: Mapping[str, Value], source: str) -> Scene:
-    return parse_scene(render_yaml(template, {**values, "title": scene.name, SEED: scene.seed}, source), source=source)
 
 
 def _same(one: Mapping[str, Value], other: Mapping[str, Value]) -> bool:
@@ -289,31 +280,23 @@ def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point
     """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
-    if knob in ("fidelity", "engine"):
-        return _fidelities(knob, str(base["engine"]), smooth=smooth)
-    return _values(knob, base, smooth=smooth)
-
-
-def _values(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Rungs of a knob that is one number."""
-    key, unit, values = {
-        "time-step": ("time_step_fraction", "", _STEPS),
-        "restitution": ("restitution", "", _RESTITUTIONS),
-        "control": ("control_interval_s", "s", _CONTROL_INTERVALS),
-        "stiffness": ("stiffness_N_per_m", "N/m", _STIFFNESSES if smooth else ()),
-        "hinge": ("hinge_stiffness_N_per_m", "N/m", ()),
-    }[knob]
-    if not values:
-        return [(f"{base[key] * n:g}", unit, f"{knob}-x{n}", {key: base[key] * n}) for n in _FACTORS]
-    every = _with(values, base[key])
-    return _numbers(knob, key, unit, every[::-1] if knob in ("restitution", "stiffness") else every)
-
-
-def _fidelities(knob: str, engine: str, *, smooth: bool) -> list[_Point]:
-    """Named fidelities: those of an engine, or of all."""
     if knob == "fidelity":
+        engine = str(base["engine"])
         return [(name, "", f"{engine}-{name}" if smooth else name, all_) for name, all_ in _names(engine).items()]
-    return [(f"{one} {name}", "", f"{one}-{name}", all_) for one in _ENGINES for name, all_ in _names(one).items()]
+    if knob == "engine":
+        return [(f"{one} {name}", "", f"{one}-{name}", all_) for one in _ENGINES for name, all_ in _names(one).items()]
+    key, unit, values, fine = {
+        "time-step": ("time_step_fraction", "", (0.9, 0.45, 0.225), "small"),
+        "restitution": ("restitution", "", (0.2, 0.5, 0.7, 0.9), "large"),
+        "control": ("control_interval_s", "s", (4e-4, 2e-4, 1e-4), "small"),
+        "stiffness": ("stiffness_N_per_m", "N/m", _STIFFNESSES if smooth else (), "large"),
+        "hinge": ("hinge_stiffness_N_per_m", "N/m", (), "large"),
+    }[knob]
+    own = base[key]
+    if not values:
+        return [(f"{own * n:g}", unit, f"{knob}-x{n}", {key: own * n}) for n in (1, 2, 4)]
+    every = sorted([*(value for value in values if not _equal(value, own)), own], reverse=fine == "small")
+    return [(f"{value:g}", unit, f"{knob}-{value:g}", {key: value}) for value in every]
 
 
 def _names(engine: str) -> dict[str, dict[str, Value]]:
@@ -325,53 +308,39 @@ def _names(engine: str) -> dict[str, dict[str, Value]]:
     return found
 
 
-def _numbers(knob: str, key: str, unit: str, values: Sequence[float]) -> list[_Point]:
-    return [(f"{value:g}", unit, f"{knob}-{value:g}", {key: value}) for value in values]
-
-
-def _with(values: Sequence[float], own: float) -> list[float]:
-    """Values and the scene's own among them, the largest first."""
-    others = [value for value in values if not _equal(value, own)]
-    return sorted([*others, own], reverse=True)
-
-
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
     """Rows of spheres by the scene's own rule of their diameter, the true section last.
 
     A scene of several rows is compared with what is finer yet: its pitch halved, its rows doubled.
     """
-    shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in _PITCHES]
+    shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
     own = {key: base[key] for key in shapes[0]}
     if own["rows"] > 1:
-        finer = [{**own, "pitch": own["pitch"] / 2}, {**own, "rows": min(2 * own["rows"], _MOST_ROWS)}]
+        finer = [{**own, "pitch": own["pitch"] / 2}, {**own, "rows": min(2 * own["rows"], max(_ROWS))}]
         shapes += [shape for shape in finer if not _same(shape, own)]
     if not any(_same(own, shape) for shape in shapes):
         shapes.append(own)
-    shapes.sort(key=lambda shape: (shape["rows"], -shape["pitch"]))
-    return [(name := _told_section(**shape), "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape) for shape in shapes]
+    points = []
+    for shape in sorted(shapes, key=lambda shape: (shape["rows"], -shape["pitch"])):
+        name = f"pitch {shape['pitch']:g}"
+        if shape["rows"] > 1:
+            name = f"{_ROWS[shape['rows']]} rows" + (f" of {name}" if shape["pitch"] != 1 else "")
+        points.append(_shaped(name, shape))
+    return points
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
     """Strands of a smooth link, by the scene's own rule of their diameter."""
-    shapes = [{"rows": rows, "diameter_m": None} for rows in _STRANDS]
+    shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
         shapes.append(own)
     shapes.sort(key=lambda shape: shape["rows"] or 0)
-    names = [
-        f"{shape['rows']} strand{'' if shape['rows'] == 1 else 's'}"
-        + ("" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm")
-        for shape in shapes
-    ]
-    return [
-        (name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), dict(shape)) for name, shape in zip(names, shapes, strict=True)
-    ]
+    return [_shaped(f"{shape['rows']} strand{'' if shape['rows'] == 1 else 's'}", shape) for shape in shapes]
 
 
-def _told_section(*, rows: int, pitch: float, diameter_m: float | None) -> str:
-    if rows == 1:
-        told = f"pitch {pitch:g}"
-    else:
-        told = f"{_ROWS[rows]} rows" + (f" of pitch {pitch:g}" if pitch != 1 else "")
-    return told if diameter_m is None else f"{told} d {1e3 * diameter_m:g} mm"
+def _shaped(name: str, shape: dict[str, Value]) -> _Point:
+    """A rung of the section, with its diameter where that is set by hand."""
+    name += "" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm"
+    return name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape

@@ -11,7 +11,10 @@ from dem.phases.gaits.drive import actuated
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
-from studies.accuracy.ladder import (
+from studies.ladder import (
+    ACTIVITIES,
+    ACTUATED,
+    BASE,
     KNOBS,
     Ladder,
     affordable,
@@ -21,7 +24,6 @@ from studies.accuracy.ladder import (
     parse_knobs,
     parse_seeds,
 )
-from studies.accuracy.rung import ACTIVITIES, ACTUATED, BASE
 from templates.sweep.expand import expand
 
 SCENE = """\
