@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,7 +106,7 @@ def compute_and_analyse(
         RunError: a run failed.
     """
     earlier = earlier or {}
-    needed = replace(folder, entries=tuple(entry for entry in folder.entries if entry.name not in earlier))
+    needed = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished and not earlier:
