@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
-import pandas as pd
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
@@ -20,8 +19,6 @@ from studies.framework.runs import DEFINITION, duration
 
 SHAKEN = "time shaken [s]"
 
-QUICK_DEFINITIONS = tuple(name for name in DEFINITIONS if name != "voronoi")
-"""Definitions that take tenths of a second per frame at most; `voronoi` takes seconds."""
 
 STAGES: Mapping[str, str] = MappingProxyType(
     {
@@ -177,15 +174,3 @@ def packing_history(run: RunManifest) -> History:
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
     msg = f"{run.directory}: no packing fraction was recorded while shaking"
     raise InputError(msg)
-
-
-def measured_quantities(runs: pd.DataFrame) -> list[str]:
-    """What is averaged over seeds: names of columns without their unit."""
-    columns = [f"{stage} {definition}" for definition in DEFINITIONS for stage in STAGES]
-    columns += ["crossings before", "crossings after", "crossings relaxed"]
-    return [name for name in columns if f"{name} [-]" in runs.columns]
-
-
-def told_shaken(runs: pd.DataFrame) -> str:
-    """How long the runs were shaken, for footers."""
-    return ", ".join(sorted({f"{time:g}" for time in runs[SHAKEN].round(3)}, key=float)) + " s"
