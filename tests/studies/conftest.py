@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +13,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from postprocess.report import figures
-from studies.registry import STUDIES, Script
 
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leaves out the figures of all studies, which take most of the time."""
     monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
-    for name in [*{study.folder.name for study in STUDIES.values() if not isinstance(study, Script)}, "accuracy"]:
-        monkeypatch.setattr(import_module(f"studies.{name}.figures"), "draw", lambda *_, **__: [])
 
 
 @pytest.fixture(scope="session", autouse=True)
