@@ -34,7 +34,7 @@ from studies.framework.provenance import (
 )
 from studies.framework.quantities import Key, Quantity
 from studies.framework.runs import DEFINITION, Row
-from studies.framework.shaken import SHAKEN, STAGES, WHEN, measured_row, packing_history
+from studies.framework.shaken import SHAKEN, STAGES, WHEN, measured_row, packing_history, phi
 from studies.framework.study import Study
 
 ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
@@ -45,11 +45,6 @@ _SYMBOLS = {
     "phi_f": ("φ_f", "$\\phi_\\mathrm{f}$ at the end [-]"),
     "phi_f relaxed": ("φ_f at rest again", ""),
 }
-
-
-def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Name the column of φ at a stage."""
-    return f"{stage} {definition} [-]"
 
 
 QUANTITIES = {

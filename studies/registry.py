@@ -1,4 +1,4 @@
-"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it, and folders that are still to become such a pair.
+"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it.
 
 A variant of the sweep is a study of its own, `strength-code` of `strength.yaml@code`, but for `quick`, which is the
 quick variant of them all. Nothing large is imported before a study is loaded.
@@ -18,11 +18,6 @@ from typing import TYPE_CHECKING
 import yaml
 
 from dem.errors import InputError, nearest
-from studies import (
-    friction,
-    landscape,
-)
-from studies.base.shipped import Shipped
 
 if TYPE_CHECKING:
     from studies.framework.study import Study
@@ -94,20 +89,11 @@ def _scripts() -> list[Script]:
     return found
 
 
-_FOLDERS: tuple[Shipped, ...] = (
-    friction.SHIPPED,
-    friction.CONTACTS,
-    friction.COMPACTION,
-    landscape.SHIPPED,
-)
-
-STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(
-    {**{study.name: study for study in _scripts()}, **{study.name: study for study in _FOLDERS}}
-)
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})
 """By name."""
 
 
-def shipped(name: str) -> Shipped | Script:
+def shipped(name: str) -> Script:
     """A shipped study.
 
     Raises:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -29,6 +29,7 @@ class Document(BaseModel):
     """A JSON object with typed keys; keys of other versions are passed over."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, strict=True)
+    remedy: ClassVar[str] = REMEDY
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -40,7 +41,7 @@ class Document(BaseModel):
         try:
             return cls.model_validate_json(path.read_bytes())
         except OSError as error:
-            cannot_read("manifest", path, error, REMEDY)
+            cannot_read("manifest", path, error, cls.remedy)
         except ValidationError as error:
             found = error.errors(include_url=False)[0]
             key = ".".join(map(str, found["loc"]))
@@ -48,7 +49,7 @@ class Document(BaseModel):
             got = (
                 "" if found["type"] in ("missing", "json_invalid", "value_error") else f", got {shown(found['input'])}"
             )
-            cannot_read("manifest", path, f"{key}: {text}{got}" if key else text + got, REMEDY)
+            cannot_read("manifest", path, f"{key}: {text}{got}" if key else text + got, cls.remedy)
 
     def write(self, path: Path, *, make_folder: bool = False) -> None:
         """Write it whole, without keys that are None.

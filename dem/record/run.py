@@ -9,6 +9,7 @@ from typing import Any, Literal, NoReturn
 
 import yaml
 
+from dem.errors import InputError
 from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
@@ -147,7 +148,7 @@ class Run:
         if (self.path / DONE).exists():
             done = Done.read(self.path / DONE)
             return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
-        said = Progress.read(self.path / PROGRESS) if (self.path / PROGRESS).exists() else Progress()
+        said = self.progress
         if not (self.path / FAILED).exists():
             return Status(
                 state="running" if in_use(self.path) else "stopped",
@@ -165,6 +166,14 @@ class Run:
             wall_s=said.wall_s,
             checkpoint_s=failed.checkpoint_s,
         )
+
+    @property
+    def progress(self) -> Progress:
+        """What it says of itself while it goes on; empty otherwise."""
+        try:
+            return Progress.read(self.path / PROGRESS)
+        except InputError:
+            return Progress()  # none yet, or the run has just ended
 
     @property
     def can_resume(self) -> bool:

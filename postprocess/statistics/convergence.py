@@ -1,6 +1,6 @@
 """Order of convergence of a result without scatter, such as that of a deterministic case of two bodies, in its step.
 
-For results that scatter between seeds, `studies.accuracy.study` says what is resolved.
+For results that scatter between seeds, `studies.accuracy` says what is resolved.
 """
 
 from __future__ import annotations

@@ -240,9 +240,3 @@ def samples(runs: pd.DataFrame) -> pd.DataFrame:
     active = runs[[PROCEDURE, THETA, ASPECT, SEED, *QUANTITIES]].assign(**{"runs [-]": 1})
     table = pd.concat([static.reindex(columns=active.columns), active], ignore_index=True)
     return table.sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
-
-
-def static_spread(runs: pd.DataFrame) -> float:
-    """Largest difference of φ before the activity between runs of the same aspect ratio and seed [-]."""
-    groups = runs.groupby([ASPECT, SEED])[f"{STATIC} {PHI}"]
-    return float((groups.max() - groups.min()).max())

@@ -199,6 +199,7 @@ class Histories:
         panel_scale: Factor of that value.
         width: Of the intervals that are averaged over; None: a hundredth of the longest activity.
         unit: Of that width.
+        log: Whether x is logarithmic; it must be positive.
         level: Horizontal line.
         told: Lines for the footer.
     """
@@ -214,6 +215,7 @@ class Histories:
     panel_scale: float = 1.0
     width: float | None = None
     unit: str = "s"
+    log: bool = False
     level: float = 0.0
     told: Sequence[str] = ()
 
@@ -245,6 +247,7 @@ class Histories:
                 plots.draw_ends(axes, ends)
             axes.axhline(self.level, color=style.GREY, linewidth=0.6)
             axes.set_xlabel(self.x_label)
+            axes.set_xscale("log" if self.log and any(histories for _, histories in drawn) else "linear")
             if value is not None:
                 axes.set_title(self.panel.format(self.panel_scale * value))
         for axes in grid.flat[len(values) :]:

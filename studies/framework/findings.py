@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
 from postprocess.statistics.pairs import pairs
 from postprocess.statistics.ranks import correlation_within
@@ -383,7 +383,3 @@ def ranked(means: Mapping[str, float], form: str = ".3g") -> str:
     """`shape-change 5.1 > internal 4.2`."""
     known = sorted((name for name in means if math.isfinite(means[name])), key=lambda name: -means[name])
     return " > ".join(f"{name} {means[name]:{form}}" for name in known) or "none"
-
-
-SAME_PILE = (ASPECT, SEED)
-"""Columns that runs have in common which begin with one pile."""

@@ -146,26 +146,6 @@ class Collected:
                 )
                 raise InputError(msg)
 
-    def refuse_other_counts(self) -> None:
-        """Refuses runs that differ in their number of smarticles.
-
-        Raises:
-            InputError: Two runs do.
-        """
-        self.refuse_mixture("count", lambda run: f"{run.manifest.count} smarticles")
-
-    def refuse_mixed_counts(self) -> None:
-        """Refuses runs of one aspect ratio that differ in their number of smarticles.
-
-        Raises:
-            InputError: Two runs do.
-        """
-        self.refuse_mixture(
-            "count",
-            lambda run: f"{run.manifest.count} smarticles at l/w {run.manifest.aspect_ratio:g}",
-            within=lambda run: round(run.manifest.aspect_ratio, 6),
-        )
-
     def refuse_repeats(self, name: str, value: Callable[[MeasuredRun], str]) -> None:
         """Refuses two runs with the same seed of the same point.
 

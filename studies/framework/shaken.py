@@ -6,21 +6,19 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
-import pandas as pd
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
 from dem.record.series import read_series
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
+from postprocess.scene_file import Settings, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.plots import History
 from studies.framework.runs import DEFINITION, duration
 
 SHAKEN = "time shaken [s]"
 
-QUICK_DEFINITIONS = tuple(name for name in DEFINITIONS if name != "voronoi")
-"""Definitions that take tenths of a second per frame at most; `voronoi` takes seconds."""
 
 STAGES: Mapping[str, str] = MappingProxyType(
     {
@@ -34,7 +32,70 @@ STAGES: Mapping[str, str] = MappingProxyType(
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """How the stages are averaged, for footers."""
 
+FRICTION = "friction [-]"
+
+TIMES = (5.0, 10.0, 20.0)
+"""When φ is taken in the course of shaking [s]."""
+
+WINDOW = 1.0
+"""Over how long before those times it is averaged [s]: 30 periods of shaking."""
+
 _SHAKE, _SERIES = "shake", "packing_fraction"
+
+
+def phi(stage: str, definition: str = DEFINITION) -> str:
+    """Name the column of φ at a stage."""
+    return f"{stage} {definition} [-]"
+
+
+def at_time(time: float) -> str:
+    """Name φ after some time of shaking [s]."""
+    return f"phi {time:g} s"
+
+
+def contact_of(run: RunManifest) -> Settings:
+    """Read what the scene of a run says of its contacts.
+
+    Raises:
+        InputError: It says nothing.
+    """
+    contact = read_scene(run.directory).part("contact")
+    if contact is None:
+        msg = f"{run.directory}: scene.yaml has no contact; give runs of a study of friction"
+        raise InputError(msg)
+    return contact
+
+
+def common_friction(run: RunManifest) -> float:
+    """Read the one coefficient of friction of a run [-].
+
+    Raises:
+        InputError: Its walls have another one than its smarticles.
+    """
+    contact = contact_of(run)
+    between, wall = contact.number("friction_smarticle"), contact.number("friction_wall")
+    if between != wall:
+        msg = f"{run.directory}: friction is {between:g} between smarticles, {wall:g} at walls; this study has one"
+        raise InputError(msg)
+    return between
+
+
+def timed_row(run: RunManifest, known: Mapping[str, object]) -> dict[str, object]:
+    """Measure φ by stage and in the course of shaking; columns known already come behind the aspect ratio."""
+    history = packing_history(run)
+    row = {**known, **measured_row(run, [DEFINITION])}
+    for time in TIMES:
+        if time <= history.active + 1e-6:
+            shown = (history.times > time - WINDOW) & (history.times <= time + 1e-6)
+            row[phi(at_time(time))] = float(np.mean(history.values[shown])) if shown.any() else float("nan")
+    return {ASPECT: row.pop(ASPECT), **row}
+
+
+def while_shaken(run: RunManifest) -> History:
+    """Read φ against the time since shaking began, as long as it went on."""
+    history = packing_history(run)
+    shaken = (history.times > 0) & (history.times <= history.active)
+    return History(times=history.times[shaken], values=history.values[shaken], active=0.0)
 
 
 def measured_row(run: RunManifest, definitions: Sequence[str]) -> dict[str, object]:
@@ -113,15 +174,3 @@ def packing_history(run: RunManifest) -> History:
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
     msg = f"{run.directory}: no packing fraction was recorded while shaking"
     raise InputError(msg)
-
-
-def measured_quantities(runs: pd.DataFrame) -> list[str]:
-    """What is averaged over seeds: names of columns without their unit."""
-    columns = [f"{stage} {definition}" for definition in DEFINITIONS for stage in STAGES]
-    columns += ["crossings before", "crossings after", "crossings relaxed"]
-    return [name for name in columns if f"{name} [-]" in runs.columns]
-
-
-def told_shaken(runs: pd.DataFrame) -> str:
-    """How long the runs were shaken, for footers."""
-    return ", ".join(sorted({f"{time:g}" for time in runs[SHAKEN].round(3)}, key=float)) + " s"

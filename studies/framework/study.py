@@ -90,7 +90,8 @@ class Study:
         extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
         shown: Selects the points of the short table.
         same_count: Columns within which all runs must have the same number of smarticles.
-        order: Columns that the table of runs is sorted by.
+        same_fidelity: Columns within which all runs must have the same fidelity.
+        order: Columns that the table of runs is sorted by; none: as given.
         constant: Columns that must be equal within groups, with the columns that make the groups.
         bounds: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs.
         count_values: Whether the points say how many seeds have a value of each quantity.
@@ -113,6 +114,7 @@ class Study:
     extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
     shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points
     same_count: Sequence[str] = (ASPECT,)
+    same_fidelity: Sequence[str] = ()
     order: Sequence[str]
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
     bounds: tuple[str, str] | None = None
@@ -190,7 +192,9 @@ class Study:
         Raises:
             InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
         """
-        found.refuse_mixture("fidelity", lambda run: run.manifest.fidelity)
+        found.refuse_mixture(
+            "fidelity", lambda run: run.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
+        )
         if self.one_engine:
             found.refuse_mixture("engine", lambda run: run.manifest.engine)
         found.refuse_mixture(
@@ -204,12 +208,12 @@ class Study:
 
     def point_of(self, run: MeasuredRun) -> str:
         """Name the point of a run, such as `procedure internal, θ 10°, l/w 0.7`."""
-        cells = ((key.label, key.text(run.row[key.column])) for key in self.keys)
+        cells = ((key.label, key.text(run.row[key.column])) for key in self.keys if key.column in run.row)
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
         """Make all tables of the table of runs: `runs`, `points`, `engines` if there are several, and extra ones."""
-        runs = sort_rows(runs, self.order, self.keys)
+        runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)
         tables = {"runs": runs}
         if "points" not in extra:
@@ -290,7 +294,7 @@ class Study:
         every = tables["runs"]
         runs, counts = judging(every), judging(tables["points"])[SEEDS]
         parts = []
-        for key in self.keys:
+        for key in (key for key in self.keys if key.column in runs):
             values = [key.text(value) for value in runs[key.column].drop_duplicates().sort_values()]
             parts.append(f"{key.label} {' '.join(filter(None, values))}")
         counts_by = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
@@ -312,7 +316,8 @@ class Study:
 
 
 def _value(run: MeasuredRun, *, column: str) -> str:
-    return f"{run.row[column]:.3g}"
+    value = run.row[column]
+    return value if isinstance(value, str) else f"{value:.3g}"
 
 
 def _values(run: MeasuredRun, *, columns: Sequence[str]) -> tuple[object, ...]:

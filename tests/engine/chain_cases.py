@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
 from dem.engine.yade.engine import YadeEngine
-from dem.phases.arrange import chain_of
 from dem.physics.strings import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
@@ -66,56 +65,3 @@ def pulled_apart(data: dict[str, Any], *, speed: float, moments: list[float]) ->
             }
         )
     return found
-
-
-def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any]:
-    """A free smarticle whose motors are suddenly off their barbs: energies step by step."""
-    scene, engine = single(data, TURNED)
-    engine.motors.deciding.commands = engine.motors.deciding.commands + np.array([turn, 0.6 * turn])
-    stiffness, hinges = scene.motor.stiffness_N_m_per_rad, engine._assembly.hinges
-    energies, interval = [], scene.fidelity.control_interval_s
-    for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.readings.commands[None], interval)
-        engine.advance(1)
-        # Velocities are half a step behind the angles: with those at the step's beginning the springs are as much late.
-        twisted = engine.motors.readings.commands - hinges.angles()
-        energies.append(engine.state().kinetic_energy + 0.5 * stiffness * (twisted**2).sum() + hinges.elastic_energy())
-    state = engine.state()
-    return {
-        "begun": 0.5 * stiffness * turn**2 * (1 + 0.36),
-        "energies": np.array(energies),
-        "momentum": state.momentum,
-        "angular_momentum": state.angular_momentum,
-        "gap": float(engine.motors.gaps().max()),
-    }
-
-
-def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
-    """A chain strained by the phase itself: how far it has left the plane, and its angles."""
-    scene = scene_of(data)
-    engine = build(scene)
-    scene.phases[0].begin(scene, 0).proceed(engine)
-    stage = scene.phases[1].begin(scene, 1)
-    first = chain_of(scene).length
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-        if np.ptp(engine.strings.ties[:, 0]) > (1 + strain) * first:
-            break
-    state = engine.state()
-    return {
-        "heights": np.abs(state.link_positions[..., 2]).max(),
-        "tilts": np.abs(state.link_rotations[..., 2, :2]).max(),
-        "turns": np.abs(state.link_spins[..., :2]).max(),
-        "angles": state.angles,
-        "steps": engine.steps,
-    }
-
-
-def bodies(data: dict[str, Any]) -> dict[str, int]:
-    """What exists of plane and strings in a scene."""
-    engine = build(scene_of(data))
-    return {
-        "felt": len(engine.fixtures.felt),
-        "container": len(engine.fixtures.container),
-        "strings": int(engine.strings.tied),
-    }

@@ -16,7 +16,6 @@ from articulated_cases import (
     own_contacts,
     vec,
 )
-from scipy.spatial.transform import Rotation
 
 from dem.engine.yade.kind import contact_law_of, hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
@@ -95,62 +94,6 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
         "angles": np.degrees(reached),
         "gap": gap / scene.sphere_diameter,
         "potential": sum(1 for i in engine._omega.interactions if i.isReal),
-    }
-
-
-def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
-    """The command jumps to an angle [rad]; the motor follows at its speed limit."""
-    scene, engine = floating(data)
-    engine.motors.articulate()
-    rows = [
-        (
-            kinetic_energy(engine),
-            engine.motors.gaps().max(),
-            *engine.state().angles[0],
-            *engine.motors.readings.commands[0],
-        )
-        for _ in drive(engine, scene, duration, lambda _: [to, to])
-    ]
-    table = np.array(rows)
-    boxes = scene.smarticle.boxes
-    inertia = boxes.link_inertias[0, 2] + boxes.link_masses[0] * (boxes.barb_length / 2) ** 2
-    return {
-        "energy": table[:, 0],
-        "gap": table[:, 1] / scene.sphere_diameter,
-        "angles": table[:, 2:4],
-        "commands": table[:, 4:],
-        "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
-        "halted": engine.motors.readings.halted,
-        "interval": scene.fidelity.control_interval_s,
-    }
-
-
-def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
-    """An articulated smarticle hits the floor; its energy from the impact on."""
-    scene = cases.scene_of(data)
-    engine = build(scene)
-    cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
-    cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
-    engine.advance(1)
-    engine.motors.articulate()
-    begun = engine.state().angles
-    mass, energies, gaps = scene.smarticle.boxes.mass, [], []
-    for _ in drive(engine, scene, duration, lambda _: begun):
-        gaps.append(engine.motors.gaps().max())
-        if not gaps[-1] < scene.sphere_diameter:  # burst, NaN included
-            energies.append(math.inf)
-            break
-        height, twist = (
-            float(engine.state().positions[0, 2]),
-            engine.motors.readings.commands - engine.motors._hinges.angles(),
-        )
-        springs = engine.motors._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
-        energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
-    return {
-        "energy": np.array(energies),
-        "gap": np.array(gaps) / scene.sphere_diameter,
-        "thrown": mass * speed**2 / 2,
-        "interval": scene.fidelity.control_interval_s,
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import handover_cases
 import numpy as np
 import pytest
 
-from dem.record.columns import EVERY
 from postprocess import measure_run, read_frames, read_series, summarise_run
 
 PHASES = ["deposit", "relax", "shake", "internal-oscillation"]
@@ -64,30 +62,6 @@ def test_frames_hold_the_engine_s_numbers_to_the_bit(handed: tuple[Path, list[di
             np.testing.assert_array_equal(torques, note["torques"])
     assert driven > 2
     assert any(frame.contacts.any() for frame in frames)
-
-
-def test_series_hold_the_engine_s_numbers_and_the_units_of_their_columns(
-    handed: tuple[Path, list[dict[str, Any]]],
-) -> None:
-    out, notes = handed
-    series = read_series(out)
-    assert series.time.tolist() == [note["time"] for note in notes]
-    for name, key in (
-        ("phase", "phase"),
-        ("count", "count"),
-        ("container_z_m", "floor"),
-        ("kinetic_energy_J", "kinetic_energy"),
-    ):
-        assert series[name].tolist() == [note[key] for note in notes]
-    poured = [k for k, note in enumerate(notes) if note["count"]]
-    assert series["com_height_m"][poured] == pytest.approx([notes[k]["heights"].mean() for k in poured], rel=1e-12)
-    last = notes[-1]
-    second = np.sort(last["heights"])[-2]
-    assert series["packing_fraction"][-1] == pytest.approx(
-        6 * last["volume"] / (math.pi * last["radius"] ** 2 * second), rel=1e-12
-    )
-    assert series.units == {name: EVERY[name].unit for name in series.data}
-    assert "motor_work_J" in series.data
 
 
 def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]]) -> None:

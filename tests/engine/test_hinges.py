@@ -73,25 +73,6 @@ def test_links_of_one_smarticle_never_touch(
     assert sweep["gap"] < 0.01
 
 
-# -- violence ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("aspect_ratio", "fidelity", "turn"), [(0.4, "draft", (0.4, 0.2, -0.7)), (0.7, "standard", (1.5, 0.3, 0.1))]
-)
-def test_smarticle_thrown_at_the_floor_gains_no_energy(
-    simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str, turn: Any
-) -> None:
-    thrown = simulate(hinge_cases.thrown, data(shape(aspect_ratio, fidelity)), speed=3.0, turn=turn, duration=0.5)
-    assert np.isfinite(thrown["energy"]).all()
-    assert thrown["gap"].max() < 0.1
-    # Highest energy of each tenth of the time since the impact: contacts store some for a moment, and give it back.
-    after = thrown["energy"][round(0.01 / thrown["interval"]) :]
-    highest = np.array([part.max() for part in np.array_split(after, 10)])
-    assert highest[0] < thrown["thrown"]
-    assert (np.diff(highest) < 1e-3 * thrown["thrown"]).all()
-
-
 # -- the stable time step ----------------------------------------------------------------------------------------------
 
 STACKS = [(1.0, "draft"), (0.4, "standard")]

@@ -133,27 +133,6 @@ def test_finished_run_holds_what_made_it_and_what_came_out(finished: tuple[Path,
     assert "phase 2 shake begins at t =" in (out / "log.txt").read_text()
 
 
-def test_frames_are_regular_and_listed(finished: tuple[Path, dict[str, Any]]) -> None:
-    out, _ = finished
-    end = read_json(out / "done.json")["time_s"]
-    files = frame_files(out)
-    listed = ElementTree.parse(out / "frames.pvd").getroot().findall("Collection/DataSet")
-    assert [row.attrib["file"] for row in listed] == [str(path.relative_to(out)) for path in files]
-    frames = [meshio.read(path) for path in files]
-    times = np.array([frame.cell_data["time_s"][0][0] for frame in frames])
-    # Every 0.04 s, from the first that has a smarticle in it.
-    assert times == pytest.approx(0.04 * np.arange(1, int(end / 0.04 + 1e-6) + 1), rel=1e-9)
-    counts = [len(frame.points) // 4 for frame in frames]
-    assert counts == sorted(counts)
-    assert {counts[0], counts[-1]} == {5, 10}
-    phases = [int(frame.cell_data["phase"][0][0]) for frame in frames]
-    assert phases == sorted(phases)
-    assert set(phases) == {0, 1, 2, 3}
-    last = frames[-1].points.reshape(-1, 4, 3)
-    assert np.hypot(last[..., 0], last[..., 1]).max() < 0.0234
-    assert last[..., 2].min() > frames[-1].cell_data["floor_z_m"][0][0]
-
-
 def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[str, Any]]) -> None:
     out, data = finished
     rows, scene = series(out), cases.scene_of(data)

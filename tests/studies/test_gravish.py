@@ -12,7 +12,8 @@ from synthetic import SyntheticRun, write_run
 
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.provenance import read_reference
-from studies.gravish import STUDY, deviations, phi, steps
+from studies.framework.shaken import phi
+from studies.gravish import STUDY, deviations, steps
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study gravish --out gravish"}
 SPREAD = {1: -0.002, 2: 0.0, 3: 0.002}

@@ -244,3 +244,10 @@ def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64])
         columns["motor_work_J" if moved else "container_work_J"] = run.work * rows[:, 4]
     columns |= {name: np.full(len(rows), value) for name, value in run.more}
     write_series(directory, columns, seed=run.seed)
+
+
+def write_ended(directory: Path, scene_sha256: str, *, status: str = "done") -> None:
+    """A run of a scene that has ended, as far as sweeps look at it: its manifest and its end."""
+    directory.mkdir(parents=True)
+    write_manifest(directory, SyntheticRun(phases=("deposit",)), scene_sha256=scene_sha256)
+    write_ending(directory, ("deposit",), [(0.0, 1.0)], status=status, wall=2.0)

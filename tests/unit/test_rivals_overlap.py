@@ -10,12 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from scenes import SMALL
 from scipy.spatial.transform import Rotation
 
-from benchmarks.rivals.overlap import SHAPES, Bars, deepest, distances, solid_of
-from dem.body.state import State
-from dem.scene.reading import parse_scene
+from benchmarks.rivals.overlap import Bars, distances
 
 Array = NDArray[np.float64]
 PAIR = np.array([[0, 1]])
@@ -56,26 +53,3 @@ def test_segments_are_as_far_apart_as_their_nearest_points(points: Array) -> Non
     # A point is at most half a piece of each segment from the nearest one that was tried.
     pieces = (np.linalg.norm(points[1] - points[0]) + np.linalg.norm(points[3] - points[2])) / 800
     assert nearest - pieces - 1e-12 <= found <= nearest + 1e-12
-
-
-def pair(shape: str, turn: Rotation, place: list[float]) -> float:
-    """How deep two smarticles are in each other, the first in its body frame, the second turned and at a place [m]."""
-    scene = parse_scene({**SMALL, "engine": "links", "fidelity": "standard"}, source="x")
-    places, turns = np.array([[0.0, 0.0, 0.0], place]), np.array([np.eye(3), turn.as_matrix()])
-    still = np.zeros((2, 3))
-    state = State.rigid(scene.particle.boxes, places, turns, still, still)
-    return deepest(solid_of(shape, scene.particle, state.link_positions, state.link_rotations))
-
-
-def nested(apart: float, shape: str) -> float:
-    """The same, the second above the first by a distance along their normal [m]."""
-    return pair(shape, Rotation.identity(), [0.0, 0.0, apart])
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_stack_of_two_is_as_deep_as_it_lacks_in_height(shape: str) -> None:
-    particle = parse_scene({**SMALL, "engine": "links", "fidelity": "standard"}, source="x").particle
-    thick = particle.boxes.thickness_normal if shape == "boxes" else 2 * particle.radius
-    # Links of one smarticle reach into each other at the hinges, by much more.
-    assert nested(thick - 3e-5, shape) == pytest.approx(3e-5, abs=1e-12)
-    assert nested(1.001 * thick, shape) == 0

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import RHO, T1, T2, U, W, make_boxes, make_particle
 
-from dem.body.particle import Boxes, Particle, chain_mean_width, mean_width
+from dem.body.particle import Boxes, Particle, mean_width
 
 SHAPES = [(0.0, U), (0.05, U), (0.4, U), (0.7, U), (1.0, U), (2.0, U)]
 BENT = [(0.7, (0.0, 0.0)), (0.7, (90.0, 0.0)), (0.4, (30.0, 105.0)), (1.0, (-15.0, 60.0)), (2.0, (10.0, 95.0))]
@@ -78,15 +78,6 @@ def test_mass_centre_and_inertia_equal_exact_quadrature(ratio: float, angles: tu
     assert masses @ points / masses.sum() == pytest.approx(np.zeros(3), abs=1e-13 * W)
     expected = tensor(points, masses)
     assert np.diag(boxes.inertia) == pytest.approx(expected, abs=1e-13 * expected.max())
-
-
-def test_bar_without_barbs_is_the_analytic_bar() -> None:
-    boxes = make_boxes(0.0)
-    mass = RHO * T1 * T2 * W
-    assert boxes.mass == pytest.approx(mass)
-    assert boxes.inertia == pytest.approx(
-        [mass / 12 * (T1**2 + T2**2), mass / 12 * (W**2 + T1**2), mass / 12 * (W**2 + T2**2)], rel=1e-12
-    )
 
 
 @given(ratio=st.floats(0.01, 2), a1=st.floats(-15, 105), a2=st.floats(-15, 105))
@@ -186,23 +177,6 @@ def test_barbs_never_overlap_the_middle_link_while_they_turn(
     assert smallest_gap(particle, 2, 1) >= 1 - 1e-9
 
 
-def test_reach_covers_spheres_and_box_corners() -> None:
-    for ratio, angles in SHAPES + BENT:
-        particle = make_particle(ratio, angles, rows=2, diameter=0.5e-3)
-        rotation, shift = in_body_frame(particle.boxes, ratio, angles)
-        corners = []
-        for start, end in itertools.pairwise(own_vertices(ratio, angles) @ rotation.T + shift):
-            length = np.hypot(*(end - start))
-            if length:
-                across = np.array([-(end - start)[1], (end - start)[0]]) / length * T2 / 2
-                corners += [[*(p + s * across), T1 / 2] for p in (start, end) for s in (-1, 1)]
-        spheres = np.linalg.norm(particle.centres, axis=1).max() + particle.radius
-        exact = max(np.linalg.norm(corners, axis=1).max(), spheres)
-        # An upper bound: an unneeded margin of a fraction of the thickness is harmless, a shortfall is not.
-        assert exact <= particle.reach * (1 + 1e-12)
-        assert particle.reach <= exact + math.hypot(T1, T2) / 2
-
-
 @pytest.mark.parametrize(("ratio", "angles"), [(0.0, U), (0.05, U), (0.4, U), (0.7, (90.0, 0.0)), (2.0, U)])
 def test_smallest_effective_mass_against_random_pushes(ratio: float, angles: tuple[float, float]) -> None:
     particle = make_particle(ratio, angles, rows=2, diameter=0.5e-3)
@@ -225,22 +199,3 @@ def test_mean_width_of_a_section_by_random_directions() -> None:
     width = np.abs(T1 * np.cos(turn)) + np.abs(T2 * np.sin(turn))
     assert mean_width(T1, T2) == pytest.approx(width.mean(), rel=3e-3)  # standard error 0.1 %
     assert mean_width(T1, T2) != pytest.approx((T1 + T2) / 2, rel=0.05)
-
-
-@pytest.mark.parametrize("pitch", [0.5, 1.0, 1.3])
-def test_chain_mean_width_by_bringing_random_chains_into_touch(pitch: float) -> None:
-    # Two chains at random phases and isotropic directions are lowered onto each other along their common normal:
-    # contact is at the largest height at which any pair of spheres touches. Weighted by sin γ as excluded volume is.
-    rng = np.random.default_rng(2)
-    number = 10_000
-    cosine = rng.random(number)
-    sine = np.sqrt(1 - cosine**2)
-    beads = pitch * np.arange(-4, 5)
-    a = (rng.random(number)[:, None] - 0.5) * pitch + beads
-    b = (rng.random(number)[:, None] - 0.5) * pitch + beads
-    squared = (a[:, :, None] - b[:, None] * cosine[:, None, None]) ** 2 + (b[:, None] * sine[:, None, None]) ** 2
-    heights = np.sqrt(np.clip(1 - squared, 0, None)).max(axis=(1, 2))
-    measured = (heights * sine).sum() / sine.sum()
-    # Scatter of 10 000 draws of spread ~0.1 is 0.001.
-    assert chain_mean_width(pitch) == pytest.approx(measured, abs=5e-3)
-    assert chain_mean_width(pitch) < 1

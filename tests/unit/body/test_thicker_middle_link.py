@@ -6,12 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scenes import chain
 
 from dem.body.chain import extent
-from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.particle import Boxes
 from dem.body.state import State
 from dem.phases.arrange import chain_of
 from dem.scene.scene import Scene
@@ -32,10 +30,6 @@ def robot(body: float | None = BODY, angles: tuple[float, float] = (90.0, 90.0),
     )
 
 
-def with_spheres(boxes: Boxes, *, rows: int = 1, diameter: float = BARB, pitch: float = 0.2) -> Particle:
-    return Particle(boxes, SphereChain(rows=rows, diameter=diameter, pitch=pitch * diameter))
-
-
 def test_mass_centre_and_inertia_are_those_of_three_boxes_written_out() -> None:
     boxes = robot()
     middle, barb = RHO * W * BODY * T1, RHO * L * BARB * T1
@@ -53,26 +47,6 @@ def test_mass_centre_and_inertia_are_those_of_three_boxes_written_out() -> None:
     assert boxes.vertices[:, 1] == pytest.approx([L - y, -y, -y, L - y], rel=1e-12)
     own = np.array([[T1**2 + t**2, length**2 + T1**2, length**2 + t**2] for length, t in ((L, BARB), (W, BODY))]) / 12
     assert boxes.link_inertias == pytest.approx(np.array([barb * own[0], middle * own[1], barb * own[0]]), rel=1e-12)
-
-
-@given(
-    a1=st.floats(-15, 105),
-    a2=st.floats(-15, 105),
-    body=st.floats(0.00951, 0.0233),
-    diameter=st.sampled_from([0.006, 0.0095]),
-    pitch=st.sampled_from([0.1, 0.5, 1.0]),
-)
-def test_barbs_turn_freely_beside_the_body(a1: float, a2: float, body: float, diameter: float, pitch: float) -> None:
-    particle = with_spheres(robot(body, (a1, a2)), diameter=diameter, pitch=pitch)
-    middle = particle.centres[particle.links == 1]
-    for barb in (0, 2):
-        own = particle.centres[particle.links == barb]
-        apart = np.linalg.norm(own[:, None] - middle[None], axis=-1).min()
-        assert apart >= diameter * (1 + 1e-9)
-        # Tips are where they were, and nothing of a barb that stands out of the body at a right angle is left out.
-        tip = particle.boxes.vertices[0 if barb == 0 else 3]
-        assert np.linalg.norm(own - tip, axis=1).min() == pytest.approx(diameter / 2)
-    assert particle.barb_start - diameter / 2 < particle.boxes.bulge + 0.6 * diameter + 0.04 * particle.boxes.bulge
 
 
 def rest(scene: Scene) -> State:

@@ -46,15 +46,6 @@ def same(one: Drive, other: Drive) -> bool:
     )
 
 
-# -- motor and fidelity --------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("ratio", [0.4, 1.4])
-def test_default_torque_is_the_weight_of_the_papers_smarticle_at_the_lever_w(ratio: float) -> None:
-    scene = small({"smarticle.aspect_ratio": ratio, "smarticle.density_kg_per_m3": 1000, "gravity_m_per_s2": 1.62})
-    assert scene.torque_limit == pytest.approx(1000 * 1.27e-3 * 0.5e-3 * 0.0117 * 2.4 * 1.62 * 0.0117)
-
-
 # -- presets -------------------------------------------------------------------------------------------------------
 
 
@@ -67,15 +58,6 @@ def test_shape_change_by_hand(active: Active) -> None:
     assert angles.shape == (5, 10, 2)
     assert angles[:, 3, 1] == pytest.approx([90, 45, 0, 45, 90])
     assert np.ptp(angles, axis=(1, 2)) == pytest.approx(0)
-
-
-def test_oscillation_by_hand(active: Active) -> None:
-    driven = drive(active({**OSCILLATION, "theta_deg": 20}), 1)
-    quarter = math.radians(10) / 6
-    assert driven.duration == 5
-    assert targets(driven, 0, quarter / 2, quarter, 2 * quarter, 3 * quarter, 4 * quarter)[:, 7, 0] == pytest.approx(
-        [90, 95, 100, 90, 80, 90], abs=1e-6
-    )
 
 
 @pytest.mark.parametrize(("ratio", "amplitude"), [(0.4, 8.75), (0.7, 5), (1.4, 2.5)])

@@ -225,20 +225,6 @@ def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) 
     assert "; " in told
 
 
-def test_a_wall_that_is_too_low_and_a_hook_in_the_pile(pour: Path) -> None:
-    def lift(mesh: meshio.Mesh) -> None:
-        mesh.points[:, 2] += 0.05
-
-    assert scene_of(pour, hooks={"lower_height_m": 0.03, "upper_height_m": 0.04}).hooks is not None  # above the pile
-    vertices = above_floor(read_frames(pour)[-1])
-    low = float(vertices[..., 2].mean())
-    line = refused(pour, hooks={"lower_height_m": low, "upper_height_m": 0.04, "length_m": 0.03, "side_m": 0.004})
-    assert line.startswith(f"hooks.lower_height_m: {low:g} m; ")
-    assert line.endswith("lie in this hook; take over a run that was poured with these hooks")
-    rewrite(pour, -1, lift)
-    assert refused(pour, **{"container.height_m": 0.05}).startswith("container.height_m: 0.05 m, but the smarticles of")
-
-
 def test_a_tip_may_be_under_the_floor_as_deep_as_contacts_are_and_an_axis_may_not(pour: Path) -> None:
     floor, radius = read_frames(pour)[-1].floor_z, parse_scene(SMALL, source="x").particle.radius
 

@@ -32,20 +32,6 @@ def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors 
 # -- the halting law ---------------------------------------------------------------------------------------------------
 
 
-@given(st.floats(-1, 1), st.floats(1e-3, 60), st.floats(1e-6, 1e-3), st.sampled_from([1, -1]))
-def test_halting_motor_stops_within_one_periods_advance(angle: float, speed: float, limit: float, sign: int) -> None:
-    law = replace(HALT, speed_limit=speed, torque_limit=limit)
-    looks = math.ceil(limit / (3e-3 * speed * PERIOD)) + 3
-    if looks > 5000:
-        return
-    motors = held(law, angle, angle + sign * 10.0, looks)
-    assert (np.abs(motors.torques) >= limit * (1 - 1e-9)).all()
-    assert (np.abs(motors.torques) < limit + 3e-3 * speed * PERIOD * (1 + 1e-9)).all()
-    assert motors.halted.all()
-    stopped = motors.commands.copy()
-    assert (held(law, angle, angle + sign * 10.0, 50, motors).commands == stopped).all()
-
-
 def test_halting_motor_gives_way_at_once_and_goes_on_when_freed() -> None:
     motors = held(HALT, 0.5, 1.0, 40)
     stopped = motors.commands.copy()

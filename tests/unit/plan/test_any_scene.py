@@ -28,10 +28,10 @@ from dem.errors import InputError
 from dem.plan.outlook import plan
 from dem.scene.reading import dump_scene, json_schema
 from smarticles.scenes import read_scene
+from studies.registry import STUDIES
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep
 
-STUDIES = Path(__file__).resolve().parents[3] / "studies"
 # As many as 20 s are enough for on a busy machine; 0.01 s each, and what hypothesis itself takes.
 TRIED = int(os.environ.get("ANY_SCENES", "200"))
 MOST_S = 1.0  # of processor time
@@ -48,7 +48,7 @@ Place = tuple[str | int, ...]
 
 def shipped() -> list[dict[str, Any]]:
     """Scenes of all shipped sweeps, every default written out, and small ones that leave most of them out."""
-    sweeps = sorted(STUDIES.rglob("*.quick.yaml"))
+    sweeps = [study.sweep_file(quick=True) for study in STUDIES.values() if getattr(study, "quick", True)]
     assert len(sweeps) > 5
     points = [point for sweep in sweeps for point in expand(load_sweep(sweep))[::3]]
     sine = {"type": "sine", "centre_deg": 90, "amplitude_deg": 5, "frequency_hz": 3}

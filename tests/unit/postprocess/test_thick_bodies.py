@@ -67,16 +67,6 @@ def run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_manifest_keeps_the_thickness_and_old_ones_have_none(run: Path, tmp_path: Path) -> None:
-    manifest = read_run(run)
-    assert manifest.thicknesses_in_plane == (BARB, BODY, BARB)
-    assert manifest.bulge == pytest.approx((BODY - BARB) / 2)
-    assert manifest.manifest.model_dump()["middle_thickness_in_plane_m"] == BODY
-    plain = read_run(write_run(tmp_path / "plain", SyntheticRun(count=2, frames_per_phase=1)))
-    assert plain.bulge == 0
-    assert "middle_thickness_in_plane_m" not in (plain.path / "run.json").read_text()
-
-
 def test_boxes_are_as_thick_as_their_links() -> None:
     vertices = robot().vertices[None]
     mesh = link_boxes(

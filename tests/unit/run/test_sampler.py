@@ -9,13 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from double import EngineDouble
-from scenes import chain, small
+from scenes import small
 from scipy.spatial.transform import Rotation
 
-from dem.body.chain import Tie
 from dem.body.placement import Poses
 from dem.engine.effect import EffectName
-from dem.physics.strings import StringLaw
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 
@@ -108,27 +106,6 @@ def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside(
     assert row["packing_fraction"] > 0
     engine.fixtures.remove_wall()
     assert math.isnan(sample(sampler, engine)["packing_fraction"])
-
-
-def test_strings_tell_their_pull_and_how_far_they_are() -> None:
-    scene = chain()
-    engine, sampler = EngineDouble.of(scene, DT), Sampler(math.nan, {EffectName.STRINGS})
-    assert math.isnan(sample(sampler, engine)["chain_width_m"])  # nothing is there yet
-    engine.add(scene.phases[0].begin(scene, 0)._chain.poses())  # type: ignore[attr-defined]
-    assert sample(sampler, engine)["chain_width_m"] == pytest.approx(0.062)
-    engine.strings.tension = 2.0
-    engine.strings.tie([Tie(0, 0, 0.0), Tie(5, 0, 0.0)], StringLaw(length=0.1, stiffness=1, damping=0), (0.0, 0.1))
-    begun = sample(sampler, engine)
-    assert begun["pulled_m"] == 0
-    assert np.isnan(begun["string_pulled_force_N"]).all()
-    engine.advance(100)
-    row = sample(sampler, engine)
-    assert row["pulled_m"] == pytest.approx(0.1 * 100 * DT)
-    assert row["chain_length_m"] - begun["chain_length_m"] == pytest.approx(row["pulled_m"])
-    assert row["string_fixed_force_N"] == pytest.approx([-2, 0, 0])
-    assert row["string_pulled_force_N"] == pytest.approx([2, 0, 0])
-    engine.strings.untie()
-    assert math.isnan(sample(sampler, engine)["pulled_m"])
 
 
 def test_motors_tell_what_they_hold_while_at_work_and_nothing_while_welded() -> None:

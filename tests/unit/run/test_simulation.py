@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import signal
@@ -235,21 +234,3 @@ def test_a_disk_that_cannot_be_written_is_told_before_anything_runs(
     with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\); choose another directory"):
         run(scene_of("rested"), folder / "run", resume=True)
     assert len(kind.built) == 1
-
-
-def test_who_comes_second_does_not_write_over_who_was_quicker(
-    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    locked = fcntl.flock
-
-    def quicker(file: Any, how: int) -> None:
-        # Between the look into the directory and the lock, another process runs from beginning to end.
-        monkeypatch.setattr("dem.record.rundir.fcntl.flock", locked)
-        (tmp_path / "run.json").write_text("{}")
-        locked(file, how)
-
-    monkeypatch.setattr("dem.record.rundir.fcntl.flock", quicker)
-    with pytest.raises(InputError, match="holds a run and is left as it is"):
-        run(scene_of("rested"), tmp_path)
-    assert (tmp_path / "run.json").read_text() == "{}"
-    assert not kind.built

@@ -156,25 +156,9 @@ def test_energy_from_nowhere_stops_the_run() -> None:
     )
 
 
-TIERED = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),)), speed=5.0)
-
-
 def at(*position: float) -> State:
     still = np.zeros((1, 3))
     return State.rigid(BOXES, np.array([position], dtype=float), np.eye(3)[None], still, still)
-
-
-def test_it_knows_a_wall_that_is_gone_and_a_hook_that_is_raised() -> None:
-    far, high = at(0.2, 0.0, 0.01), at(0.0, 0.0, 0.11)
-    for state in (far, high):
-        with pytest.raises(RunError):
-            TIERED.check(state, floor=0.0, time=1.0)
-        TIERED.check(state, floor=0.0, time=1.0, raised=None)
-    TIERED.check(high, floor=0.0, time=1.0, raised=0.02)
-    with pytest.raises(RunError, match="left through the wall"):
-        TIERED.check(far, floor=0.0, time=1.0, raised=0.02)
-    with pytest.raises(RunError, match="left through the wall or the floor"):
-        TIERED.check(at(0.2, 0.0, -0.01), floor=0.0, time=1.0, raised=None)  # the floor stays
 
 
 GLANCE = {"fastest": 4.9, "lowest": 1.0, "highest": 1.09, "widest": 0.0234, "gap": 1e-5, "deepest": 1e-4}

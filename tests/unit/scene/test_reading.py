@@ -51,26 +51,6 @@ def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict
     assert str(caught.value) == f"bad.yaml: {told}"
 
 
-@pytest.mark.parametrize(
-    ("text", "way_out"),
-    [
-        ("twenty", "write it in digits"),
-        ("1:30", "write it in digits"),
-        ("20", "leave out the quotes"),
-        ("1e3", "leave out the quotes"),
-        ("nan", "write a finite one"),
-        ("-inf", "write a finite one"),
-        ("3 h", "leave out the unit, which the key names"),
-        ("2.5mm", "leave out the unit, which the key names"),
-        ("0,5", "write 0.5, with a point"),
-    ],
-)
-def test_text_where_a_number_is_wanted_is_told_what_it_lacks(scene_data: SceneData, text: str, way_out: str) -> None:
-    with pytest.raises(InputError) as caught:
-        parse_scene(scene_data({"phases.1.duration_s": text}), source="bad.yaml")
-    assert str(caught.value) == f"bad.yaml: phases.1.duration_s: got the text {text!r}, expected a number; {way_out}"
-
-
 @pytest.mark.parametrize(("data", "kind"), [([1], "[1]"), ("text", "'text'"), (3, "3")], ids=["list", "text", "3"])
 def test_file_that_is_no_mapping(data: Any, kind: str) -> None:
     with pytest.raises(InputError) as caught:

@@ -12,7 +12,6 @@ import pytest
 import yaml
 from scenes import chain, small
 
-from dem.plan.steps import time_step
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene, derive_seed
 
@@ -52,21 +51,6 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
         scene.fidelity.stiffness_N_per_m == load_scene(write(tmp_path), ["fidelity=draft"]).fidelity.stiffness_N_per_m
     )
     assert scene.smarticle.angles_deg == (80, 85)
-
-
-def test_fidelity_by_name_and_by_mapping() -> None:
-    named = small({"fidelity": "reference"})
-    mapped = small({"fidelity": {"base": "reference"}})
-    assert named == mapped
-    knob = small({"fidelity": {"base": "reference", "stiffness_N_per_m": 123.0}}).fidelity
-    assert knob.stiffness_N_per_m == 123
-    assert knob.rows == named.fidelity.rows
-    assert small({"fidelity": {"rows": 2}}).fidelity.base == "standard"
-    scenes = [small({"fidelity": name}) for name in ("draft", "standard", "reference")]
-    counts = [len(scene.particle.centres) for scene in scenes]
-    steps = [time_step(scene) for scene in scenes]
-    assert counts == sorted(set(counts))  # three settings that differ, each finer than the one before
-    assert steps == sorted(set(steps), reverse=True)
 
 
 @pytest.mark.parametrize(("text", "value"), [("1e-3", 1e-3), ("1.e1", 10.0), ("2E0", 2.0), ("5", 5.0), (".5", 0.5)])

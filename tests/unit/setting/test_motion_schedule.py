@@ -78,13 +78,6 @@ def test_steps_begin_where_the_one_before_ended() -> None:
     assert motion(**data).period is None
 
 
-def test_a_swing_as_a_step_starts_anew_and_is_left_where_it_is() -> None:
-    data = sequence(ramp(60, 1), triangle(duration_s=0.75), hold(1), back(1))
-    assert degrees(data, [1, 1.25, 1.5, 1.75, 2.0, 2.7, 3.25, 3.75]) == pytest.approx(
-        [60, 70, 80, 70, 70, 70, 80, 90], abs=1e-9
-    )
-
-
 def test_sequences_within_sequences() -> None:
     wave = sequence(ramp(80, 0.5), ramp(40, 0.5), repeat=2)
     data = sequence(ramp(40, 1), wave, back(1))
@@ -147,18 +140,6 @@ def test_speed_is_that_of_dense_sampling(data: dict[str, Any], start: float) -> 
     times = np.linspace(0, length, 20_001)
     steepest = np.abs(np.diff(found.angle(times, begun))).max() / times[1]
     assert steepest == pytest.approx(found.speed(begun), rel=1e-3, abs=1e-6)
-
-
-@given(data=SEQUENCES, start=ANGLES, times=st.lists(st.floats(0, 1), min_size=2, max_size=20))
-def test_one_time_and_many_times_agree(data: dict[str, Any], start: float, times: list[float]) -> None:
-    found = motion(**data)
-    # The same with a last step that has no end.
-    endless = motion(**sequence(*data["steps"], hold()))
-    asked = found.duration * np.array(times)
-    last = [endless.angle(np.array([time]), math.radians(start))[0] for time in asked]
-    assert endless.angle(asked, math.radians(start)) == pytest.approx(last, abs=1e-9)
-    alone = [found.angle(np.array([time]), math.radians(start))[0] for time in asked]
-    assert found.angle(asked, math.radians(start)) == pytest.approx(alone, abs=1e-9)
 
 
 @given(data=SEQUENCES, start=ANGLES, share=st.floats(0.01, 0.99))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
+from synthetic import write_ended
 
 from dem.errors import InputError
 from dem.record.rundir import claimed
@@ -20,10 +21,7 @@ def finish(directory: Path) -> None:
     """Make every run of a sweep look finished."""
     folder = open_folder(directory)
     for entry in folder.entries:
-        run = folder.run(entry)
-        run.mkdir(parents=True)
-        (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
-        (run / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0, "wall_s": 2.0}))
+        write_ended(folder.run(entry), entry.scene_sha256)
 
 
 def test_a_dry_run_lists_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
