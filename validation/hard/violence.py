@@ -56,13 +56,13 @@ def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
 
     On links the barrier holds it.
     """
-    _, engine, recorder = watched(scene(access, count=1), out)
+    described, engine, recorder = watched(scene(access, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
     access.push(engine, 0, velocity=(0, 0, -speed))
     said, first, lowest = None, energy(engine), math.inf
     while not said and engine.time < 0.05:
         engine.advance(2)
-        lowest = min(lowest, float(engine.state().vertices[..., 2].min()))
+        lowest = min(lowest, float(engine.state().spheres(described.particle)[..., 2].min()))
         said = look(engine, recorder)
     solid = [above("lowest point of an axis [m]", lowest, 0.0)]
     left = [says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m")]
