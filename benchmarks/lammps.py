@@ -27,8 +27,9 @@ from dem.engine.interface import Saved
 from dem.engine.lammps.kind import LammpsKind
 from dem.engine.lammps.ranks import RANKS
 from dem.plan.steps import time_step
+from dem.record.run import Run
 from dem.scene.reading import parse_scene
-from postprocess import link_crossings, read_frames, read_run, read_series
+from postprocess import link_crossings, read_frames, read_series
 
 ENGINES = ("yade", "links", "lammps")
 STRETCH, STRETCHES = 10, 8  # steps, and how many such
@@ -50,11 +51,11 @@ def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[
 
 def told(run: Path) -> dict[str, float]:
     """Means at rest and over the second half of the shaking."""
-    manifest, series = read_run(run), read_series(run)
+    planned, series = Run(run).phases, read_series(run)
     times, phases, phi = series["time_s"], series["phase"], series["packing_fraction"]
-    rest = phi[(phases == 1) & (times > (manifest.phases[1].end or 0.0) - 0.1)]
-    shaken = manifest.phases[2]
-    half = ((shaken.start or 0.0) + (shaken.end or 0.0)) / 2
+    rest = phi[(phases == 1) & (times > (planned[1].end_s or 0.0) - 0.1)]
+    shaken = planned[2]
+    half = ((shaken.start_s or 0.0) + (shaken.end_s or 0.0)) / 2
     crossings = [float(link_crossings(frame.vertices).mean()) for frame in read_frames(run).after(half)]
     return {
         "phi_0 [-]": float(rest.mean()),
