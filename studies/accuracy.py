@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from dem.errors import InputError
 from dem.record.manifest import RunManifest
@@ -297,6 +298,9 @@ def _draw_panel(axes: Any, name: str, table: pd.DataFrame) -> None:
                 wide = rows.loc[part, marked(COST, "95 %")].to_numpy()
                 draw_means(axes, cost[part], rows.loc[part, errors], high, across=wide, look=look, label=label)
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("processor time per simulated time [s/s]")
     axes.set_ylabel(f"error of {SYMBOLS[name]} [%]")
 

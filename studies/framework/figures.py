@@ -131,7 +131,8 @@ class Means:
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the judging engine filled, other engines open beside it."""
-        if analysis.points[[quantity.column for quantity in self.quantities]].isna().all().any():
+        drawn = pd.concat([series.rows for series in self.split(analysis.points)] or [analysis.points.iloc[:0]])
+        if drawn[[quantity.column for quantity in self.quantities]].isna().all().any():
             return []
         columns = min(len(self.quantities), 2)
         rows = -(-len(self.quantities) // columns)

@@ -304,7 +304,8 @@ class Study:
             times = runs[runs[PROCEDURE] != STATIC].groupby(PROCEDURE)[ACTIVE].first()
             statement += "; active for: " + ", ".join(f"{name} {time:.3g} s" for name, time in times.items())
         bars = told_bars(counts, "point")
-        return [f"{statement}.", *filter(None, [told_engines(every)]), *self.remarks, f"{bars}.", f"{CRITERION}."]
+        compared = [told_engines(every)] if "engines" in tables else []
+        return [f"{statement}.", *filter(None, compared), *self.remarks, f"{bars}.", f"{CRITERION}."]
 
     def _seeds(self, tables: Mapping[str, pd.DataFrame]) -> str:
         runs, counts = judging(tables["runs"]), judging(tables["points"])[SEEDS]

@@ -18,7 +18,6 @@ from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from validation.known.theory import dashpot_impact
 
-G = 9.81
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)
 
 
@@ -28,26 +27,6 @@ def put(
     """Smarticles at places, not turned or turned as told."""
     given = turns or (Rotation.identity(),) * len(places)
     engine.add(Poses(np.array(places), given), speed=speed)
-
-
-def test_what_flies_falls_as_thrown_and_does_not_turn(build: Build) -> None:
-    engine = build(small())
-    askew = Rotation.from_rotvec([0.5, 1.0, 0.3])
-    put(engine, (0.005, 0, 0.09), (-0.01, 0, 0.05), turns=(askew, askew.inv()), speed=0.2)
-    before = engine.state()
-    np.testing.assert_allclose(before.velocities, [[0, 0, -0.2]] * 2, atol=1e-15)
-    engine.advance(200)
-    after, t = engine.state(), 200 * engine.time_step
-    assert engine.time == pytest.approx(t, rel=1e-12)
-    fallen = before.positions - after.positions
-    # The scheme is exact for a constant force.
-    np.testing.assert_allclose(fallen[:, 2], 0.2 * t + G * t**2 / 2, rtol=1e-9)
-    assert np.abs(fallen[:, :2]).max() < 1e-15
-    np.testing.assert_allclose(after.velocities[:, 2], -(0.2 + G * t), rtol=1e-9)
-    assert np.abs(after.link_rotations - before.link_rotations).max() < 1e-9
-    assert engine.impulse == pytest.approx(-after.momentum[2], rel=1e-9)
-    assert engine.unbalanced_force() == pytest.approx(1, rel=1e-9)
-    assert engine.touches().tolist() == [0, 0]
 
 
 def test_one_rank_and_two_move_the_same_smarticles_alike(build: Build) -> None:

@@ -129,7 +129,7 @@ def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str
         if met:
             finish(start(path, out), what)
             row = row_of(whole, out, seconds=seconds, killed=killed)
-            rows.append({"engine": engine, "seed": seed, "kill": len(rows) + 1, **row})
+            rows.append({"engine": engine, "threads": 1, "seed": seed, "kill": len(rows) + 1, **row})
             if row[SAME] != "yes":
                 continue
         shutil.rmtree(out)

@@ -9,8 +9,7 @@ import pytest
 from scenes import small
 
 from dem.engine.lammps.child import NEEDED, Child, explain
-from dem.engine.lammps.ranks import check_ranks
-from dem.errors import InputError, RunError
+from dem.errors import RunError
 from dem.run.run import run_scene
 
 HELP = "Large-scale Atomic/Molecular Massively Parallel Simulator - {version}\n\n" + " ".join(NEEDED)
@@ -97,15 +96,3 @@ def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(program
     assert "signal 9 (Killed)" in kept.read_text()
     kept.unlink()
     kept.parent.rmdir()
-
-
-def test_more_ranks_than_cores_are_refused_but_for_those_of_a_batch_system(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
-    monkeypatch.delenv("SLURM_NTASKS", raising=False)
-    check_ranks(2)
-    with pytest.raises(InputError, match=r"^--ranks 3: there are 2 cores .*; use at most 2, or more machines"):
-        check_ranks(3)
-    monkeypatch.setenv("SLURM_NTASKS", "64")
-    check_ranks(64)
-    with pytest.raises(InputError, match=r"use at most 64"):
-        check_ranks(65)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from dem.body.state import State
 from dem.engine.lammps.contacts import Contacts
 from dem.engine.lammps.fixtures import LammpsFixtures
-from dem.engine.lammps.text import Moving, body_lines, contact_terms
+from dem.engine.lammps.text import Moving, contact_terms
 from dem.errors import InputError
 from dem.physics.contact import contact_law
 from dem.scene.reading import parse_scene
@@ -80,21 +80,6 @@ def moving(count: int) -> tuple[Any, Moving]:
     vectors = (rng.normal(size=(count, 3)) for _ in range(5))
     places, *rest = vectors
     return scene, Moving(places, turns, *rest)
-
-
-def test_bodies_keep_all_digits_of_their_motion() -> None:
-    scene, told = moving(3)
-    number, *lines = body_lines(scene.particle, told)
-    assert number == "3"
-    rows = np.array([line.split() for line in lines], float)
-    assert rows.shape == (3, 20)
-    assert np.array_equal(rows[:, 2:5], told.positions)
-    assert np.array_equal(rows[:, 11:14], told.velocities)
-    assert np.array_equal(rows[:, 14:17], told.momenta)
-    xx, yy, zz, xy, xz, yz = rows[:, 5:11].T
-    tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    turned = np.swapaxes(told.turns, 1, 2) @ tensors @ told.turns
-    np.testing.assert_allclose(turned, np.tile(np.diag(scene.particle.boxes.inertia), (3, 1, 1)), atol=1e-20)
 
 
 @pytest.fixture

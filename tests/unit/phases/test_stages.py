@@ -78,15 +78,6 @@ def test_a_phase_takes_the_time_that_it_says_and_remembers_all_that_it_needs(pha
     assert ends[0] == ends[1]
 
 
-@pytest.mark.parametrize("phase", PHASES, ids=[phase["type"] for phase in PHASES])
-def test_a_phase_without_motors_is_welded_and_one_with_motors_articulated(phase: dict[str, Any]) -> None:
-    scene, engine = begin(SWING, phase, hooks={})
-    run_phase(scene, engine, 1)
-    assert engine.motors.articulated
-    run_phase(scene, engine, 2)
-    assert engine.motors.articulated is scene.phases[2].actuates
-
-
 # -- pour --------------------------------------------------------------------------------------------------------------
 
 
@@ -100,27 +91,6 @@ def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> N
     # Three falls of less than 2w, each looked at every 10 ms, and 50 ms of rest.
     assert 3 * 0.01 < duration < 3 * 0.12
     assert engine.positions[:, 2] == pytest.approx(engine.stands)
-
-
-def test_a_pour_by_the_clock_waits_for_nobody_until_all_are_there() -> None:
-    clocked = {"phases.0.every_s": 0.015, "phases.0.thrown_at_m_per_s": 2.0}
-    scene = small({"count": 12, **clocked})
-    engine, stage = EngineDouble.of(scene, DT), scene.phases[0].begin(scene, 0)
-    counts, waits, tops = [], [], []
-    for _ in range(3):
-        waits.append(stage.proceed(engine))
-        counts.append(engine.count)
-        new = slice(0, 5) if engine.count == 5 else slice(engine.count - (5 if engine.count == 10 else 2), None)
-        assert (engine.velocities[new, 2] == -2.0).all()
-        tops.append(engine.state().vertices[new, :, 2].min())
-        engine.advance(round(waits[-1] / DT))
-    assert (counts, waits) == ([5, 10, 12], [0.015] * 3)
-    # All from the same height, high up at the wall, whatever is below.
-    least = scene.cylinder.height - scene.phases[0].layer_height_w * 0.0117 - 2 * scene.particle.reach
-    assert least < min(tops)
-    assert max(tops) < least + 0.0117
-    perform(stage, engine)
-    assert engine.touches().all()
 
 
 def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
@@ -222,14 +192,6 @@ def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> 
         ("untie",),
     ]
     assert duration == pytest.approx(0.01 / 0.5, abs=1e-4)
-
-
-def test_straining_ends_when_the_chain_has_parted() -> None:
-    engine, duration = strained()
-    assert engine.told[-1] == ("untie",)
-    # The last one is drawn out of the next by two thicknesses and a gap; looked at every 10 ms.
-    needed = (2 * 0.0095 + 0.00105) / 0.5
-    assert needed <= duration <= needed + CHECK_INTERVAL + 1e-4
 
 
 @pytest.mark.parametrize("at_once", [2, 7, 64])

@@ -225,25 +225,6 @@ def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) 
     assert "; " in told
 
 
-def test_a_tip_may_be_under_the_floor_as_deep_as_contacts_are_and_an_axis_may_not(pour: Path) -> None:
-    floor, radius = read_frames(pour)[-1].floor_z, parse_scene(SMALL, source="x").particle.radius
-
-    def stand(tip: float) -> Callable[[meshio.Mesh], None]:
-        """One smarticle on its tips, barbs upright, at a height [m] over the floor; the others stay."""
-
-        def change(mesh: meshio.Mesh) -> None:
-            half, long = 0.0117 / 2, float(np.linalg.norm(mesh.points[1] - mesh.points[0]))
-            heights = floor + tip + np.array([0.0, long, long, 0.0])
-            mesh.points[:4] = np.column_stack([[-half, -half, half, half], np.zeros(4), heights])
-
-        return change
-
-    rewrite(pour, -1, stand(-0.5 * radius))
-    assert scene_of(pour).count == 10
-    rewrite(pour, -1, stand(-1.05 * radius))
-    assert "takes over, lie at -3.248e-05 to" in refused(pour)
-
-
 # -- the stage ---------------------------------------------------------------------------------------------------------
 
 

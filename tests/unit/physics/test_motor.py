@@ -32,22 +32,6 @@ def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors 
 # -- the halting law ---------------------------------------------------------------------------------------------------
 
 
-def test_halting_motor_gives_way_at_once_and_goes_on_when_freed() -> None:
-    motors = held(HALT, 0.5, 1.0, 40)
-    stopped = motors.commands.copy()
-    assert motors.halted.all()
-    # Told to go back: it does, although the torque is still above the limit.
-    motors.look(np.full((1, 2), 0.5), np.full((1, 2), 0.4), PERIOD, STEP)
-    assert motors.commands == pytest.approx(stopped - 6 * PERIOD, rel=1e-12)
-    assert not motors.halted.any()
-    # Held again, then free: the barb follows, the torque is gone, and the motor goes on.
-    motors = held(HALT, 0.5, 1.0, 40, motors)
-    assert motors.halted.all()
-    motors.look(motors.commands.copy(), np.full((1, 2), 1.0), PERIOD, STEP)
-    assert not motors.halted.any()
-    assert motors.commands[0, 0] > stopped[0, 0]
-
-
 def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> None:
     stall = replace(HALT, law="stall")
     motors = held(stall, 0.5, 1.0, 40)
@@ -78,22 +62,6 @@ def test_an_easing_motor_goes_on_at_half_the_speed_whatever_it_takes() -> None:
     assert motors.torques[0, 0] > 10 * EASE.torque_limit
     assert motors.commands[0, 1] == pytest.approx(200 * 6 * PERIOD, rel=1e-12)
     assert not motors.halted.any()
-
-
-def test_easing_motors_stop_when_both_are_found_at_the_limit_ten_times_in_a_row() -> None:
-    slow = math.ceil(EASE.torque_limit / ADVANCE)
-    # Twenty findings, of barb 1 and barb 2 in turn: the second barb is the twentieth and stops a look earlier.
-    motors = held(EASE, 0.0, 1.0, slow + 10)
-    assert motors.halted.tolist() == [[False, True]]
-    stopped = held(EASE, 0.0, 1.0, 100)
-    assert stopped.halted.all()
-    assert stopped.commands[0] / (6 * PERIOD) == pytest.approx([slow + 5.0, slow + 4.5], rel=1e-12)
-    # One that comes free starts the count anew, for both.
-    angles = np.array([[0.0, stopped.commands[0, 1]]])
-    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
-    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
-    assert not stopped.halted.any()
-    assert stopped.commands[0, 0] / (6 * PERIOD) > slow + 5
 
 
 @given(st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=40))

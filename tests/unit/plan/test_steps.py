@@ -65,19 +65,6 @@ def test_time_step_divides_the_recording_intervals(fidelity: str, series: float)
         assert dt > 0.9 * wanted  # no smaller than needed
 
 
-def test_given_time_step_above_the_stable_one_is_refused_with_both() -> None:
-    scene = small({"fidelity": {"time_step_s": 0.001}})
-    stable = stable_step(scene)
-    with pytest.raises(InputError) as caught:
-        time_step(scene)
-    assert str(caught.value) == (
-        f"fidelity.time_step_s: 0.001 s is above the stable step {stable:.4g} s of this smarticle at "
-        f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
-    )
-    least = float(str(caught.value).split("use at most ")[1].split(" s")[0])
-    assert 0.98 * stable < time_step(small({"fidelity": {"time_step_s": least}})) <= stable
-
-
 @pytest.mark.parametrize(("key", "value"), [("hinge_stiffness_N_per_m", 1e6), ("stiffness", 10.0)])
 def test_stiff_hinges_and_shafts_shorten_the_step(key: str, value: float) -> None:
     phases = [{"type": "deposit"}, {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}]

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
-from scenes import chain, small
+from scenes import small
 
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene, derive_seed
@@ -110,15 +109,3 @@ def test_seeds_for_purposes_come_from_the_seed_alone() -> None:
     drawn = {derive_seed(seed, purpose) for seed in range(500) for purpose in ("deposit", "shake")}
     assert len(drawn) == 1000
     assert max(drawn) > 2**63  # all 64 bits are used: seeds of a sweep do not collide
-
-
-def test_strengths_are_drawn_from_the_seed_within_the_spread() -> None:
-    assert chain().motor_strengths is None
-    strengths = chain({"motor.strength_spread": 0.1}).motor_strengths
-    assert strengths is not None
-    assert strengths.shape == (6, 2)
-    assert 0.02 < strengths.std() < 0.1
-    assert np.abs(strengths - 1).max() <= 0.1
-    again = chain({"motor.strength_spread": 0.1}).motor_strengths
-    assert (again == strengths).all()
-    assert (chain({"motor.strength_spread": 0.1, "seed": 4}).motor_strengths != strengths).all()

@@ -35,12 +35,6 @@ def test_two_linked_squares_are_linked_once():
     assert gauss_integral(SQUARE[::-1], THROUGH[::-1]) == pytest.approx(-1, abs=1e-14)
 
 
-def test_wound_twice_counts_twice():
-    angle = np.linspace(0, 4 * np.pi, 81)
-    coil = np.stack([1 + 0.5 * np.cos(angle), 0 * angle, 0.5 * np.sin(angle)], axis=1)
-    assert gauss_integral(SQUARE, coil) == pytest.approx(2 * gauss_integral(SQUARE, THROUGH), abs=1e-12)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_open_chains_agree_with_quadrature(scene, seed):
     first, second = scene(2, seed, box=0.8)

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess import DEFINITIONS, UndefinedMeasureError, packing_fraction
-from postprocess.geometry.region import Region, inner_region
+from postprocess import DEFINITIONS, packing_fraction
+from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import solid_fraction
 
@@ -88,16 +88,6 @@ def test_voxels_count_overlaps_once(shape):
     assert solid_fraction([shape(1.0), shape(1.0)], region, **sizes) == once
 
 
-def test_voronoi_cells_of_a_lattice_are_its_cells(pile):
-    # Wall, floor and lid further off than any void of the lattice is wide.
-    container = Region(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
-    region = inner_region(container, inner=0.4, low=0.4, high=0.6)
-    local = local_packing(pile, container, region, solid_volume=SOLID, spacing=0.25)
-    assert 10 < local.interior.sum() < len(pile) / 4
-    assert local.volumes[local.interior] == pytest.approx(math.prod(CELL), rel=1e-6)
-    assert local.value == pytest.approx(DENSITY, rel=1e-6)
-
-
 def test_voronoi_cells_fill_the_container(scene):
     # Dense enough that images in wall, floor and lid close every cell.
     count, rng = 150, np.random.default_rng(0)
@@ -110,13 +100,6 @@ def test_voronoi_cells_fill_the_container(scene):
     # The wall is a polygon around the circle, so the sum comes out a little high.
     assert local.volumes.sum() == pytest.approx(container.volume, rel=0.05)
     assert local.volumes.sum() >= container.volume
-
-
-@pytest.mark.parametrize("definition", ["voxel", "voronoi"])
-def test_empty_inner_region_is_refused_instead_of_zero(shape, definition):
-    ring = [shape(1.0) + np.array([3, 0, z]) for z in (3.5, 4.0, 5.0)]
-    with pytest.raises(UndefinedMeasureError, match="inner region"):
-        phi(np.array(ring), definition, axis=(0.0, 0.0), inner=0.3)
 
 
 @pytest.mark.parametrize(

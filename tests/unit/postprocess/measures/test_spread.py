@@ -44,16 +44,6 @@ def test_the_radius_of_an_even_disc_holds_its_share():
         assert found == pytest.approx(0.02 * math.sqrt(share), rel=0.02)
 
 
-def test_a_level_line_through_the_axis_is_cut_where_the_circle_is():
-    """Of a line from −a to a about its own middle, the share within r is r/a: exact."""
-    pile = np.array([line([-0.03, 0.0, 0.01], [0.03, 0.0, 0.01])])
-    for share in (0.1, 0.5, 0.95, 1.0):
-        assert spread_radius(pile, share=share) == pytest.approx(0.03 * share, rel=1e-9)
-    # Beside the axis: from (b, −a) to (b, a) the share within r is √(r² − b²)/a.
-    beside = pile + np.array([0, 0.01, 0])
-    assert spread_radius(beside, share=0.5, axis=(0.0, 0.0)) == pytest.approx(math.hypot(0.015, 0.01), rel=1e-9)
-
-
 @given(seed=st.integers(0, 1000), angle=st.floats(0, 2 * math.pi), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
 def test_spread_does_not_depend_on_place_or_direction(seed, angle, shift):
     rng = np.random.default_rng(seed)

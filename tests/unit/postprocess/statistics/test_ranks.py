@@ -61,12 +61,12 @@ def test_the_interval_holds_the_true_correlation_as_often_as_it_says() -> None:
     random = np.random.default_rng(6)
     true = 6 / math.pi * math.asin(0.6 / 2)  # Spearman's of normal variables that correlate by 0.6
     held = 0
-    for _ in range(100):
+    for _ in range(40):
         x = random.normal(size=(60, 1))
         y = 0.6 * x[:, 0] + 0.8 * random.normal(size=60)
         low, high = widths(x, y, np.arange(60))
         held += low < true < high
-    assert 88 <= held <= 99
+    assert 34 <= held < 40
 
 
 def test_copies_of_a_run_do_not_make_it_surer() -> None:
