@@ -26,7 +26,7 @@ from dem.engine.interface import Saved
 from dem.engine.kinds import engine_kind
 from dem.plan.steps import time_steps
 from dem.record.checkpoint import read_checkpoint
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 
 COUNTS = (50, 100, 270, 1000, 2000, 5000, 10_000, 20_000)
@@ -37,7 +37,7 @@ WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per s
 
 def stretches(run: Path) -> dict[str, Any]:
     """Time the stretches of the pile of a run's last checkpoint."""
-    scene, made_by = load_scene(run / "scene.yaml"), read_run(run).versions["links"]
+    scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
     # An engine has a shaker only where the scene calls for one, and the pour does not.
     content = yaml.safe_load(dump_scene(scene))
     content["phases"].append({"type": "shake", "duration_s": 1.0, "frequency_hz": FREQUENCY})

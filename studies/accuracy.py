@@ -20,8 +20,7 @@ import pandas as pd
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
-from dem.record.series import read_series
+from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
@@ -70,7 +69,7 @@ _OF_SETTING = (ENGINE, TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
 _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
-def measure(run: RunManifest, expected_s: Mapping[str, float]) -> Row:
+def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
     """Measure what a run cost, and what is compared.
 
     Args:
@@ -80,35 +79,35 @@ def measure(run: RunManifest, expected_s: Mapping[str, float]) -> Row:
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.directory}: no activity after another phase: its phases are {types}"
+        msg = f"{run.path}: no activity after another phase: its phases are {types}"
         raise InputError(msg)
-    named = _NAMED.fullmatch(run.directory.name)
-    if named is None or int(named["seed"]) != run.seed:
-        msg = f"{run.directory}: not named SETTING_seed{run.seed}, as runs of a ladder are; do not rename runs"
+    named = _NAMED.fullmatch(run.path.name)
+    if named is None or int(named["seed"]) != run.manifest.seed:
+        msg = f"{run.path}: not named SETTING_seed{run.manifest.seed}, as runs of a ladder are; do not rename runs"
         raise InputError(msg)
     last = active[-1]
     wanted = [active[0].index - 1, last.index]
-    table = summarise_run(run.directory, definitions=[DEFINITION], phases=set(wanted)).set_index("phase")
+    table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted)).set_index("phase")
     if len(table) != len(wanted):
-        msg = f"{run.directory}: no frame of the phase before its activity, or of its last one; run it again"
+        msg = f"{run.path}: no frame of the phase before its activity, or of its last one; run it again"
         raise InputError(msg)
     before, after = (table.loc[phase] for phase in wanted)
-    time, expected = duration(last), expected_s.get(run.directory.name, math.nan)
-    cpu = math.fsum(_or_nan(phase.cpu_time) for phase in run.phases)
+    time, expected = duration(last), expected_s.get(run.path.name, math.nan)
+    cpu = math.fsum(_or_nan(phase.cpu_s) for phase in run.phases)
     phi = f"phi {DEFINITION}"
     return {
         VARIANT: named["variant"],
-        SEED: run.seed,
-        ASPECT: round(run.aspect_ratio, 6),
-        COUNT: run.count,
+        SEED: run.manifest.seed,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        COUNT: run.manifest.count,
         ACTIVITY: " ".join(dict.fromkeys(phase.type for phase in active)),
-        ENGINE: run.engine,
-        "fidelity": run.fidelity,
-        TIME_STEP: run.time_step,
+        ENGINE: run.manifest.engine,
+        "fidelity": run.manifest.fidelity,
+        TIME_STEP: run.manifest.time_step_s,
         # Links that are no chains have spheres in pictures alone.
-        SPHERES: run.spheres_per_smarticle if run.engine == "yade" else math.nan,
-        COST: _or_nan(last.cpu_time) / time if time > 0 else math.nan,
-        WALL: _or_nan(run.wall_time),
+        SPHERES: run.manifest.spheres_per_smarticle if run.manifest.engine == "yade" else math.nan,
+        COST: _or_nan(last.cpu_s) / time if time > 0 else math.nan,
+        WALL: _or_nan(run.status.wall_s),
         EXPECTED: cpu / expected if expected > 0 else math.nan,
         COMPARED["phi_0"]: before[f"{phi} [-]"],
         COMPARED["phi_f"]: after[f"{phi} [-]"],
@@ -118,8 +117,8 @@ def measure(run: RunManifest, expected_s: Mapping[str, float]) -> Row:
         **_of_series(run),
         "escaped at the end [-]": after["escaped [-]"],
         "frames averaged [-]": int(table["frames averaged"].min()),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
@@ -127,16 +126,16 @@ def _or_nan(number: float | None) -> float:
     return math.nan if number is None else number
 
 
-def _of_series(run: RunManifest) -> dict[str, float]:
+def _of_series(run: Run) -> dict[str, float]:
     """Read the peak force of the first hook, energy residual and joint gap; NaN where the scene has none."""
     found = {COMPARED["hook_force"]: math.nan, RESIDUAL: math.nan, GAP: math.nan}
-    if not (run.directory / "series.h5").exists():
+    if not (run.path / "series.h5").exists():
         return found
-    series = read_series(run.directory)
+    series = run.series
     pulled = [phase.index for phase in run.phases if phase.type == PULL]
     if pulled and has_pull(series, pulled[0]):
         highest = peak(read_pull(run, series, pulled[0])).force
-        found[COMPARED["hook_force"]] = highest / (run.count * weight_of_one(run))
+        found[COMPARED["hook_force"]] = highest / (run.manifest.count * weight_of_one(run))
     data = series.data
     if "energy_residual_J" in data and "dissipated_energy_J" in data:
         residual, dissipated = data["energy_residual_J"], data["dissipated_energy_J"]

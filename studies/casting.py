@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.outline import BALL
 from postprocess.measures.heights import heights
 from postprocess.measures.mould import cast, read_tiers
@@ -81,19 +81,19 @@ QUANTITIES = (
 )
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure how a mould was filled, and what is left of its shape."""
-    tiers = read_tiers(run.directory)
+    tiers = read_tiers(run)
     if len(tiers) != len(TIERS) + 1:
-        msg = f"{run.directory}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}"
+        msg = f"{run.path}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}"
         raise InputError(msg)
     tiers = tiers[:-1]  # without the neck that the mould is filled through
     before, frames = around(run)
-    start = removal(run).start or before.time
+    start = removal(run).start_s or before.time
     after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
     one, other = (frame.vertices - np.array([0.0, 0.0, frame.floor_z]) for frame in (before, after))
-    ball = BALL * run.middle_length
-    found = cast(one, other, tiers, thickness=run.sphere_diameter, ball=ball)
+    ball = BALL * run.manifest.middle_length_m
+    found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
     filled = found.filled_before * volumes
     # Of less than the ball that tells inside from outside, a share says nothing.
@@ -121,8 +121,8 @@ def measure(run: RunManifest) -> Row:
         CENTRE: levels[1].mean_com / levels[0].mean_com,
         "time after [s]": after.time - start,
         "time without the wall [s]": duration(removal(run)),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 

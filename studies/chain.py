@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.strain import (
     AT_PEAK,
     BEND,
@@ -33,7 +33,6 @@ from postprocess.measures.strain import (
 )
 from postprocess.measures.strain import QUANTITIES as MEANINGS
 from postprocess.report import figures as style
-from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.points import averaged
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
@@ -72,24 +71,24 @@ QUANTITIES = {
 }
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure force, strain and width of the chain."""
-    strained = [phase for phase in read_phases(run.directory) if phase.type == STRAIN]
+    strained = [phase for phase in run.scene["phases"] if phase["type"] == STRAIN]
     if len(strained) != 1:
-        msg = f"{run.directory}: {len(strained)} phases that strain a chain; give runs of the study chain"
+        msg = f"{run.path}: {len(strained)} phases that strain a chain; give runs of the study chain"
         raise InputError(msg)
     pull = read_strain_test(run)
-    width = float(pull.widths[0]) if run.middle_thickness_in_plane is None else PAPER_WIDTH
+    width = float(pull.widths[0]) if run.manifest.middle_thickness_in_plane_m is None else PAPER_WIDTH
     return {
-        VARIANT: run.name,
-        COUNT: run.count,
-        CONFINEMENT: round(width / run.channel_width, 3) if run.channel_width else 0.0,
-        SEED: run.seed,
-        SPEED: strained[0].number("speed_m_per_s"),
+        VARIANT: run.manifest.name,
+        COUNT: run.manifest.count,
+        CONFINEMENT: round(width / run.manifest.channel_width_m, 3) if run.manifest.channel_width_m else 0.0,
+        SEED: run.manifest.seed,
+        SPEED: strained[0]["speed_m_per_s"],
         START: float(pull.widths[0]),
         **measured(pull),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
@@ -249,14 +248,14 @@ FINDINGS = (
 )
 
 
-def force_history(run: RunManifest) -> plots.History:
+def force_history(run: Run) -> plots.History:
     """Read the force of the pulled string against strain, up to the fracture."""
     pull = read_strain_test(run)
     end = pull.fracture + 1
     return plots.History(times=np.maximum.accumulate(pull.strains[:end]), values=pull.forces[:end], active=0.0)
 
 
-def width_history(run: RunManifest) -> plots.History:
+def width_history(run: Run) -> plots.History:
     """Read the width over that at the start against strain, up to the fracture."""
     pull = read_strain_test(run)
     end = pull.fracture + 1

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.collapse import (
     COM,
     CORE,
@@ -77,22 +77,22 @@ def read_gravish() -> pd.DataFrame:
         return pd.read_csv(file)
 
 
-def measure(run: RunManifest) -> Sequence[Row]:
+def measure(run: Run) -> Sequence[Row]:
     """Measure the collapse time by each definition of the height, a row each."""
     shaken = vibration(run)
     histories = {name: column_history(run, name, shaken) for name in HEIGHTS}
     what: dict[str, object] = {
-        ASPECT: round(run.aspect_ratio, 6),
+        ASPECT: round(run.manifest.aspect_ratio, 6),
         GAMMA: shaken.acceleration,
-        SEED: run.seed,
+        SEED: run.manifest.seed,
         FREQUENCY: shaken.frequency,
         WATCHED: duration(shaken.phase),
-        "smarticles [-]": run.count,
-        RADIUS: run.container_radius,
+        "smarticles [-]": run.manifest.count,
+        RADIUS: run.manifest.container_radius_m,
         "com height with the wall [m]": height_with_the_wall(run),
         "com height before vibration [m]": histories[COM].before,
         "within the radius before vibration [-]": histories[REMAINING].before,
-        "fidelity": run.fidelity,
+        "fidelity": run.manifest.fidelity,
     }
     rows = []
     for name, history in histories.items():
@@ -113,8 +113,8 @@ def measure(run: RunManifest) -> Sequence[Row]:
                 "fall [-]": found.fall,
                 LOG: logarithm,
                 DELTA: shaken.acceleration * logarithm,
-                "scene_sha256": run.scene_sha256,
-                "run": run.directory.name,
+                "scene_sha256": run.manifest.scene_sha256,
+                "run": run.path.name,
             }
         )
     return rows
@@ -283,7 +283,7 @@ FINDINGS = (
 )
 
 
-def _history(run: RunManifest) -> History:
+def _history(run: Run) -> History:
     history = column_history(run, REMAINING, vibration(run))
     return History(times=history.times, values=history.heights, active=float(history.times[-1]))
 

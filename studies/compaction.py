@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
@@ -126,7 +126,7 @@ def of(law: str, column: str) -> str:
     return f"{law} {column}"
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure φ in the course of time, and fit both laws."""
     row = timed_row(run, {FRICTION: common_friction(run)})
     history, shaken = packing_history(run), while_shaken(run)

@@ -13,8 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.factorial import paired_differences
@@ -61,32 +60,32 @@ QUANTITY, FACTOR, EFFECT, SHARE = "quantity", "factor", "effect [unit of the qua
 DEVIATION = "deviation of phi_f from Gravish [%]"
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure φ before, in the course of and after shaking, and by how much the lowest smarticles rose."""
     contact = contact_of(run)
     known = {
-        FRICTION: contact.number("friction_smarticle"),
-        WALL: contact.number("friction_wall"),
-        RESTITUTION: contact.number("restitution"),
+        FRICTION: contact["friction_smarticle"],
+        WALL: contact["friction_wall"],
+        RESTITUTION: contact["restitution"],
         RISEN: risen(run),
     }
     return timed_row(run, known)
 
 
-def risen(run: RunManifest) -> float:
+def risen(run: Run) -> float:
     """Measure by how much the lowest tenth of all smarticles rose while the pile was shaken [w].
 
     A pile that packs lets it sink; one that climbs its container as a whole leaves a gap below. Heights are means over
     the last `WINDOW` of the phase before shaking and of shaking.
     """
-    frames, heights = read_frames(run.directory), []
+    frames, heights = run.frames, []
     shaken = next(phase.index for phase in run.phases if phase.type == "shake")
     for phase in (shaken - 1, shaken):
         part = frames.in_phase(phase)
         late = part.after(part.times[-1] - WINDOW)
         lowest = [_lowest_tenth(centres_of_mass(one.vertices)[:, 2] - one.floor_z) for one in late]
         heights.append(float(np.mean(lowest)))
-    return (heights[1] - heights[0]) / run.middle_length
+    return (heights[1] - heights[0]) / run.manifest.middle_length_m
 
 
 def _lowest_tenth(heights: NDArray[np.float64]) -> float:

@@ -16,8 +16,7 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
-from dem.record.series import read_series
+from dem.record.run import Run
 from postprocess.measures import strain
 from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
@@ -132,30 +131,30 @@ REFINED = tuple(
 _WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure a few numbers, as the study measures them that the run is a small scene of."""
-    case, slash, variant = run.name.partition("/")
+    case, slash, variant = run.manifest.name.partition("/")
     if not slash or case not in (*ACTIVE, HOOK, COLLAPSE, CHAIN):
-        msg = f"{run.directory}: the scene's name is {run.name!r}, not CASE/VARIANT; give runs of the study engines"
+        msg = f"{run.path}: the scene's name is {run.manifest.name!r}, not CASE/VARIANT; give runs of the study engines"
         raise InputError(msg)
     return {
         CASE: case,
         VARIANT: variant,
-        ENGINE: run.engine,
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        ENGINE: run.manifest.engine,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
         **dict.fromkeys((one.column for one in QUANTITIES), math.nan),
         **_measured(run, case),
-        "processor time [s]": sum(phase.cpu_time or math.nan for phase in run.phases),
-        "simulated [s]": run.end_time,
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "processor time [s]": sum(phase.cpu_s or math.nan for phase in run.phases),
+        "simulated [s]": run.status.time_s,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
-def _measured(run: RunManifest, case: str) -> dict[str, float]:
+def _measured(run: Run, case: str) -> dict[str, float]:
     if case == CHAIN:
         return {FORCE: strain.measured(strain.read_strain_test(run))[strain.PEAK]}
     if case == COLLAPSE:
@@ -164,10 +163,10 @@ def _measured(run: RunManifest, case: str) -> dict[str, float]:
     if case == HOOK:
         pulled = run.phases[-1]
         if pulled.type != PULL:
-            msg = f"{run.directory}: ends with {pulled.type}, not {PULL}; give runs of the study engines"
+            msg = f"{run.path}: ends with {pulled.type}, not {PULL}; give runs of the study engines"
             raise InputError(msg)
-        force = peak(read_pull(run, read_series(run.directory), pulled.index)).force
-        return {PEAK: force / run.count / weight_of_one(run)}
+        force = peak(read_pull(run, run.series, pulled.index)).force
+        return {PEAK: force / run.manifest.count / weight_of_one(run)}
     row = procedure_row(run)
     return {name: float(str(row[name])) for name in (PHI_0, CROSSINGS_0, PHI_ACTIVE, PHI, CROSSINGS, HEIGHT, ENERGY)}
 

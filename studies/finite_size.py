@@ -19,8 +19,8 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import RunManifest
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 from postprocess.measures.clusters import entanglement_clusters, spans_height, spans_width
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
@@ -121,44 +121,44 @@ ASKED = {
 """Quantities that are asked about: what they are called, how they are shown, and in ids."""
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure the pile at rest before and after the shake."""
     types = tuple(phase.type for phase in run.phases)
     if types != PHASES:
-        msg = f"{run.directory}: its phases are {', '.join(types)}, not {', '.join(PHASES)}"
+        msg = f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}"
         raise InputError(msg)
-    frames = read_frames(run.directory)
+    frames = run.frames
     row: dict[str, object] = {
-        ASPECT: round(run.aspect_ratio, 6),
-        COUNT: run.count,
-        SEED: run.seed,
-        RADIUS: run.container_radius / run.middle_length,
-        "fidelity": run.fidelity,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        COUNT: run.manifest.count,
+        SEED: run.manifest.seed,
+        RADIUS: run.manifest.container_radius_m / run.manifest.middle_length_m,
+        "fidelity": run.manifest.fidelity,
         "time shaken [s]": duration(run.phases[2]),
     }
     for stage, phase in zip(STAGES, (1, 3), strict=True):
         row |= _at_rest(run, frames, stage, phase)
-    late = frames.in_phase(2).after((run.phases[2].end or 0.0) - WINDOW - 1e-6)
+    late = frames.in_phase(2).after((run.phases[2].end_s or 0.0) - WINDOW - 1e-6)
     row[MOVING] = float(np.mean([packing_of(frame, run, definition=DEFINITION) for frame in late])) if late else np.nan
     return row | {
         "escaped at the end [-]": escaped(frames[-1], run),
         "frames averaged [-]": len(late),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
-def _at_rest(run: RunManifest, frames: FrameSequence, stage: str, phase: int) -> dict[str, object]:
+def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[str, object]:
     """Measure the last frame of a rest."""
     part = frames.in_phase(phase)
     if not part:
-        msg = f"{run.directory}: no frame of phase {phase} (relax); run it again"
+        msg = f"{run.path}: no frame of phase {phase} (relax); run it again"
         raise InputError(msg)
     frame = part[-1]
-    vertices, diameter = frame.vertices, run.sphere_diameter
+    vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
     clusters = entanglement_clusters(vertices)
     height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
-    width = spans_width(clusters, vertices, diameter=diameter, wall_radius=run.container_radius)
+    width = spans_width(clusters, vertices, diameter=diameter, wall_radius=run.manifest.container_radius_m)
     return {
         **{phi(stage, one): packing_of(frame, run, definition=one) for one in DEFINITIONS},
         crossings(stage): entanglement(vertices).mean,

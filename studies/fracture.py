@@ -14,13 +14,10 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest
-from dem.record.series import read_series
+from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.figures import Histories, Means, Scatter, Series, Split, by_procedure, one_by_one
 from studies.framework.findings import Effect, Finding, Rows, above, ranks
@@ -83,57 +80,57 @@ QUANTITIES = {
 }
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure the pile before the pull, and the forces on the hooks."""
     procedure, pulled = prepared_by(run, PULL), run.phases[-1]
-    rest, settings = pulled.index - 1, read_phases(run.directory)
-    asked, series = settings[pulled.index], read_series(run.directory)
-    table = summarise_run(run.directory, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
+    rest, settings = pulled.index - 1, run.scene["phases"]
+    asked, series = settings[pulled.index], run.series
+    table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
     if rest not in table.index:
-        msg = f"{run.directory}: no frame of the rest before the pull; run it again"
+        msg = f"{run.path}: no frame of the rest before the pull; run it again"
         raise InputError(msg)
     before = table.loc[rest]
-    frame = read_frames(run.directory).in_phase(rest)[-1]
+    frame = run.frames.in_phase(rest)[-1]
     hook = float(series["hook_upper_z_m"][series.nearest(frame.time)])
     pull, one = read_pull(run, series, pulled.index), weight_of_one(run)
-    total, highest, free = run.count * one, peak(pull), freed(pull)
-    unlimited = asked.values.get("force_limit_N") is None
+    total, highest, free = run.manifest.count * one, peak(pull), freed(pull)
+    unlimited = asked.get("force_limit_N") is None
     return {
         PROCEDURE: procedure,
-        THETA: settings[2].number("theta_deg") if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
         ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
         PHI: before[PHI],
         CROSSINGS: before["crossings mean [-]"],
-        ABOVE: int((centres_of_mass(frame.vertices)[:, 2] > hook).sum()) / run.count,
+        ABOVE: int((centres_of_mass(frame.vertices)[:, 2] > hook).sum()) / run.manifest.count,
         PEAK: highest.force / total,
         **{column: peak(pull, window).force / total for window, column in WINDOWS.items()},
         HELD: held_at(pull, highest.time) / total,
         NET: peak(pull.net).force / total,
         PEAK_TIME: highest.time,
         RAISED: highest.raised,
-        WORK: pull.work / total / run.middle_length,
+        WORK: pull.work / total / run.manifest.middle_length_m,
         CAME_FREE: float(math.isfinite(free)),
         FREE_TIME: free,
         LEFT: pull.left / total,
         BEFORE: pull.before / total,
         ACCOUNT: pull.work / pull.engine_work - 1 if pull.engine_work else math.nan,
         HELD_FAST: float(held_fast(pull, asked)),
-        LIMIT: math.inf if unlimited else asked.number("force_limit_N", positive=True) / run.count / one,
+        LIMIT: math.inf if unlimited else asked["force_limit_N"] / run.manifest.count / one,
         "escaped at the end [-]": table["escaped [-]"].iloc[-1],
         "frames averaged [-]": int(before["frames averaged"]),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
-def force_history(run: RunManifest, *, net: bool = False) -> History:
+def force_history(run: Run, *, net: bool = False) -> History:
     """Read the force over n W_s against the time since the pull began; net of that on the lower hook."""
-    pull = read_pull(run, read_series(run.directory), run.phases[-1].index)
-    force = (pull.net if net else pull).force / run.count / weight_of_one(run)
+    pull = read_pull(run, run.series, run.phases[-1].index)
+    force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force, active=0.0)
 
 

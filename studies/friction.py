@@ -19,7 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, seeds_of, told_number
@@ -173,7 +173,7 @@ Curves = Mapping[tuple[str, float], Curve]
 """By stage and l/w; those that Gravish has a point of."""
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure φ before, in the course of, at the end of and after shaking."""
     return timed_row(run, {FRICTION: common_friction(run)})
 

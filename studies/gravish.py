@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
@@ -76,9 +76,9 @@ QUANTITIES = {
 }
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure φ and crossings before and after shaking."""
-    row = measured_row(run, [name for name in DEFINITIONS if name != COSTLY or run.fidelity != "draft"])
+    row = measured_row(run, [name for name in DEFINITIONS if name != COSTLY or run.manifest.fidelity != "draft"])
     missing = dict.fromkeys([name for name in QUANTITIES if name not in row], math.nan)
     return row | missing | {SHAKEN: round(float(str(row[SHAKEN])), 3)}
 

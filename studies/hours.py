@@ -14,8 +14,8 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import read_run
 from dem.record.names import MANIFEST, OF_SWEEP
+from dem.record.run import open_run
 from templates.sweep.folder import open_folder
 
 STUDY, ENGINE, RUNS, PLANNED = "study", "engine", "runs planned [-]", "planned [h]"
@@ -62,7 +62,7 @@ def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
 
 def _taken(directory: Path) -> float:
     """Hours that a run took; NaN unless it is done."""
-    seconds = read_run(directory).processor_time if (directory / MANIFEST).is_file() else None
+    seconds = open_run(directory).status.cpu_s if (directory / MANIFEST).is_file() else None
     return math.nan if seconds is None else seconds / 3600
 
 

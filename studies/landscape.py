@@ -28,14 +28,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from dem.errors import InputError
-from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest
-from dem.record.series import read_series
+from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.scene_file import read_phases, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, told
 from postprocess.statistics.points import marked, mean_columns, told_number
@@ -145,60 +142,60 @@ _MEASURED = {
 _NAMED = re.compile(r"[^_]+_(?P<time>\d+(?:\.\d+)?)s_.+")
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure the pile before the pull, the energy spent on it, and its strength."""
     procedure = prepared_by(run, PULL)
-    pulled, named = run.phases[-1], _NAMED.fullmatch(run.directory.name)
+    pulled, named = run.phases[-1], _NAMED.fullmatch(run.path.name)
     rest = pulled.index - 1
-    settings, series = read_phases(run.directory), read_series(run.directory)
-    hooks, frames = read_scene(run.directory).part("hooks"), read_frames(run.directory).in_phase(rest)
+    settings, series = run.scene["phases"], run.series
+    hooks, frames = run.scene.get("hooks"), run.frames.in_phase(rest)
     if named is None:  # the run's own time is rounded to whole swings
-        msg = f"{run.directory}: not named like a run of this study, such as internal10_2s_lw0.70_seed1"
+        msg = f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1"
         raise InputError(msg)
-    if hooks is None or not frames or settings[pulled.index].type != PULL:
-        msg = f"{run.directory}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
+    if hooks is None or not frames or settings[pulled.index]["type"] != PULL:
+        msg = f"{run.path}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
         raise InputError(msg)
-    before = summarise_run(run.directory, definitions=[DEFINITION], phases={rest}).set_index("phase").loc[rest]
+    before = summarise_run(run, definitions=[DEFINITION], phases={rest}).set_index("phase").loc[rest]
     heights = centres_of_mass(frames[-1].vertices)[:, 2] - frames[-1].floor_z
-    above = float((heights > hooks.number("upper_height_m")).mean())
+    above = float((heights > hooks["upper_height_m"]).mean())
     weight = weight_of_one(run)
-    total, energy = run.count * weight, _spent(run, procedure, rest) / run.count
+    total, energy = run.manifest.count * weight, _spent(run, procedure, rest) / run.manifest.count
     pull = read_pull(run, series, pulled.index)
     highest = peak(pull)
     return {
         PROCEDURE: procedure,
-        THETA: settings[2].number("theta_deg") if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
         PLANNED: float(named["time"]),
         ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
         **{column: before[measured] for column, measured in _MEASURED.items()},
         ABOVE: above,
         ENERGY: energy,
-        LIFTS: energy / weight / run.middle_length,
+        LIFTS: energy / weight / run.manifest.middle_length_m,
         PEAK: highest.force / total,
         BEYOND: highest.force / total - above,
         RAISED: highest.raised,
-        WORK: pull.work / total / run.middle_length,
+        WORK: pull.work / total / run.manifest.middle_length_m,
         HELD_FAST: float(held_fast(pull, settings[pulled.index])),
         "escaped at the end [-]": before["escaped [-]"],
         "frames averaged [-]": int(before["frames averaged"]),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
-def _spent(run: RunManifest, procedure: str, rest: int) -> float:
+def _spent(run: Run, procedure: str, rest: int) -> float:
     """Read the work that an activity spent on the smarticles, to the end of the rest after it [J]."""
     if procedure == STATIC:
         return 0.0
-    series = read_series(run.directory)
+    series = run.series
     name = "container_work_J" if procedure == EXTERNAL else "motor_work_J"
     work = series.data.get(name)
     if work is None:
-        msg = f"{series.path}: no {name} of {run.directory}; run it with recording.energy"
+        msg = f"{series.path}: no {name} of {run.path}; run it with recording.energy"
         raise InputError(msg)
     known = np.isfinite(work)
     start, end = (work[known & (series["phase"] <= phase)] for phase in (1, rest))

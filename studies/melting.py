@@ -12,10 +12,9 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.heights import heights
 from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile, has_toppled
-from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
@@ -66,12 +65,12 @@ QUANTITIES = tuple(
 )
 
 
-def measure(run: RunManifest) -> MeasuredRun:
+def measure(run: Run) -> MeasuredRun:
     """Measure the pile before its wall went, in the end, and of every frame between them."""
     before, after = around(run)
     phase = removal(run)
-    settings = read_phases(run.directory)[phase.index]
-    lift = 0.0 if settings.values.get("speed_m_per_s") is None else settings.number("speed_m_per_s")
+    settings = run.scene["phases"][phase.index]
+    lift = 0.0 if settings.get("speed_m_per_s") is None else settings["speed_m_per_s"]
     centre = centre_of_mass(before.vertices)
     foot = (float(centre[0]), float(centre[1]))
     levels = heights(before.vertices, floor_z=before.floor_z)
@@ -92,7 +91,7 @@ def measure(run: RunManifest) -> MeasuredRun:
                 OFFSET: pile.offset / base,
             }
         )
-    start = before.time if phase.start is None else phase.start
+    start = before.time if phase.start_s is None else phase.start_s
     row: dict[str, object] = {
         **named_columns(run),
         LIFT: lift,
@@ -102,8 +101,8 @@ def measure(run: RunManifest) -> MeasuredRun:
         CENTRE: levels.mean_com,
         **rows[-1],
         TOPPLED: float(has_toppled(rows[-1][OFFSET] * base, base)),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
     return MeasuredRun(

@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, seeds_of
@@ -50,11 +50,13 @@ COMPARED = {
 }
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure φ and crossings before and after shaking; the variant is in the name of the run."""
-    found = re.fullmatch(r"(.+)_seed(\d+)", run.directory.name)
-    if found is None or int(found[2]) != run.seed:
-        msg = f"{run.directory}: runs of this study are named VARIANT_seedN, here N = {run.seed}; do not rename runs"
+    found = re.fullmatch(r"(.+)_seed(\d+)", run.path.name)
+    if found is None or int(found[2]) != run.manifest.seed:
+        msg = (
+            f"{run.path}: runs of this study are named VARIANT_seedN, here N = {run.manifest.seed}; do not rename runs"
+        )
         raise InputError(msg)
     return {VARIANT: found[1], **measured_row(run, [DEFINITION])}
 

@@ -71,27 +71,6 @@ class Phase(Document):
     wall_s: NonNegativeFloat | None = None
     cpu_s: NonNegativeFloat | None = None
 
-    # Old names, until studies and pictures have moved to the new ones (today).
-    @property
-    def start(self) -> float | None:  # noqa: D102
-        return self.start_s
-
-    @property
-    def end(self) -> float | None:  # noqa: D102
-        return self.end_s
-
-    @property
-    def time_step(self) -> float | None:  # noqa: D102
-        return self.time_step_s
-
-    @property
-    def wall_time(self) -> float | None:  # noqa: D102
-        return self.wall_s
-
-    @property
-    def cpu_time(self) -> float | None:  # noqa: D102
-        return self.cpu_s
-
 
 class Manifest(Document):
     """What made a run, `run.json`.

@@ -159,7 +159,7 @@ class Frame:
         path: The file it came from.
         time: Simulated time [s].
         floor_z: Height of the container's floor [m]; heights are measured from it.
-        phase: Index into `RunManifest.phases`.
+        phase: Index into `Run.phases`.
         vertices: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has
             at that time.
         smarticle_ids: (N,) int64.

@@ -123,7 +123,7 @@ class FrameSequence(Sequence[Frame]):
         """The frames of one phase, found by bisection: phases follow each other in time.
 
         Args:
-            phase: Index into `RunManifest.phases`.
+            phase: Index into `Run.phases`.
 
         Returns:
             Its frames; empty if the run has not recorded any.

@@ -16,9 +16,9 @@ import numpy as np
 import pyvista as pv
 
 from dem.errors import InputError, nearest
-from dem.record.forces import NO_FORCES, has_forces, read_forces
+from dem.record.forces import NO_FORCES, read_forces
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.export.fields import Field, link_values
 from postprocess.measures.entanglement import link_passages
 from postprocess.measures.force_chains import strong_contacts
@@ -26,7 +26,6 @@ from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.force_lines import force_lines, force_tubes
 from postprocess.pictures.strings import ChainStrings, read_strings
 from postprocess.pictures.surroundings import Bounds, Surroundings, read_surroundings
-from postprocess.scene_file import read_phases, read_scene
 
 if TYPE_CHECKING:
     pass
@@ -87,7 +86,7 @@ class Bodies:
 
     def __init__(
         self,
-        run: RunManifest,
+        run: Run,
         around: Surroundings,
         strings: ChainStrings | None,
         kinds: Sequence[str],
@@ -98,28 +97,26 @@ class Bodies:
         self.fields = fields
         self._around = around
         self._strings = strings
-        container = read_scene(run.directory).part("container")
-        height = None if container is None else container.values.get("height_m")
-        self._height = None if container is None or height is None else container.number("height_m", positive=True)
+        container = run.scene.get("container")
+        height = None if container is None else container.get("height_m")
+        self._height = None if container is None or height is None else height
         # The wall rests where the floor is at rest, at z = 0, while a shake moves the floor alone.
-        self._floor_alone = {
-            phase.index for phase in read_phases(run.directory) if phase.values.get("moves") == "floor"
-        }
+        self._floor_alone = {index for index, phase in enumerate(run.scene["phases"]) if phase.get("moves") == "floor"}
         self._top = 0.0  # of the highest smarticle above the floor
         self._reach = 0.0  # of the farthest one from the axis
         self._span = math.inf, -math.inf  # of all along x
 
     @classmethod
-    def read(cls, run: RunManifest, kinds: Sequence[str], fields: Sequence[Field]) -> Self:
+    def read(cls, run: Run, kinds: Sequence[str], fields: Sequence[Field]) -> Self:
         """What a run directory tells.
 
         Raises:
             InputError: Its scene or its series is damaged.
         """
-        if "forces" in kinds and not has_forces(run.directory):
-            msg = f"{run.directory}: records no forces; {NO_FORCES}"
+        if "forces" in kinds and not (run.forces is not None):
+            msg = f"{run.path}: records no forces; {NO_FORCES}"
             raise InputError(msg)
-        return cls(run, read_surroundings(run), read_strings(run) if run.planar else None, kinds, fields)
+        return cls(run, read_surroundings(run), read_strings(run) if run.manifest.planar else None, kinds, fields)
 
     def hold(self, frames: Iterable[Frame]) -> None:
         """Make walls and floor large enough for these frames too."""
@@ -148,7 +145,9 @@ class Bodies:
     def _smarticles(self, frame: Frame) -> pv.PolyData:
         run = self.run
         mesh = link_boxes(
-            frame.vertices, thickness_normal=run.thickness_normal, thickness_in_plane=run.thicknesses_in_plane
+            frame.vertices,
+            thickness_normal=run.manifest.thickness_normal_m,
+            thickness_in_plane=run.manifest.thicknesses_in_plane_m,
         )
         owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
         for field in self.fields:
@@ -159,12 +158,12 @@ class Bodies:
 
     def _wall(self, frame: Frame) -> pv.PolyData | None:
         run, floor = self.run, frame.floor_z
-        if run.planar:
-            if run.channel_width is None:
+        if run.manifest.planar:
+            if run.manifest.channel_width_m is None:
                 return None
-            half, (first, last) = run.channel_width / 2, self._span
+            half, (first, last) = run.manifest.channel_width_m / 2, self._span
             return _joined(
-                pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.thickness_normal]])
+                pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.manifest.thickness_normal_m]])
                 for y in (-half, half)
             )
         raised = self._around.raised(frame.time, frame.phase, self._top_of(frame))
@@ -181,17 +180,17 @@ class Bodies:
         """Radius and height above the floor of the corners of the wall from below [m]."""
         if self._around.corners:
             return self._around.corners
-        top = self._top + self.run.middle_length if self._height is None else self._height
-        return [(self.run.container_radius, 0.0), (self.run.container_radius, top)]
+        top = self._top + self.run.manifest.middle_length_m if self._height is None else self._height
+        return [(self.run.manifest.container_radius_m, 0.0), (self.run.manifest.container_radius_m, top)]
 
     @staticmethod
     def _top_of(frame: Frame) -> float:
         return float(frame.vertices[..., 2].max(initial=frame.floor_z)) - frame.floor_z
 
     def _floor(self, frame: Frame) -> pv.PolyData | None:
-        if self.run.planar:
+        if self.run.manifest.planar:
             return None
-        radius = max(self.run.container_radius, self._reach)
+        radius = max(self.run.manifest.container_radius_m, self._reach)
         floor: pv.PolyData = pv.Disc(center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=ROUND).triangulate()
         return floor
 
@@ -217,7 +216,7 @@ class Bodies:
         return mesh
 
     def _crossings(self, frame: Frame) -> pv.PolyData | None:
-        if self.run.planar or frame.count == 0:
+        if self.run.manifest.planar or frame.count == 0:
             return None
         found = link_passages(frame.vertices)
         if not len(found.i):
@@ -259,13 +258,13 @@ def cross(bars: Sequence[Bounds], height: float) -> pv.PolyData:
     return _joined(pv.Box((*bar[:4], height + bar[4], height + bar[5])) for bar in bars)
 
 
-def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:
+def solid(kind: str, mesh: pv.PolyData, run: Run) -> pv.PolyData:
     """A body as triangles alone, for files that know nothing else.
 
     Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
     most, whose thickness is in proportion to the normal force; boxes stay what they are.
     """
-    thin = min(run.thickness_in_plane, run.thickness_normal)
+    thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":
         mesh = mesh.tube(radius=thin / 10, n_sides=8, capping=True)
     if kind == "forces":
@@ -273,7 +272,7 @@ def solid(kind: str, mesh: pv.PolyData, run: RunManifest) -> pv.PolyData:
         mesh = force_tubes(mesh, normal, thickest=thin / 2, largest=float(normal.max()))
     if kind == "crossings":
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
-        mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)
+        mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.manifest.middle_length_m / 3)
     triangles: pv.PolyData = mesh.triangulate()
     return triangles
 

@@ -12,7 +12,7 @@ import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 
 SCRIPT = "show_in_paraview.py"
 """Name of the script beside the collections."""
@@ -29,7 +29,7 @@ class Collection:
         run: Whose frames they are.
     """
 
-    def __init__(self, folder: Path, run: RunManifest) -> None:
+    def __init__(self, folder: Path, run: Run) -> None:
         self._folder = folder
         self._run = run
         self._frames: list[tuple[int, float, int]] = []  # number, time, phase
@@ -58,10 +58,12 @@ class Collection:
         # The name by which VTK's readers know the time.
         mesh.field_data["TimeValue"] = np.array([time])
         mesh.field_data["phase"] = np.array([phase])
-        mesh.field_data["middle_length_m"] = np.array([run.middle_length])
-        mesh.field_data["thickness_m"] = np.array([min(run.thickness_in_plane, run.thickness_normal)])
-        mesh.GetFieldData().AddArray(_text("run_name", run.name))
-        mesh.GetFieldData().AddArray(_text("scene_sha256", run.scene_sha256))
+        mesh.field_data["middle_length_m"] = np.array([run.manifest.middle_length_m])
+        mesh.field_data["thickness_m"] = np.array(
+            [min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)]
+        )
+        mesh.GetFieldData().AddArray(_text("run_name", run.manifest.name))
+        mesh.GetFieldData().AddArray(_text("scene_sha256", run.manifest.scene_sha256))
         mesh.save(self._folder / _file(kind, number))
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.export.bodies import Bodies, solid
 from postprocess.export.colours import colour_field, paint_of, painted, scalars, scale, span
 from postprocess.export.fields import Field
@@ -33,12 +33,12 @@ class Painter:
         bounds: The least and the greatest value of it in all frames.
     """
 
-    run: RunManifest
+    run: Run
     field: Field
     bounds: tuple[float, float]
 
     @classmethod
-    def of(cls, run: RunManifest, color_by: str | None, frames: Iterable[Frame]) -> Self:
+    def of(cls, run: Run, color_by: str | None, frames: Iterable[Frame]) -> Self:
         """One scale for all frames.
 
         Raises:
@@ -55,8 +55,8 @@ class Painter:
     def told(self, frame: Frame) -> dict[str, Any]:
         """What a file tells of itself: plain data."""
         return {
-            "run_name": self.run.name,
-            "scene_sha256": self.run.scene_sha256,
+            "run_name": self.run.manifest.name,
+            "scene_sha256": self.run.manifest.scene_sha256,
             "time_s": frame.time,
             "unit": "m",
             "coloured_by": self.field.name,

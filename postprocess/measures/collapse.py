@@ -17,16 +17,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from dem.errors import InputError
-from dem.record.frames import read_frames
-from dem.record.series import read_series
 from postprocess.geometry.links import centres_of_mass
-from postprocess.scene_file import read_phases
 from postprocess.statistics.averages import mean_with_error
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from dem.record.manifest import PhaseRecord, RunManifest
+    from dem.record.document import Phase
+    from dem.record.run import Run
 
 REMAINING, COM, CORE = "remaining", "com", "core"
 
@@ -69,7 +67,7 @@ class Vibration:
         frequency: f [Hz].
     """
 
-    phase: PhaseRecord
+    phase: Phase
     acceleration: float
     frequency: float
 
@@ -118,7 +116,7 @@ class CollapseTime:
     fall: float
 
 
-def vibration(run: RunManifest) -> Vibration:
+def vibration(run: Run) -> Vibration:
     """Find the first phase of a run that shakes the floor after the wall was taken away.
 
     Raises:
@@ -128,68 +126,68 @@ def vibration(run: RunManifest) -> Vibration:
     after = kinds.index("remove-container") if "remove-container" in kinds else len(kinds)
     found = next((phase for phase in run.phases[after:] if phase.type == "shake"), None)
     if found is None:
-        msg = f"{run.directory}: no shake after a remove-container: its phases are {', '.join(kinds)}"
+        msg = f"{run.path}: no shake after a remove-container: its phases are {', '.join(kinds)}"
         raise InputError(msg)
-    settings = read_phases(run.directory)[found.index]
+    settings = run.scene["phases"][found.index]
     return Vibration(
         phase=found,
-        acceleration=settings.number("peak_acceleration_g"),
-        frequency=settings.number("frequency_hz"),
+        acceleration=settings["peak_acceleration_g"],
+        frequency=settings["frequency_hz"],
     )
 
 
-def column_history(run: RunManifest, definition: str, shaken: Vibration) -> ColumnHistory:
+def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
     """Read the heights of a run's column, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
 
     Raises:
         InputError: The run lacks its series or frames, or samples before the vibration.
     """
     times, heights = _core(run, shaken) if definition == CORE else _of_series(run, definition, shaken)
-    assert shaken.phase.start is not None  # of a finished run
-    times = times - shaken.phase.start
+    assert shaken.phase.start_s is not None  # of a finished run
+    times = times - shaken.phase.start_s
     resting = (times > -REST * (1 + 1e-6)) & (times < 1e-9)
     before = float(heights[resting].mean()) if resting.any() else math.nan
     if not before > 0:
         msg = (
-            f"{run.directory}: no height of the column in the last {REST:g} s before its vibration; record more often, "
+            f"{run.path}: no height of the column in the last {REST:g} s before its vibration; record more often, "
             "or rest longer before"
         )
         raise InputError(msg)
     return ColumnHistory(times=times, heights=heights / before, before=before)
 
 
-def height_with_the_wall(run: RunManifest) -> float:
+def height_with_the_wall(run: Run) -> float:
     """Read the height of the centre of mass when the wall was last there [m].
 
     Raises:
         InputError: The run lacks its series, or samples before its wall went.
     """
-    series = read_series(run.directory)
+    series = run.series
     gone = [phase.type for phase in run.phases].index("remove-container")
     heights = series["com_height_m"][series["phase"] < gone]
     if not len(heights):
-        msg = f"{run.directory}: no height of the column before its wall went; record more often"
+        msg = f"{run.path}: no height of the column before its wall went; record more often"
         raise InputError(msg)
     return float(heights[-1])
 
 
-def _of_series(run: RunManifest, definition: str, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    series = read_series(run.directory)
+def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    series = run.series
     last = shaken.phase.index
     shown = (series["phase"] >= last - 1) & (series["phase"] <= last)
     if definition == REMAINING:
-        heights = 1 - series["outside_count"][shown] / run.count
+        heights = 1 - series["outside_count"][shown] / run.manifest.count
     else:
         heights = np.asarray(series["com_height_m"][shown], dtype=np.float64)
     return series.time[shown], heights
 
 
-def _core(run: RunManifest, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    frames, last = read_frames(run.directory), shaken.phase.index
+def _core(run: Run, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    frames, last = run.frames, shaken.phase.index
     times, heights = [], []
     for frame in (frame for phase in (last - 1, last) for frame in frames.in_phase(phase)):
         centres = centres_of_mass(frame.vertices)
-        within = np.hypot(centres[:, 0], centres[:, 1]) <= run.container_radius
+        within = np.hypot(centres[:, 0], centres[:, 1]) <= run.manifest.container_radius_m
         times.append(frame.time)
         heights.append(max(0.0, float(centres[within, 2].mean() - frame.floor_z)) if within.any() else 0.0)
     return np.array(times), np.array(heights)

@@ -12,7 +12,7 @@ import numpy as np
 
 from dem.errors import InputError, nearest
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.pictures.colouring import COLOURINGS, Colouring
 from postprocess.pictures.surroundings import Surroundings
 
@@ -100,11 +100,11 @@ class Look:
         return np.stack([right, np.cross(right, forward), forward])
 
 
-def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
+def extent(frame: Frame, run: Run, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
     """Points (n, 3) [mm] above the floor that must be in the picture; the floor is at z = 0."""
     points = (frame.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
-    if run.planar:
-        thick = max(run.thicknesses_in_plane) * MILLIMETRE
+    if run.manifest.planar:
+        thick = max(run.manifest.thicknesses_in_plane_m) * MILLIMETRE
         if surroundings.strings is not None:
             strings = surroundings.strings.lines(frame).reshape(-1, 3)
             points = np.concatenate([points, (strings - [0.0, 0.0, frame.floor_z]) * MILLIMETRE])
@@ -114,20 +114,22 @@ def extent(frame: Frame, run: RunManifest, look: Look, surroundings: Surrounding
         upper = circle(surroundings.hooks.length / 2, surroundings.hooks.heights(frame.time)[1])
         points = np.concatenate([points, upper * MILLIMETRE])
     top = _wall_height(float(points[:, 2].max()), run)
-    return np.concatenate([points, circle(run.container_radius * MILLIMETRE, 0.0), rims(top, run, look, surroundings)])
+    return np.concatenate(
+        [points, circle(run.manifest.container_radius_m * MILLIMETRE, 0.0), rims(top, run, look, surroundings)]
+    )
 
 
-def rims(top: float, run: RunManifest, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
+def rims(top: float, run: Run, look: Look, surroundings: Surroundings) -> NDArray[np.float64]:
     """Points (n, 3) [mm] of a wall that is drawn up to `top` [mm]; none in a plane."""
     parts = [np.empty((0, 3))]
-    for radius, height in [] if run.planar else wall_corners(top, run, surroundings)[1:]:
+    for radius, height in [] if run.manifest.planar else wall_corners(top, run, surroundings)[1:]:
         rim = circle(radius, height)
         # The front is cut open.
         parts.append(rim if look.elevation >= 90 else rim[rim @ look.axes[2] > look.axes[2, 2] * height])
     return np.concatenate(parts)
 
 
-def wall_corners(top: float, run: RunManifest, surroundings: Surroundings) -> list[tuple[float, float]]:
+def wall_corners(top: float, run: Run, surroundings: Surroundings) -> list[tuple[float, float]]:
     """Radius and height of the corners of the wall from the floor up [mm]; the highest part ends at `top` [mm].
 
     The top tier of a mould is high enough to pour through; it is cut as well, but not all of it.
@@ -135,24 +137,24 @@ def wall_corners(top: float, run: RunManifest, surroundings: Surroundings) -> li
     corners = [(radius * MILLIMETRE, height * MILLIMETRE) for radius, height in surroundings.corners]
     if corners:
         *below, (radius, height) = corners
-        least = below[-1][1] + run.middle_length * MILLIMETRE / 4
+        least = below[-1][1] + run.manifest.middle_length_m * MILLIMETRE / 4
         return [*below, (radius, min(height, max(top, least)))]
-    radius = run.container_radius * MILLIMETRE
+    radius = run.manifest.container_radius_m * MILLIMETRE
     return [(radius, 0.0), (radius, top)]
 
 
-def channel(points: NDArray[np.float64], run: RunManifest) -> NDArray[np.float64]:
+def channel(points: NDArray[np.float64], run: Run) -> NDArray[np.float64]:
     """(walls, 2, 3) [mm]: the two walls of a plane from above, as long as points (n, 3) [mm] reach; none without."""
-    if run.channel_width is None:
+    if run.manifest.channel_width_m is None:
         return np.empty((0, 2, 3))
-    half, top = run.channel_width * MILLIMETRE / 2, run.thickness_normal * MILLIMETRE
+    half, top = run.manifest.channel_width_m * MILLIMETRE / 2, run.manifest.thickness_normal_m * MILLIMETRE
     ends = points[:, 0].min(), points[:, 0].max()
     return np.array([[[x, side * half, top] for x in ends] for side in (-1, 1)])
 
 
-def _wall_height(top: float, run: RunManifest) -> float:
+def _wall_height(top: float, run: Run) -> float:
     """Height up to which the wall is drawn [mm]: above the pile, in whole quarters of w."""
-    step = run.middle_length * MILLIMETRE / 4
+    step = run.manifest.middle_length_m * MILLIMETRE / 4
     return max(4.0, math.ceil(top / step) + 1.0) * step
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 from dem.errors import InputError
 from dem.record.forces import read_forces
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
 from postprocess.pictures.camera import (
     FIELD_OF_VIEW,
@@ -112,7 +112,7 @@ class Canvas:
 
     def __init__(
         self,
-        run: RunManifest,
+        run: Run,
         look: Look,
         surroundings: Surroundings | None,
         extent: NDArray[np.float64],
@@ -188,8 +188,8 @@ class Canvas:
         """Puts the boxes where they are in a frame; builds them anew only where there are more or fewer."""
         boxes = link_boxes(
             frame.vertices - [0.0, 0.0, frame.floor_z],
-            thickness_normal=self._run.thickness_normal,
-            thickness_in_plane=self._run.thicknesses_in_plane,
+            thickness_normal=self._run.manifest.thickness_normal_m,
+            thickness_in_plane=self._run.manifest.thicknesses_in_plane_m,
         )
         boxes.points *= MILLIMETRE
         boxes.cell_data["colour"] = colours[boxes.cell_data["smarticle"], boxes.cell_data["link"]]
@@ -223,11 +223,13 @@ class Canvas:
         plotter, axes, around = self._plotter, self._axes, self._surroundings
         plotter.set_background("white")
         if around is not None:
-            if self._run.planar:
+            if self._run.manifest.planar:
                 for wall in channel(extent, self._run):
                     self._add_outline(pv.MultipleLines(wall))
             else:
-                self._add_container(around, self._run.container_radius * MILLIMETRE, float(extent[:, 2].max()))
+                self._add_container(
+                    around, self._run.manifest.container_radius_m * MILLIMETRE, float(extent[:, 2].max())
+                )
             if around.hooks is not None:
                 look = {"color": _FIXTURE, "ambient": 0.25, "diffuse": 0.8, "render": False}
                 self._hooks = [plotter.add_mesh(_cross(bars), **look) for bars in around.hooks.bars]
@@ -240,12 +242,12 @@ class Canvas:
         camera.focal_point = tuple(focus)
         camera.up = tuple(axes[1])
         distance = float(np.linalg.norm(position - focus))
-        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + self._run.container_radius * MILLIMETRE
+        reach = float(np.linalg.norm(extent - focus, axis=1).max()) + self._run.manifest.container_radius_m * MILLIMETRE
         camera.clipping_range = (max(distance - reach, distance / 1000), distance + reach)
         if not self._quick:
             plotter.enable_ssao(
-                radius=0.6 * self._run.middle_length * MILLIMETRE,
-                bias=0.4 * self._run.thickness_in_plane * MILLIMETRE,
+                radius=0.6 * self._run.manifest.middle_length_m * MILLIMETRE,
+                bias=0.4 * self._run.manifest.thickness_in_plane_m * MILLIMETRE,
                 kernel_size=64,
                 blur=True,
             )
@@ -275,8 +277,8 @@ class Canvas:
         if not len(strings):
             return
         # A string has no thickness in the simulation: here one that is seen.
-        thick = max(0.06 * self._run.thickness_in_plane * MILLIMETRE, self._pixel)
-        lifted = strings + np.array([0.0, 0.0, self._run.thickness_normal * MILLIMETRE])
+        thick = max(0.06 * self._run.manifest.thickness_in_plane_m * MILLIMETRE, self._pixel)
+        lifted = strings + np.array([0.0, 0.0, self._run.manifest.thickness_normal_m * MILLIMETRE])
         tubes = [pv.Line(*ends).tube(radius=thick) for ends in lifted]
         knots = [pv.Sphere(radius=3 * thick, center=end) for ends in lifted for end in ends]
         mesh = tubes[0].append_polydata(*tubes[1:], *knots)
@@ -288,7 +290,7 @@ class Canvas:
         forces = read_forces(frame)
         if not len(forces.contacts.normal):
             return
-        lines, thickest = force_lines(forces), _THICK * self._run.thickness_in_plane
+        lines, thickest = force_lines(forces), _THICK * self._run.manifest.thickness_in_plane_m
         normal = forces.contacts.normal[lines.cell_data["contact"]]
         tubes = force_tubes(lines, normal, thickest=thickest, largest=largest)
         tubes.points = (tubes.points - [0.0, 0.0, frame.floor_z]) * MILLIMETRE

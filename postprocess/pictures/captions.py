@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 
@@ -28,12 +28,12 @@ class Caption:
     lines: tuple[str, ...]
 
 
-def titles_of(runs: Sequence[RunManifest]) -> list[str]:
+def titles_of(runs: Sequence[Run]) -> list[str]:
     """What pictures of runs beside each other are called: by their names, with their folders where these are alike."""
-    names = [run.name for run in runs]
+    names = [run.manifest.name for run in runs]
     if len(set(names)) == len(names):
         return names
-    folders = [run.directory.resolve() for run in runs]
+    folders = [run.path.resolve() for run in runs]
     # As much of the path as tells them apart: runs of sweeps differ in their last part, others may not.
     depth = 1
     longest = max(len(folder.parts) for folder in folders)
@@ -44,7 +44,7 @@ def titles_of(runs: Sequence[RunManifest]) -> list[str]:
 
 def caption_of(
     frame: Frame,
-    run: RunManifest,
+    run: Run,
     *,
     pace: str = "",
     force: float | None = None,
@@ -61,29 +61,29 @@ def caption_of(
         crossings: Of all smarticles, where they are known already.
         force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
-    count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
+    count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
     when = f"t = {frame.time:.3f} s ({phase})"
-    lines = [f"l/w = {run.aspect_ratio:g}   N = {count}   {when}"]
+    lines = [f"l/w = {run.manifest.aspect_ratio:g}   N = {count}   {when}"]
     if pace:
         lines[0] += f"   {pace}"
-    if not run.planar:  # neither packing nor crossings have a meaning there
+    if not run.manifest.planar:  # neither packing nor crossings have a meaning there
         mean = entanglement(frame.vertices, crossings).mean
         passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {passed}")
     if force is not None:
         lines[-1] += f"   widest line: {1e3 * force:.3g} mN"
-    return Caption(run.name if title is None else title, tuple(lines))
+    return Caption(run.manifest.name if title is None else title, tuple(lines))
 
 
-def packing_text(frame: Frame, run: RunManifest) -> str:
+def packing_text(frame: Frame, run: Run) -> str:
     """φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
     value = packing_of(frame, run, definition=DEFINITION)
     if math.isfinite(value):
         return f"φ = {value:.4f} ({DEFINITION})"
-    if run.container_tiers > 1:
-        return f"no φ: a mould of {run.container_tiers} tiers"
-    if not run.walled(frame.phase):
+    if run.manifest.container_tiers > 1:
+        return f"no φ: a mould of {run.manifest.container_tiers} tiers"
+    if not run.manifest.walled(frame.phase):
         return "no φ: the wall is gone"
     if frame.count < 2:
         return "no φ: fewer than 2 smarticles"

@@ -15,7 +15,7 @@ from matplotlib.colors import ListedColormap, Normalize, hsv_to_rgb
 from matplotlib.ticker import FuncFormatter
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.measures.entanglement import link_crossings
 from postprocess.report import figures
@@ -40,15 +40,15 @@ class Colouring:
 
     label: str
     kind: Literal["count", "value", "name"]
-    values: Callable[[Frame, RunManifest], NDArray[Any]]
+    values: Callable[[Frame, Run], NDArray[Any]]
 
 
-def _height(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
+def _height(frame: Frame, _: Run) -> NDArray[np.float64]:
     return (centres_of_mass(frame.vertices)[:, 2] - frame.floor_z) * 1e3
 
 
-def _speed(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
-    sections = np.array(run.thicknesses_in_plane) / run.thickness_in_plane
+def _speed(frame: Frame, run: Run) -> NDArray[np.float64]:
+    sections = np.array(run.manifest.thicknesses_in_plane_m) / run.manifest.thickness_in_plane_m
     weights = (link_lengths(frame.vertices) * sections)[:, :, None]
     velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
     speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)

@@ -43,7 +43,7 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
         RunError: This machine lacks the libraries to draw without a display.
     """
     frame, run = shot.frames[index], shot.run
-    if run.planar:
+    if run.manifest.planar:
         msg = f"smarticle {smarticle}: in a plane no link passes through another smarticle; draw the whole run"
         raise InputError(msg)
     found = np.flatnonzero(frame.smarticle_ids == smarticle)
@@ -72,14 +72,14 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
     look = Look.checked(color_by="id", size=size, view="front")
     corners = (frame.vertices[own] - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
     points = (part.vertices.reshape(-1, 3) - [0.0, 0.0, frame.floor_z]) * MILLIMETRE
-    thick = run.thickness_normal * MILLIMETRE
+    thick = run.manifest.thickness_normal_m * MILLIMETRE
     links = int(through.sum())
     if has_plane(frame.vertices[own][None])[0]:
         said = f"{links} link{'s' * (links != 1)} of {len(shown) - 1} other{'s' * (len(shown) != 2)} through its plane"
     else:
         said = "straight: it has no plane"
     caption = Caption(
-        f"{run.name}: smarticle {smarticle}",
+        f"{run.manifest.name}: smarticle {smarticle}",
         (
             f"{said}   t = {frame.time:.3f} s ({run.phases[frame.phase].type})",
             "orange: the smarticle, faintly its plane; blue: links through it",

@@ -261,8 +261,8 @@ class _Set:
 
 
 def _look(shots: Sequence[Shot], color_by: str | None, size: tuple[int, int], view: str | None) -> Look:
-    planar = shots[0].run.planar
-    if any(shot.run.planar != planar for shot in shots):
+    planar = shots[0].run.manifest.planar
+    if any(shot.run.manifest.planar != planar for shot in shots):
         msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
         raise InputError(msg)
     return Look.checked(

@@ -12,7 +12,7 @@ import numpy as np
 from dem.errors import InputError
 from dem.record.forces import NO_FORCES, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import RunManifest, read_run
+from dem.record.run import Run, open_run
 from postprocess.pictures.camera import Look, extent, rims
 from postprocess.pictures.surroundings import Surroundings, read_surroundings
 
@@ -27,7 +27,7 @@ Span = tuple[float, float]
 class Shot:
     """A run to be drawn."""
 
-    run: RunManifest
+    run: Run
     frames: FrameSequence = field(repr=False)
     around: Surroundings = field(repr=False)
 
@@ -38,7 +38,7 @@ class Shot:
         Raises:
             InputError: Something of it is missing or damaged.
         """
-        run = read_run(directory)
+        run = open_run(directory)
         return cls(run=run, frames=read_frames(directory), around=read_surroundings(run))
 
     def extent(self, indices: Iterable[int], look: Look) -> NDArray[np.float64]:
@@ -59,8 +59,8 @@ class Shot:
         Raises:
             InputError: The run records no forces.
         """
-        if not has_forces(self.run.directory):
-            msg = f"{self.run.directory}: records no forces to draw; {NO_FORCES}"
+        if not has_forces(self.run.path):
+            msg = f"{self.run.path}: records no forces to draw; {NO_FORCES}"
             raise InputError(msg)
         found = [read_forces(self.frames[int(i)]).contacts.normal.max(initial=0.0) for i in indices]
         return float(max(found)) or 1e-3
@@ -90,9 +90,7 @@ def common_times(shots: Sequence[Shot]) -> NDArray[np.float64]:
     low = max(float(shot.frames.times[0]) for shot in shots)
     high = min(float(shot.frames.times[-1]) for shot in shots)
     if low > high:
-        spans = ", ".join(
-            f"{shot.run.directory} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots
-        )
+        spans = ", ".join(f"{shot.run.path} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots)
         msg = f"the runs have no time in common: {spans}; compare runs that overlap in time"
         raise InputError(msg)
     inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
 from dem.record.names import SERIES
-from dem.record.series import read_series
-from postprocess.scene_file import read_phases
+from dem.record.run import Run
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,7 +62,7 @@ def knots(vertices: NDArray[np.float64], from_hinge: float) -> NDArray[np.float6
     return np.array(points)
 
 
-def read_strings(run: RunManifest) -> ChainStrings | None:
+def read_strings(run: Run) -> ChainStrings | None:
     """The strings of a run's strain test; None where there is no such phase.
 
     They are tied to the chain as it was laid out, so a chain that moved before it was pulled would have them where they
@@ -76,29 +74,34 @@ def read_strings(run: RunManifest) -> ChainStrings | None:
     Source:
         `dem.body.chain.Chain`: how a chain is laid out.
     """
-    phases = {phase.type: phase for phase in read_phases(run.directory)}
+    planned = run.scene["phases"]
+    phases = {phase["type"]: phase for phase in planned}
     if _STRAIN not in phases or _ARRANGE not in phases:
         return None
-    strain, gap = phases[_STRAIN], phases[_ARRANGE].number("gap_m")
-    radius, barb = run.sphere_diameter / 2, run.barb_length
-    offset = barb + gap + run.bulge + radius  # of the two rows of middle links
-    from_hinge = barb - radius if strain.values.get("tied_at") == "tip" else offset / 2
-    reach = ((run.count - 1) * (run.middle_length - 2 * radius - gap) + run.middle_length) / 2
-    length = strain.number("string_length_m", positive=True)
+    index = planned.index(phases[_STRAIN])
+    index = planned.index(phases[_STRAIN])
+    strain, gap = phases[_STRAIN], phases[_ARRANGE]["gap_m"]
+    radius, barb = run.manifest.sphere_diameter_m / 2, run.manifest.barb_length_m
+    offset = barb + gap + run.manifest.bulge_m + radius  # of the two rows of middle links
+    from_hinge = barb - radius if strain.get("tied_at") == "tip" else offset / 2
+    reach = (
+        (run.manifest.count - 1) * (run.manifest.middle_length_m - 2 * radius - gap) + run.manifest.middle_length_m
+    ) / 2
+    length = strain["string_length_m"]
     ends = reach + np.sqrt(length**2 - (from_hinge - offset / 2) ** 2)
     return ChainStrings(
-        phase=strain.index,
-        start=_start(run, strain.index),
-        speed=strain.number("speed_m_per_s"),
+        phase=index,
+        start=_start(run, index),
+        speed=strain["speed_m_per_s"],
         from_hinge=from_hinge,
         anchors=np.array([[-ends, 0.0, 0.0], [ends, 0.0, 0.0]]),
     )
 
 
-def _start(run: RunManifest, index: int) -> float:
+def _start(run: Run, index: int) -> float:
     """Time at which a phase begins [s]: a run that is not done tells it by its series alone."""
-    start = run.phases[index].start
-    if start is None and (run.directory / SERIES).exists():
-        series = read_series(run.directory)
+    start = run.phases[index].start_s
+    if start is None and (run.path / SERIES).exists():
+        series = run.series
         start = float(series.time[series["phase"] < index].max(initial=0.0))
     return start or 0.0

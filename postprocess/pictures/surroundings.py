@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from dem.record.manifest import RunManifest
-from dem.record.names import SERIES
-from dem.record.series import Series, read_series
+from dem.record.run import Run, SceneData
+from dem.record.series import Series
 from postprocess.measures.mould import read_tiers
 from postprocess.pictures.strings import ChainStrings, read_strings
-from postprocess.scene_file import Settings, read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,18 +58,18 @@ class DrawnHooks:
     upper: NDArray[np.float64] = field(repr=False)
 
     @classmethod
-    def of(cls, settings: Settings, series: Series | None) -> Self:
+    def of(cls, settings: SceneData, series: Series | None) -> Self:
         """Hooks of a scene; without a series the upper one is drawn where it started."""
-        times, upper = np.zeros(1), np.array([settings.number("upper_height_m")])
+        times, upper = np.zeros(1), np.array([settings["upper_height_m"]])
         if series is not None:
             times, upper = series.time, series["hook_upper_z_m"] - series["container_z_m"]
         return cls(
-            side=settings.number("side_m"),
-            length=settings.number("length_m"),
+            side=settings["side_m"],
+            length=settings["length_m"],
             # Older scenes have two crosses alike, and do not say so.
-            lower_length=settings.number("lower_length_m" if "lower_length_m" in settings.values else "length_m"),
-            lower_bars=round(settings.number("lower_bars")) if "lower_bars" in settings.values else 1,
-            lower=settings.number("lower_height_m"),
+            lower_length=settings["lower_length_m" if "lower_length_m" in settings else "length_m"],
+            lower_bars=round(settings["lower_bars"]) if "lower_bars" in settings else 1,
+            lower=settings["lower_height_m"],
             times=times,
             upper=upper,
         )
@@ -144,32 +142,32 @@ class Surroundings:
         return raised if raised <= top else None
 
 
-def read_surroundings(run: RunManifest) -> Surroundings:
+def read_surroundings(run: Run) -> Surroundings:
     """What the scene of a run says of its container and hooks, and where the series says that they are.
 
     Raises:
         InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
     """
-    scene = read_scene(run.directory)
-    series = read_series(run.directory) if (run.directory / SERIES).exists() else None
-    hooks = scene.part("hooks")
+    scene = run.scene
+    series = run.series if run.has_series else None
+    hooks = scene.get("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
     return Surroundings(
-        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run.directory)),
+        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
         removed=removed,
-        lift=None if removed is None else _lift(run, scene.parts("phases")[removed], series, removed),
+        lift=None if removed is None else _lift(run, scene["phases"][removed], series, removed),
         hooks=None if hooks is None else DrawnHooks.of(hooks, series),
-        strings=read_strings(run) if run.planar else None,
+        strings=read_strings(run) if run.manifest.planar else None,
     )
 
 
-def _lift(run: RunManifest, phase: Settings, series: Series | None, index: int) -> Lift | None:
-    if phase.values.get("speed_m_per_s") is None:
+def _lift(run: Run, phase: SceneData, series: Series | None, index: int) -> Lift | None:
+    if phase.get("speed_m_per_s") is None:
         return None
-    start = run.phases[index].start
+    start = run.phases[index].start_s
     if start is None:
         # Not done yet: the phase began with the last sample of the one before.
         if series is None:
             return None
         start = float(series.time[series["phase"] < index].max(initial=0.0))
-    return Lift(start=start, end=start + phase.number("duration_s"), speed=phase.number("speed_m_per_s"))
+    return Lift(start=start, end=start + phase["duration_s"], speed=phase["speed_m_per_s"])

@@ -45,7 +45,9 @@ def turntable(directory: Path | str, *, views: int = VIEWS_AROUND, color_by: str
     shot = Shot.of(directory)
     index = len(shot.frames) - 1
     frame = shot.frames[index]
-    named = Look.checked(color_by=color_by or ("id" if shot.run.planar else "crossings"), size=_SIZE, view="front")
+    named = Look.checked(
+        color_by=color_by or ("id" if shot.run.manifest.planar else "crossings"), size=_SIZE, view="front"
+    )
     looks = [
         replace(named, azimuth=VIEWS["front"][0] + 360.0 * number / views, elevation=_ELEVATION)
         for number in range(views)

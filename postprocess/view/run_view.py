@@ -11,7 +11,6 @@ import numpy as np
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import read_run
 from dem.record.run import open_run
 from postprocess.export.bodies import KINDS, ON_REQUEST, Bodies
 from postprocess.export.colours import colour_field, painted, scalars, scale, span
@@ -47,7 +46,7 @@ class RunView:
     """
 
     def __init__(self, directory: Path | str) -> None:
-        self.run = read_run(directory)
+        self.run = open_run(directory)
         self.frames: FrameSequence = read_frames(directory)
         frame = self.frames[-1]
         self.fields = tuple(
@@ -89,7 +88,7 @@ class RunView:
 
     def grow(self) -> bool:
         """Look for new frames; whether there are any."""
-        frames = read_frames(self.run.directory)
+        frames = read_frames(self.run.path)
         grown = len(frames) > len(self.frames)
         self.frames = frames
         return grown
@@ -128,7 +127,7 @@ class RunView:
 
     def look(self) -> None:
         """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
-        if self.run.planar:
+        if self.run.manifest.planar:
             self.window.look_from((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
         else:
             self.window.look_from((0.0, -1.0, 0.35), (0.0, 0.0, 1.0))

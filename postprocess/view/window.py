@@ -9,7 +9,7 @@ import pyvista as pv
 from matplotlib.colors import to_rgb
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.export.bodies import solid
 from postprocess.export.colours import PAINTS
 from postprocess.pictures.camera import FIELD_OF_VIEW, MILLIMETRE
@@ -27,7 +27,7 @@ class Window:
         run: The run.
     """
 
-    def __init__(self, run: RunManifest) -> None:
+    def __init__(self, run: Run) -> None:
         self._run = run
         self.vtk = vtkRenderWindow()
         self._renderer = vtkRenderer()

@@ -74,7 +74,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
     import pandas as pd  # noqa: PLC0415
 
-    from dem.record.run import open_run  # noqa: PLC0415
+    from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -102,7 +102,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
-        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
+        rings = pd.concat([profile_table(Run(directory)) for directory in directories], ignore_index=True)
         write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.plan.steps import time_steps
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
 from studies.framework.runs import ENGINE, MeasuredRun, Row
@@ -95,7 +95,7 @@ def _origins(path: Path) -> dict[str, Mapping[str, Any]]:
         raise InputError(msg) from None
 
 
-def _manifest(run: Wanted, origin: Mapping[str, Any]) -> RunManifest:
+def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
     """What the run said of itself, as far as scene and provenance tell."""
     scene = load_scene(run.scene)
     versions = dict(origin["versions"])
@@ -107,7 +107,7 @@ def _manifest(run: Wanted, origin: Mapping[str, Any]) -> RunManifest:
         made_by=(scene.engine, versions.get(scene.engine, "unknown")),
         threads=1,
     )
-    found = RunManifest(Path(origin["directory"]))
+    found = Run(Path(origin["directory"]))
     # Its directory is not here.
     vars(found)["manifest"] = made.model_copy(update={"started": origin["started"], "versions": versions})
     return found

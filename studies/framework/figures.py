@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.points import marked
 from studies.framework import plots
@@ -32,7 +32,7 @@ class Analysis:
     """
 
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
-    manifests: Mapping[str, RunManifest] = field(repr=False)
+    manifests: Mapping[str, Run] = field(repr=False)
     footer: Sequence[str]
 
     @property
@@ -206,7 +206,7 @@ class Histories:
     """
 
     name: str
-    history: Callable[[RunManifest], History]
+    history: Callable[[Run], History]
     split: Split
     x_label: str
     y_label: str

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.seeds import SeedMean
 from studies.framework.runs import DEFINITION
@@ -30,7 +30,7 @@ BY_RANKS = "mean over seeds of the rank correlation of peak force and ⟨N⟩ > 
 """Criterion by which the force that tears a pile goes with its entanglement."""
 
 
-def prepared_by(run: RunManifest, *then: str) -> str:
+def prepared_by(run: Run, *then: str) -> str:
     """The procedure of a run: a pour, a rest, one activity with a rest of its own or none, and then some phases.
 
     Args:
@@ -44,7 +44,7 @@ def prepared_by(run: RunManifest, *then: str) -> str:
     active = [kind for kind in types if kind in PROCEDURES]
     if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
         msg = (
-            f"{run.directory}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
+            f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
             f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
         )
         raise InputError(msg)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dem.errors import InputError
+from dem.record.document import Phase
 from dem.record.frame import Frame
-from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import PhaseRecord, RunManifest
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 from postprocess.measures.table import PASSIVE_PHASES
 from postprocess.pictures import strip
 from postprocess.statistics.columns import ASPECT, SEED
@@ -22,7 +23,7 @@ ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 _REMOVAL = "remove-container"
 
 
-def removal(run: RunManifest) -> PhaseRecord:
+def removal(run: Run) -> Phase:
     """Find the phase that takes the wall away.
 
     Raises:
@@ -31,26 +32,26 @@ def removal(run: RunManifest) -> PhaseRecord:
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.directory}: does not end with a rest and {_REMOVAL}: its phases are {types}"
+        msg = f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}"
         raise InputError(msg)
     return last
 
 
-def around(run: RunManifest) -> tuple[Frame, FrameSequence]:
+def around(run: Run) -> tuple[Frame, FrameSequence]:
     """Read the last frame with the wall, and all those since it began to go.
 
     Raises:
         InputError: There are none.
     """
-    phase, frames = removal(run), read_frames(run.directory)
+    phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
-        msg = f"{run.directory}: no frame of the rest before {_REMOVAL} or of that phase; run it again"
+        msg = f"{run.path}: no frame of the rest before {_REMOVAL} or of that phase; run it again"
         raise InputError(msg)
     return rest[len(rest) - 1], after
 
 
-def named_columns(run: RunManifest) -> dict[str, object]:
+def named_columns(run: Run) -> dict[str, object]:
     """Cells of the columns that tell a run from others.
 
     Raises:
@@ -58,14 +59,14 @@ def named_columns(run: RunManifest) -> dict[str, object]:
     """
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
-        msg = f"{run.directory}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
+        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
         raise InputError(msg)
     return {
         PROCEDURE: PROCEDURES[active[0]] if active else STATIC,
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
     }
 
 
@@ -96,12 +97,10 @@ class Pictures:
             if not names:
                 continue
             run = analysis.manifests[names[0]]
-            start, end = removal(run).start, run.end_time
+            start, end = removal(run).start_s, run.status.time_s
             if start is not None and end is not None:
                 last = end if self.after is None else start + self.after
-                rows.append(
-                    strip.Row(directory=run.directory, label=label, times=(around(run)[0].time, start + 0.1, last))
-                )
+                rows.append(strip.Row(directory=run.path, label=label, times=(around(run)[0].time, start + 0.1, last)))
         if not rows:
             return []
         columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")

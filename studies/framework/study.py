@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
@@ -105,7 +105,7 @@ class Study:
 
     name: str
     title: str
-    measure: Callable[[RunManifest], Row | Sequence[Row] | MeasuredRun]
+    measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]
     quantities: Sequence[Quantity]
     findings: Sequence[Finding]
@@ -161,7 +161,7 @@ class Study:
         lines = self.text(tables, judged, table_lines(header, rows))
         files = dict(origin.write(output, footer, tables=tables, text=(TEXT, lines)))
         below = origin.below_figures(f"{self._seeds(tables)}.", TEXT)
-        analysis = Analysis(tables=tables, manifests={run.directory.name: run for run in manifests}, footer=below)
+        analysis = Analysis(tables=tables, manifests={run.path.name: run for run in manifests}, footer=below)
         files |= {path.name: path for path in self.draw(output, analysis)}
         return Report(
             header=header,
@@ -179,7 +179,7 @@ class Study:
             output=output,
         )
 
-    def measured(self, run: RunManifest) -> MeasuredRun:
+    def measured(self, run: Run) -> MeasuredRun:
         """Measure one finished run."""
         measured = self.measure(run)
         if isinstance(measured, MeasuredRun):
@@ -193,13 +193,13 @@ class Study:
             InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
         """
         found.refuse_mixture(
-            "fidelity", lambda run: run.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
+            "fidelity", lambda run: run.manifest.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
         )
         if self.one_engine:
-            found.refuse_mixture("engine", lambda run: run.manifest.engine)
+            found.refuse_mixture("engine", lambda run: run.manifest.manifest.engine)
         found.refuse_mixture(
             "count",
-            lambda run: f"{run.manifest.count} smarticles",
+            lambda run: f"{run.manifest.manifest.count} smarticles",
             within=partial(_values, columns=self.same_count),
         )
         for column, within in self.constant.items():

@@ -9,7 +9,8 @@ import handover_cases
 import numpy as np
 import pytest
 
-from postprocess import measure_run, read_frames, read_series, summarise_run
+from dem.record.run import Run
+from postprocess import measure_run, read_frames, summarise_run
 
 PHASES = ["deposit", "relax", "shake", "internal-oscillation"]
 SCENE: dict[str, Any] = {
@@ -66,7 +67,8 @@ def test_frames_hold_the_engine_s_numbers_to_the_bit(handed: tuple[Path, list[di
 
 def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]]) -> None:
     out, notes = handed
-    said, table, series = {note["time"]: note for note in notes}, measure_run(out, costly="never"), read_series(out)
+    run, said = Run(out), {note["time"]: note for note in notes}
+    table, series = measure_run(run, costly="never"), run.series
     for _, row in table.iterrows():
         note = said[row["time [s]"]]
         # Hinges give way by a little, and vertices stand for both links that meet there.
@@ -76,6 +78,6 @@ def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]
         assert row["kinetic energy [J]"] == note["kinetic_energy"]
         phi = series["packing_fraction"][series.nearest(row["time [s]"])]
         assert row["phi second-highest-com [-]"] == pytest.approx(phi, rel=near)
-    summary = summarise_run(out, costly="never")
+    summary = summarise_run(Run(out), costly="never")
     assert summary["phase type"].tolist() == PHASES
     assert summary["phi second-highest-com [-]"].gt(0).all()

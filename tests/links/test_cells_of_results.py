@@ -20,7 +20,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from studies.framework.runs import DEFINITION
@@ -139,7 +139,7 @@ def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, obje
     assert done.returncode == 0, done.stderr
     study = shipped(table).load(quick=False)
     measured = study.measured if isinstance(study, Study) else study.measure
-    return measured(read_run(out)).rows[0]
+    return measured(open_run(out)).rows[0]
 
 
 @pytest.mark.parametrize(("table", "run"), CELLS)

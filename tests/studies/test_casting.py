@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from synthetic.released import stack, write_released
 
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from postprocess.measures.mould import read_tiers
 from studies.casting import (
     FILLED,
@@ -44,7 +44,7 @@ def crossed(count: int) -> NDArray[np.float64]:
 
 
 def row_of(directory: Path) -> dict[str, Any]:
-    return dict(STUDY.measured(read_run(directory)).row)
+    return dict(STUDY.measured(open_run(directory)).row)
 
 
 def test_a_run_tells_what_each_tier_holds_before_and_after(tmp_path: Path) -> None:
@@ -82,4 +82,4 @@ def test_piles_without_a_mould_are_listed_and_others_judged(tmp_path: Path, monk
     assert "a mould has 3 tiers and a neck: container.tiers has 0" in report.missing[0].cause
     assert {one.finding.id: one.verdict for one in report.judged}["internal-fills"] == "no data"
     assert {"tiers.png", "overlap.png", "pictures.png"} <= set(report.files)
-    assert [(tier.radius, tier.bottom) for tier in read_tiers(runs[0])][:2] == [(0.012, 0.0), (0.0108, 0.006)]
+    assert [(tier.radius, tier.bottom) for tier in read_tiers(Run(runs[0]))][:2] == [(0.012, 0.0), (0.0108, 0.006)]

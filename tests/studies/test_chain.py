@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from synthetic.strained import WIDTH, write_strained_run
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.measures.strain import AT_PEAK, BEND, DROP, FRACTURE, PEAK, QUANTITIES, STIFFNESS, WIDENING, YIELD
 from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import marked
@@ -59,7 +59,7 @@ def test_of_bodies_confinement_tells_where_walls_are(tmp_path: Path, monkeypatch
     content |= {"middle_thickness_in_plane_m": 0.021, "channel_width_m": 0.8 * content["channel_width_m"]}
     (run / "run.json").write_text(json.dumps(content))
     monkeypatch.setattr("studies.chain.PAPER_WIDTH", 0.8 * WIDTH)
-    row: dict[str, Any] = dict(STUDY.measured(read_run(run)).row)
+    row: dict[str, Any] = dict(STUDY.measured(open_run(run)).row)
     assert row[CONFINEMENT] == 0.52
 
 

@@ -12,7 +12,7 @@ import pytest
 from synthetic.columns import H0, PHASES, WITH_WALL, Column, F, write_column
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest, read_run
+from dem.record.run import Run, open_run
 from postprocess.measures.collapse import COM, CORE, HEIGHTS, REMAINING, column_history, period_means, vibration
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from studies.collapse import (
@@ -43,11 +43,11 @@ def tau(delta: float, gamma: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory: pytest.TempPathFactory) -> RunManifest:
-    return read_run(write_column(tmp_path_factory.mktemp("one") / "run", Column(tau=0.8, beta=0.8)))
+def one(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return open_run(write_column(tmp_path_factory.mktemp("one") / "run", Column(tau=0.8, beta=0.8)))
 
 
-def test_each_height_is_one_before_and_falls_as_it_was_made_to(one: RunManifest) -> None:
+def test_each_height_is_one_before_and_falls_as_it_was_made_to(one: Run) -> None:
     shaken = vibration(one)
     assert (shaken.acceleration, shaken.frequency, shaken.phase.index) == (2.5, F, 4)
     before = {REMAINING: 1.0, COM: H0, CORE: H0}
@@ -59,7 +59,7 @@ def test_each_height_is_one_before_and_falls_as_it_was_made_to(one: RunManifest)
         assert history.heights[-1] == pytest.approx(end, abs=0.02)
 
 
-def test_each_definition_gives_its_own_time(one: RunManifest) -> None:
+def test_each_definition_gives_its_own_time(one: Run) -> None:
     rows = pd.DataFrame(measure(one)).set_index(DEFINITION)
     # Whole smarticles leave, of 50, and frames are 0.1 s apart.
     assert rows[TIME].tolist() == pytest.approx([0.8, 0.4, 0.4], rel=0.02)

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from studies.contacts import (
     CALLED,
@@ -141,8 +141,10 @@ def test_from_runs_to_effects(tmp_path: Path) -> None:
 
 def test_the_lowest_tenth_rises_by_what_the_piles_height_makes_it(tmp_path: Path) -> None:
     run = SyntheticRun(packing=(0.100, 0.105, 0.090, 0.100), floor_z=0.003)
-    manifest = read_run(write_run(tmp_path / "run", run))
+    manifest = open_run(write_run(tmp_path / "run", run))
     # Heights are shares of that of the pile; of twelve smarticles one is a tenth. Frames scatter by 0.2 % of φ.
     before = np.mean([run.height(0.105 * (1 + shift)) for shift in (0.002, -0.002)])
     after = run.height(0.090 * (1 - 0.002))
-    assert risen(manifest) == pytest.approx(run.shares()[0] * (after - before) / manifest.middle_length, rel=1e-5)
+    assert risen(manifest) == pytest.approx(
+        run.shares()[0] * (after - before) / manifest.manifest.middle_length_m, rel=1e-5
+    )

@@ -15,7 +15,7 @@ from synthetic import SyntheticRun, write_run
 from synthetic.shapes import RADIUS, W
 
 from dem.errors import InputError
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.finite_size import (
@@ -138,14 +138,14 @@ def write(folder: Path, *, ratio: float = 0.7, count: int = 12, seed: int = 1, *
 
 def test_measures_are_those_put_in(tmp_path: Path) -> None:
     directory = write(tmp_path, count=60, frames_per_phase=40)
-    row: dict[str, Any] = dict(measure(read_run(directory)))  # type: ignore[arg-type]
+    row: dict[str, Any] = dict(measure(open_run(directory)))  # type: ignore[arg-type]
     # The last frame of a phase is 0.2 % beside its φ, to one side or the other.
     assert row[phi(BEFORE)] == pytest.approx(0.11, rel=0.003)
     assert row[phi(AFTER)] == pytest.approx(0.14, rel=0.003)
     assert row[MOVING] == pytest.approx(0.15, rel=0.003)
     assert row[RADIUS_OVER_W] == pytest.approx(RADIUS / W)
     assert row["escaped at the end [-]"] == 0
-    every = summarise_run(directory, last=1, definitions=["voxel"], phases={1, 3}).set_index("phase")
+    every = summarise_run(Run(directory), last=1, definitions=["voxel"], phases={1, 3}).set_index("phase")
     for stage, phase in ((BEFORE, 1), (AFTER, 3)):
         there = every.loc[phase]
         assert row[crossings(stage)] == there["crossings mean [-]"] > 0
@@ -158,7 +158,7 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
 def test_runs_of_other_studies_are_none_of_this_one(tmp_path: Path) -> None:
     other = write_run(tmp_path / "other", SyntheticRun(phases=("deposit", "shake", "relax")))
     with pytest.raises(InputError, match="its phases are deposit, shake, relax, not deposit, relax, shake, relax"):
-        measure(read_run(other))
+        measure(open_run(other))
 
 
 def test_the_study_writes_its_tables_and_figures(tmp_path: Path) -> None:

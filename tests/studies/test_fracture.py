@@ -13,7 +13,7 @@ from synthetic import SyntheticRun, W
 from synthetic.hooked import AFTER_REST, UPPER, weight, write_hooked_run
 from synthetic.hooked import HELD as GOES_ON
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.fracture import (
@@ -56,7 +56,7 @@ def write(directory: Path, procedure: str, **changes: Any) -> Path:
 
 
 def row_of(directory: Path) -> dict[str, Any]:
-    return dict(STUDY.measured(read_run(directory)).row)
+    return dict(STUDY.measured(open_run(directory)).row)
 
 
 def test_measures_are_those_put_in(tmp_path: Path) -> None:

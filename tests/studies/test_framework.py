@@ -11,7 +11,7 @@ import pytest
 from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import mean
@@ -24,17 +24,17 @@ ORIGIN = {"note": "the full study as shipped", "command": "smarticles study toy 
 LEVEL = Quantity(column="level [m]", label="level [mm]", form=".1f", scale=1e3, meaning="a level")
 
 
-def measure(run: RunManifest) -> Row:
-    if run.name == "odd":
-        msg = f"{run.directory}: is odd"
+def measure(run: Run) -> Row:
+    if run.manifest.name == "odd":
+        msg = f"{run.path}: is odd"
         raise InputError(msg)
     return {
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "level [m]": 1e-3 * run.seed,
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "level [m]": 1e-3 * run.manifest.seed,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 

@@ -15,7 +15,7 @@ from synthetic import SyntheticRun
 from synthetic.hooked import UPPER, weight, write_hooked_run
 from synthetic.shapes import W
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import ASPECT, SEED
 from studies import landscape
@@ -93,7 +93,7 @@ def write(
 
 
 def row_of(directory: Path) -> dict[str, Any]:
-    return dict(measure(read_run(directory)))
+    return dict(measure(open_run(directory)))
 
 
 def test_measures_are_those_put_in(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from synthetic.released import stack, write_released
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.measures.spread import centre_of_mass
 from studies.framework.runs import MeasuredRun
 from studies.melting import BASE, CONTACT, HEIGHT, LIFT, OFFSET, SINCE, SLOUGHED, SPREAD, STUDY, TILT, TOPPLED
@@ -40,7 +40,7 @@ def fallen(pile: Pile) -> Pile:
 
 
 def measured(directory: Path) -> MeasuredRun:
-    return STUDY.measured(read_run(directory))
+    return STUDY.measured(open_run(directory))
 
 
 def test_a_run_is_measured_against_time_from_when_the_wall_went(tmp_path: Path) -> None:

@@ -213,8 +213,7 @@ def write_manifest(directory: Path, run: SyntheticRun, **more: Any) -> None:
         engine="yade",
         phases=tuple(Phase(index=k, type=kind, time_step_s=1e-5) for k, kind in enumerate(run.phases)),
     )
-    known = {next(key for key in Manifest.model_fields if key in (name, f"{name}_m")): more[name] for name in more}
-    manifest.model_copy(update=known).write(directory / "run.json")
+    Manifest(**{**dict(manifest), **more}).write(directory / "run.json")
 
 
 def _write_scene(directory: Path, run: SyntheticRun) -> None:

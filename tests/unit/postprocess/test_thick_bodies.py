@@ -16,7 +16,7 @@ from dem.body.chain import Chain
 from dem.body.particle import HINGE_CLEARANCE, INWARDS, Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from dem.scene.reading import dump_scene
 from postprocess.geometry import chains
 from postprocess.measures.contacts import chain_of
@@ -50,8 +50,8 @@ def run(tmp_path: Path) -> Path:
     state = State.rigid(robot(), poses.positions, turns, np.zeros((2, 3)), np.zeros((2, 3)))
     made = SyntheticRun(count=2, phases=("relax", "strain"), frames_per_phase=1, packing=(0.1, 0.1))
     write_run(tmp_path, made)
-    size = {"middle_length": W, "barb_length": L, "sphere_diameter": BARB, "thickness_normal": T1}
-    size |= {"thickness_in_plane": BARB, "middle_thickness_in_plane": BODY}
+    size = {"middle_length_m": W, "barb_length_m": L, "sphere_diameter_m": BARB, "thickness_normal_m": T1}
+    size |= {"thickness_in_plane_m": BARB, "middle_thickness_in_plane_m": BODY}
     write_manifest(tmp_path, made, planar=True, **size)
     scene = chain({"phases.0.gap_m": 0.001, "phases.1.tied_at": "axis"})
     (tmp_path / "scene.yaml").write_text(dump_scene(scene))
@@ -84,7 +84,7 @@ def test_spheres_are_where_the_simulator_puts_them(angles: tuple[float, float], 
     boxes = robot(angles)
     particle = Particle(boxes, SphereChain(rows=1, diameter=BARB, pitch=pitch * BARB))
     turn = Rotation.from_euler("xyz", [0.3, -1.1, 2.0]).as_matrix()
-    known = chain_of(read_run(run))
+    known = chain_of(open_run(run))
     chain = chains.Chain(
         diameter=known.diameter, rows=known.rows, width=known.width, pitch=pitch * BARB, bulge=known.bulge
     )

@@ -9,7 +9,7 @@ from synthetic import SyntheticRun
 from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 
 from dem.errors import InputError
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from dem.record.series import read_series
 from postprocess.measures.pull import (
     FREE,
@@ -40,7 +40,7 @@ def pulled(tmp_path):
 
     def make(force):
         directory = write_hooked_run(tmp_path / "run", synthetic(), force)
-        return read_pull(read_run(directory), read_series(directory), 2)
+        return read_pull(open_run(directory), read_series(directory), 2)
 
     return make
 
@@ -102,5 +102,5 @@ def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
             file[name] = values
             file[name].attrs.update(attributes)
     with pytest.raises(InputError, match=r"series\.h5: no force of a hook throughout phase 2 of"):
-        read_pull(read_run(directory), read_series(directory), 2)
-    assert "hook work [J]" not in summarise_run(directory).columns
+        read_pull(open_run(directory), read_series(directory), 2)
+    assert "hook work [J]" not in summarise_run(Run(directory)).columns

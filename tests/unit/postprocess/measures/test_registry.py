@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from synthetic import SyntheticRun, write_run
 
+from dem.record.run import Run
 from postprocess import measure_run, measures, summarise_run
 from postprocess.measures.registry import registered
 
@@ -19,7 +20,7 @@ MEASURES = (
         name="newest",
         place=53,
         quantities=(Quantity("newest height", "m"), Quantity("{other}", "-")),
-        take=lambda frame, run: (frame.vertices[..., 2].max(), float(run.count)),
+        take=lambda frame, run: (frame.vertices[..., 2].max(), float(run.manifest.count)),
     ),
 )
 """
@@ -41,15 +42,15 @@ def add_measure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_a_new_file_is_a_new_measure_in_every_table(tmp_path: Path, add_measure) -> None:
     run = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=2))
-    before = list(measure_run(run, costly="never").columns)
+    before = list(measure_run(Run(run), costly="never").columns)
     add_measure("newest share")
-    table = measure_run(run, costly="never")
+    table = measure_run(Run(run), costly="never")
     new = ["newest height [m]", "newest share [-]"]
     at = before.index("rattlers [-]") + 1
     assert list(table.columns) == [*before[:at], *new, *before[at:]]
     assert (table["newest share [-]"] == 12).all()
     assert table["newest height [m]"].gt(0).all()
-    assert "newest height SE [m]" in summarise_run(run, costly="never")
+    assert "newest height SE [m]" in summarise_run(Run(run), costly="never")
 
 
 def test_columns_that_are_there_already_are_refused(add_measure) -> None:

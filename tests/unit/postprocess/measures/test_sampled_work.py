@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from dem.record.frames import FrameSequence
-from postprocess.measures import motors
 from postprocess.measures.motors import MEASURES, sampled, sampled_work
 
 
@@ -62,8 +61,7 @@ class Swinging(FrameSequence):
 def test_every_beginning_within_the_first_tenth_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     times = np.arange(13) * 0.025
     swinging = Swinging(times, tuple(Path(f"{k}.vtu") for k in range(13)))
-    monkeypatch.setattr(motors, "read_frames", lambda _: swinging)
-    first, least, most = MEASURES[0].take(SimpleNamespace(directory=Path()), None, 2)  # type: ignore[arg-type]
+    first, least, most = MEASURES[0].take(SimpleNamespace(frames=swinging), None, 2)  # type: ignore[arg-type]
     # Samples at 0, 0.1, 0.2, 0.3: 0.2 rad each against 1.1, 1.2, 1.3 N m; from 0.025 on there are two ways only.
     assert first == pytest.approx(0.2 * (1.1 + 1.2 + 1.3))
     assert most == pytest.approx(first)

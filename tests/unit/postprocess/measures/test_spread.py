@@ -20,7 +20,7 @@ from postprocess.measures.spread import (
 )
 
 W = 0.0117
-RUN = SimpleNamespace(sphere_diameter=1.2e-3, container_radius=0.0234, middle_length=W)
+RUN = SimpleNamespace(manifest=SimpleNamespace(sphere_diameter_m=1.2e-3, container_radius_m=0.0234, middle_length_m=W))
 
 
 def line(start, end):
@@ -80,7 +80,7 @@ def test_a_column_that_fell_over_its_edge_has_toppled_and_one_that_spread_has_no
 
 
 def test_what_lies_beyond_the_former_wall_came_off():
-    edge = RUN.container_radius + OUTSIDE * W
+    edge = RUN.manifest.container_radius_m + OUTSIDE * W
     inside = [line([x, 0, 0], [x, 0, 0.01]) for x in (0.0, 0.01, edge - 1e-4)]
     outside = [line([0, y, 0], [0, y, 0.01]) for y in (edge + 1e-4,)]
     pile = np.array(inside + outside)

@@ -14,7 +14,7 @@ from synthetic.forces import pressed, write_forces
 from dem.errors import InputError
 from dem.record.forces import read_forces
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.export.export import export_run
 from postprocess.export.fields import BY_NAME, fields_of
 from postprocess.geometry.links import centres_of_mass
@@ -85,7 +85,7 @@ def test_an_export_has_lines_with_their_forces(row: Path, tmp_path: Path) -> Non
 
 
 def test_fields_tell_what_presses_each_and_its_chain(row: Path) -> None:
-    run, frame = read_run(row), read_frames(row)[0]
+    run, frame = open_run(row), read_frames(row)[0]
     assert {"normal_force_N", "force_chain"} <= {field.name for field in fields_of(run)}
     assert BY_NAME["normal_force_N"].take(frame, run) == pytest.approx([5e-3, 8e-3, 1e-3])
     assert BY_NAME["force_chain"].take(frame, run).tolist() == [0, 0, 1]
@@ -97,4 +97,4 @@ def test_a_run_that_records_none_says_how_to(tmp_path: Path) -> None:
         render_run(run, forces=True)
     with pytest.raises(InputError, match=r"records no forces; .*recording.contact_forces: true"):
         export_run(run, to="vtp", wanted=["forces"])
-    assert not {"normal_force_N", "force_chain"} & {field.name for field in fields_of(read_run(run))}
+    assert not {"normal_force_N", "force_chain"} & {field.name for field in fields_of(open_run(run))}

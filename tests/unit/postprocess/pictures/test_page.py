@@ -11,7 +11,7 @@ from synthetic.shapes import bent
 
 from dem.errors import InputError
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from postprocess import measure_run
 from postprocess.pictures.camera import Look
 from postprocess.pictures.captions import Caption, caption_of, packing_text, titles_of
@@ -39,8 +39,8 @@ def one(directory, vertices, **told):
 
 def test_phi_of_a_picture_is_that_of_measure(tmp_path):
     run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=2, floor_z=-0.003))
-    frames, manifest = read_frames(run), read_run(run)
-    table = measure_run(run, costly="never")
+    frames, manifest = read_frames(run), open_run(run)
+    table = measure_run(Run(run), costly="never")
     for number, frame in enumerate(frames):
         expected = table["phi second-highest-com [-]"][number]
         assert packing_text(frame, manifest) == f"φ = {expected:.4f} (second-highest-com)"
@@ -49,7 +49,7 @@ def test_phi_of_a_picture_is_that_of_measure(tmp_path):
 def test_runs_of_one_name_beside_each_other_are_told_apart_by_their_folders(tmp_path):
     def runs(*names, name="pile"):
         made = SyntheticRun(count=2, frames_per_phase=1, name=name)
-        return [read_run(write_run(tmp_path / folder, made)) for folder in names]
+        return [open_run(write_run(tmp_path / folder, made)) for folder in names]
 
     a, b = runs("runs/a", "runs/b")
     assert titles_of([a, b]) == ["pile (a)", "pile (b)"]
@@ -57,7 +57,7 @@ def test_runs_of_one_name_beside_each_other_are_told_apart_by_their_folders(tmp_
     assert titles_of([a, *runs("c", name="other")]) == ["pile", "other"]
     assert titles_of(runs("one/x", "two/x")) == ["pile (one/x)", "pile (two/x)"]
     assert titles_of([a, a]) == ["pile (a)", "pile (a)"]
-    assert caption_of(read_frames(a.directory)[-1], a, title="pile (a)").title == "pile (a)"
+    assert caption_of(read_frames(a.path)[-1], a, title="pile (a)").title == "pile (a)"
 
 
 def test_a_picture_without_phi_says_why(tmp_path):
@@ -68,18 +68,18 @@ def test_a_picture_without_phi_says_why(tmp_path):
         for name in ("run.json", "done.json"):
             content = json.loads((run / name).read_text())
             (run / name).write_text(json.dumps(content).replace(old, new))
-        return packing_text(frame, read_run(run))
+        return packing_text(frame, open_run(run))
 
     assert said('"shake"', '"remove-container"') == "no φ: the wall is gone"
     assert said('"container_tiers": 1', '"container_tiers": 3') == "no φ: a mould of 3 tiers"
     alone = one(tmp_path / "b", u_shape(0.7 * W)[None] + np.array([0, 0, 0.002]))
-    assert packing_text(read_frames(alone)[0], read_run(alone)) == "no φ: fewer than 2 smarticles"
-    assert measure_run(alone, costly="never")["phi second-highest-com [-]"].isna().all()
+    assert packing_text(read_frames(alone)[0], open_run(alone)) == "no φ: fewer than 2 smarticles"
+    assert measure_run(Run(alone), costly="never")["phi second-highest-com [-]"].isna().all()
 
 
 def test_a_film_tells_its_pace(tmp_path):
     run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1))
-    frame, manifest = read_frames(run)[0], read_run(run)
+    frame, manifest = read_frames(run)[0], open_run(run)
     assert caption_of(frame, manifest, pace="0.5 × real time").lines[0].endswith("(deposit)   0.5 × real time")
     assert caption_of(frame, manifest).lines[0] == "l/w = 0.7   N = 12   t = 1.000 s (deposit)"
 
@@ -265,7 +265,7 @@ def chain(directory):
     first = bent(W, 0.7) + np.array([-step / 2, -offset / 2, 0])
     made = SyntheticRun(phases=("arrange", "strain"), count=2, frames_per_phase=2, series=False)
     write_run(directory, made)
-    write_manifest(directory, made, planar=True, channel_width=0.03)
+    write_manifest(directory, made, planar=True, channel_width_m=0.03)
     strings = {"speed_m_per_s": 0.02, "string_length_m": CORD, "tied_at": "axis", "distance_m": 0.1}
     scene = {"phases": [{"type": "arrange", "gap_m": GAP}, {"type": "strain", **strings}]}
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
@@ -278,7 +278,7 @@ def chain(directory):
 
 def test_strings_are_where_the_scene_ties_them(tmp_path):
     run = chain(tmp_path / "a")
-    strings, frames = read_strings(read_run(run)), read_frames(run)
+    strings, frames = read_strings(open_run(run)), read_frames(run)
     assert len(strings.lines(frames[1])) == 0  # not tied before they pull
     reach = (2 * W - T1 - GAP) / 2
     now = strings.lines(frames[3])

@@ -9,7 +9,7 @@ from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, wri
 
 from dem.errors import InputError, RunError
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.pictures.camera import VIEWS, Look, extent, fitted_camera
 from postprocess.pictures.canvas import link_boxes
 from postprocess.pictures.colouring import COLOURINGS, ColourScale
@@ -100,7 +100,7 @@ def test_camera_sees_everything_and_stands_no_further_than_needed(tmp_path, view
     scene = SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(packing,))
     directory = write_run(tmp_path, scene)
     look = Look.checked(color_by="id", size=SIZE, view=view)
-    run = read_run(directory)
+    run = open_run(directory)
     points = extent(read_frames(directory)[0], run, look, read_surroundings(run))
     right, up, forward = look.axes
     position, focus = fitted_camera(points, look.axes, 1.3)
