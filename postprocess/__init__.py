@@ -1,6 +1,6 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
-Readers take a run directory (see ARCHITECTURE.md); measures are pure functions of NumPy arrays and
+Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and
 return frozen results. Lengths are in metres, times in seconds. `heights`,
 `entanglement` and `linking` are functions of the modules of the same name and are imported from there.
 """

@@ -146,7 +146,7 @@ def read_frames(directory: Path | str) -> FrameSequence:
         InputError: `frames.pvd` is missing, damaged or not in time order.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
 
     Example:
         >>> for frame in read_frames("runs/pile")[-2:]:

@@ -176,7 +176,7 @@ def read_series(directory: Path | str) -> Series:
         InputError: The file is missing, damaged, or lacks what it must have.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
 
     Example:
         >>> series = read_series("runs/pile")

@@ -118,7 +118,7 @@ def test_linear_colours_are_darker_in_the_middle_alone():
 
 
 def test_the_table_in_the_documentation_is_this_one():
-    text = (Path(__file__).resolve().parents[4] / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    text = (Path(__file__).resolve().parents[4] / "docs/reference/files.md").read_text(encoding="utf-8")
     table = text.partition("Cell data of smarticles")[2].partition("Point data of crossings")[0]
     rows = [line for line in table.splitlines() if line.startswith("| `")]
     assert rows == [f"| `{field.name}` | {field.unit} | {field.of} | {field.meaning} |" for field in FIELDS]
