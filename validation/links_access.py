@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
+from dem.engine.demand import contact_law_of
 from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.kind import contact_law_of
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motors import LAWS
 from dem.engine.links.shape import shape_of

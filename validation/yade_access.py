@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
+from dem.engine.demand import contact_law_of
 from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
+from dem.engine.yade.kind import hinge_law, motor_law
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
+from dem.engine.demand import contact_law_of
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
 from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError

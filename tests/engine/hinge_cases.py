@@ -17,7 +17,8 @@ from articulated_cases import (
     vec,
 )
 
-from dem.engine.yade.kind import contact_law_of, hinge_law
+from dem.engine.demand import contact_law_of
+from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
 from validation.bench import Targets, drive
 from validation.yade_access import bodies_of as bodies
