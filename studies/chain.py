@@ -275,7 +275,7 @@ def _draw_sensitivity(path: Path, analysis: Analysis) -> list[Path]:
     if changes.empty:
         return []
     names = list(dict.fromkeys(changes[VARIANT]))
-    figure, axes = style.new_figure(width=2 * style.COLUMN_WIDTH, height=0.8 + 0.27 * len(names))
+    figure, axes = style.new_figure(width=2 * style.COLUMN_WIDTH, height=1.8 + 0.27 * len(names))
     for shift, quantity, colour in ((0.14, PEAK, style.BLUE), (-0.14, FRACTURE, style.ORANGE)):
         part = changes[changes["quantity"] == quantity].set_index(VARIANT).loc[names]
         look = {**plots.marker("o", colour, colour), "linestyle": "none"}

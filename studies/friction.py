@@ -469,7 +469,7 @@ def _draw(path: Path, analysis: Analysis) -> list[Path]:
     """Draw φ against friction, a panel for each l/w, with Gravish's values."""
     means, found, reference = analysis.points, analysis.tables["crossings"], read_reference()
     ratios = sorted(means[ASPECT].unique())
-    figure = style.blank_figure(max(2.05 * len(ratios) + 0.4, style.COLUMN_WIDTH), 2.75)
+    figure = style.blank_figure(max(2.05 * len(ratios) + 0.4, 4.8), 2.75)
     panels = figure.subplots(1, len(ratios), sharey=True, squeeze=False)[0]
     shapes = {"phi_0": ("D", style.BLUE, "white"), "phi_f relaxed": ("^", style.SKY, style.SKY)}
     shapes["phi_f"] = ("D", style.BLUE, style.BLUE)
