@@ -23,12 +23,12 @@ def test_pairs_in_contact_are_those_that_the_engine_counted(engine: str, tmp_pat
     }
     done = smarticles.run(parse_scene(given, source="x"), tmp_path / "a")
     frame = done.frames[-1]
-    pairs = smarticles.measures.pairs_in_contact(frame, done.manifest)
+    pairs = smarticles.measures.pairs_in_contact(frame, done)
     counts = np.bincount(np.concatenate([pairs.i, pairs.j]), minlength=frame.count)
     assert frame.contacts.sum() > 40
     # At rest a frame and the forces before it see the same; one that just opens may be told apart.
     assert np.abs(counts - frame.contacts).sum() <= 2
-    swept = smarticles.measures.touching_pairs(frame.vertices, done.manifest.sphere_diameter)
+    swept = smarticles.measures.touching_pairs(frame.vertices, done.manifest.sphere_diameter_m)
     if engine == "yade":
         assert 2 * len(swept.i) > 1.05 * frame.contacts.sum()  # what takes no notice of the gaps finds too many: 1.10
     else:
