@@ -43,7 +43,6 @@ verify: setup ## known answers against theory, and orders of convergence, on bot
 bench: setup ## measure speed, what each effect costs, and rivals that are installed (hours)
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.scaling
-	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.effects
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.rivals
 

@@ -14,7 +14,6 @@ import platform
 import sys
 import tempfile
 import time
-from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.child import run_child
-from benchmarks.engines import PAPER_COUNT, PAPER_RADIUS
+from benchmarks.runs import PAPER_COUNT, PAPER_RADIUS, folder_of, run_child
 from dem.body.placement import place_layer
 from dem.engine.interface import Saved
 from dem.engine.lammps.kind import LammpsKind
 from dem.engine.lammps.ranks import RANKS
 from dem.plan.steps import time_step
+from dem.record.run import Run
 from dem.scene.reading import parse_scene
-from postprocess import link_crossings, read_frames, read_run, read_series
+from postprocess import link_crossings, read_frames, read_series
 
 ENGINES = ("yade", "links", "lammps")
 STRETCH, STRETCHES = 10, 8  # steps, and how many such
@@ -52,11 +51,11 @@ def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[
 
 def told(run: Path) -> dict[str, float]:
     """Means at rest and over the second half of the shaking."""
-    manifest, series = read_run(run), read_series(run)
+    planned, series = Run(run).phases, read_series(run)
     times, phases, phi = series["time_s"], series["phase"], series["packing_fraction"]
-    rest = phi[(phases == 1) & (times > (manifest.phases[1].end or 0.0) - 0.1)]
-    shaken = manifest.phases[2]
-    half = ((shaken.start or 0.0) + (shaken.end or 0.0)) / 2
+    rest = phi[(phases == 1) & (times > (planned[1].end_s or 0.0) - 0.1)]
+    shaken = planned[2]
+    half = ((shaken.start_s or 0.0) + (shaken.end_s or 0.0)) / 2
     crossings = [float(link_crossings(frame.vertices).mean()) for frame in read_frames(run).after(half)]
     return {
         "phi_0 [-]": float(rest.mean()),
@@ -65,33 +64,22 @@ def told(run: Path) -> dict[str, float]:
     }
 
 
-def agree(folder: Path, seeds: list[int], count: int, fidelity: str, shake: float) -> None:
-    """The same poses on every engine."""
-    rows = []
-    for seed, engine in product(seeds, ENGINES):
+def agree(folder: Path, given: argparse.Namespace) -> None:
+    """Give the same poses to every engine."""
+    rows, rest = [], {"type": "relax", "duration_s": 0.2}
+    for seed, engine in product(given.seeds, ENGINES):
         pour = f"pour-{seed}"
         if not (folder / pour).exists():
-            poured = scene_data(
-                "links", seed, count, fidelity, {"type": "deposit"}, {"type": "relax", "duration_s": 0.2}
-            )
-            run_child(folder, pour, poured)
-        on = scene_data(
-            engine,
-            seed,
-            count,
-            fidelity,
-            {"type": "take-over", "run": str((folder / pour).absolute())},
-            {"type": "relax", "duration_s": 0.2},
-            {"type": "shake", "duration_s": shake},
-        )
-        run_child(folder, f"{engine}-{seed}", on)
+            run_child(folder, pour, scene_data("links", seed, given.count, given.fidelity, {"type": "deposit"}, rest))
+        taken = {"type": "take-over", "run": str((folder / pour).absolute())}
+        shake = {"type": "shake", "duration_s": given.shake}
+        run_child(folder, f"{engine}-{seed}", scene_data(engine, seed, given.count, given.fidelity, taken, rest, shake))
         rows.append({"engine": engine, "seed": seed, **told(folder / f"{engine}-{seed}")})
         print(rows[-1], flush=True)
     table = pd.DataFrame(rows)
     table.to_csv(folder / "agree.csv", index=False)
     columns = list(table.columns[2:])
-    means = table.groupby("engine")[columns].agg(["mean", "sem"])
-    print(means.round(5).to_string())
+    print(table.groupby("engine")[columns].agg(["mean", "sem"]).round(5).to_string())
     wide = table.pivot_table(index="seed", columns="engine", values=columns)
     for column, other in product(columns, ("yade", "links")):
         apart = wide[column]["lammps"] - wide[column][other]
@@ -109,21 +97,14 @@ def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]
     while engine.count < count:
         size = min(count - engine.count, max(4, round(30 * widening**2)))
         layer = place_layer(
-            scene.particle,
-            count=size,
-            radius=scene.cylinder.inner_radius,
-            bottom=bottom,
-            height=0.01,
-            obstacles=np.empty((0, 3)),
-            rng=rng,
-        )
+            scene.particle, count=size, radius=scene.cylinder.inner_radius, bottom=bottom, height=0.01,
+            obstacles=np.empty((0, 3)), rng=rng,
+        )  # fmt: skip
         engine.add(layer)
         bottom = float(engine.state().vertices[..., 2].max()) + scene.particle.chain.diameter
     engine.advance(round(fall / engine.time_step))
     with tempfile.TemporaryDirectory() as scratch:
         saved = engine.save(Path(scratch))
-    print(f"{count}: φ's height {1e3 * np.median(engine.state().positions[:, 2]):.1f} mm median, "
-          f"{engine.touches().mean():.1f} contact points each", flush=True)  # fmt: skip
     engine.child.close()
     return data, saved
 
@@ -151,13 +132,7 @@ def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: fl
         steps = STRETCH * STRETCHES
         one, two = (1e6 * least[number].sum() / steps / count for number in (1, 2))
         rows.append(
-            {
-                "N": count,
-                "one rank [us per step and smarticle]": one,
-                "two ranks [us]": two,
-                "faster [-]": one / two,
-                "one rank [us per step and sphere]": one / len(scene.particle.centres),
-            }
+            {"N": count, "one rank [us per step and smarticle]": one, "two ranks": two, "faster [-]": one / two}
         )
         print(rows[-1], flush=True)
     pd.DataFrame(rows).to_csv(folder / "ranks.csv", index=False)
@@ -175,14 +150,13 @@ def main() -> None:
     parser.add_argument("--fall", type=float, default=0.25, help="time to come down [s] (ranks)")
     parser.add_argument("--fidelity", default="standard", help="draft, standard, reference")
     parser.add_argument("--out", type=Path, default=None, help="folder for runs and tables (default: a new one)")
-    arguments = parser.parse_args()
-    folder = arguments.out or Path("out") / f"lammps-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
-    folder.mkdir(parents=True)
+    given = parser.parse_args()
+    folder = folder_of("lammps", given.out)
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, {' '.join(sys.argv)}")
-    if arguments.what == "agree":
-        agree(folder, arguments.seeds, arguments.count, arguments.fidelity, arguments.shake)
+    if given.what == "agree":
+        agree(folder, given)
     else:
-        ranks(folder, arguments.counts, arguments.repeats, arguments.fidelity, arguments.fall)
+        ranks(folder, given.counts, given.repeats, given.fidelity, given.fall)
 
 
 if __name__ == "__main__":

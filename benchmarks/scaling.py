@@ -1,10 +1,8 @@
-"""Cost of a step per smarticle on links as piles grow at equal height, and threads: `python -m benchmarks.scaling`.
+"""Measure the cost of a step per smarticle on links as piles grow at equal height: `python -m benchmarks.scaling`.
 
-Piles of 50 to 20 000 are poured once, into `OUT/pours`, in cylinders as wide as the height of the paper's pile of 270
-asks for; a pour that is there is not made again. Each is then shaken at Γ = 2 for a period of the shaking, in processes
-of their own, threads in turn, and again and again: the trajectory is the same bit for bit, so that of each stretch of
-four steps the least time counts. That is as near to an idle machine as a shared one allows; with several threads it
-still needs all cores to be free at once for some milliseconds.
+Piles are poured once, into `OUT/pours`, in cylinders as wide as the height of the paper's pile of 270 asks for. Each is
+then shaken at Γ = 2 for a period, in processes of their own, again and again: the trajectory is the same bit for bit,
+so that of each stretch of four steps the least time counts. That is as near to an idle machine as a shared one allows.
 """
 
 from __future__ import annotations
@@ -12,130 +10,94 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
+import resource
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import yaml
 
-from benchmarks.child import run_child
-from benchmarks.engines import PAPER_COUNT, PAPER_PER_LAYER, PAPER_RADIUS
-from benchmarks.stretches import LENGTH
-from postprocess.report.figures import BLUE, GREY, ORANGE, add_footer, blank_figure, save, style
+from benchmarks.runs import pile, run_child
+from dem.engine.interface import Saved
+from dem.engine.kinds import engine_kind
+from dem.plan.steps import time_steps
+from dem.record.checkpoint import read_checkpoint
+from dem.record.run import open_run
+from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 
 COUNTS = (50, 100, 270, 1000, 2000, 5000, 10_000, 20_000)
-STRETCHES = 80  # 320 steps, a period of 30 Hz
+STRETCHES, LENGTH = 80, 4  # stretches, and their steps: a period of 30 Hz
+AMPLITUDE, FREQUENCY = 0.552e-3, 30.0  # m, Hz: Γ = 2, the paper's shaking
 WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per step and smarticle [us]"
-MEMORY, TOUCHES, HEIGHT = "peak memory [MiB]", "contact points per smarticle [-]", "height of the centre of mass [mm]"
 
 
-def scene_of(count: int, seed: int = 1) -> dict[str, Any]:
-    """Pour and wait, with a checkpoint while it rests."""
-    widening = (count / PAPER_COUNT) ** 0.5
+def stretches(run: Path) -> dict[str, Any]:
+    """Time the stretches of the pile of a run's last checkpoint."""
+    scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
+    # An engine has a shaker only where the scene calls for one, and the pour does not.
+    content = yaml.safe_load(dump_scene(scene))
+    content["phases"].append({"type": "shake", "duration_s": 1.0, "frequency_hz": FREQUENCY})
+    shaken = parse_scene(content, source=str(run))
+    engine = engine_kind("links").build(shaken, min(time_steps(shaken)))
+    checkpoint, _ = read_checkpoint(run, scene_sha256=scene_hash(scene), made_by=("links", made_by))
+    state: dict[str, Any] = dict(checkpoint.state)
+    engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), run)
+    engine.fixtures.shake(amplitude=AMPLITUDE, frequency=FREQUENCY)
+    engine.advance(30)
+    wall, processor = [], []
+    for _ in range(STRETCHES):
+        begun, spent = time.perf_counter(), time.process_time()
+        engine.advance(LENGTH)
+        wall.append(time.perf_counter() - begun)
+        processor.append(time.process_time() - spent)
     return {
-        "schema_version": 1,
-        "name": f"poured, N = {count}",
-        "engine": "links",
-        "seed": seed,
-        "count": count,
-        "container": {"radius_m": PAPER_RADIUS * widening},
-        "recording": {"frame_interval_s": 1.0, "checkpoint_interval_s": 0.4},
-        "phases": [
-            {"type": "deposit", "per_layer": max(4, round(PAPER_PER_LAYER * widening**2))},
-            {"type": "relax", "duration_s": 0.5},
-        ],
+        "wall": wall,
+        "processor": processor,
+        "contact points per smarticle [-]": float(engine.touches().mean()),
+        "peak memory [MiB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
 
 
-def stretches(run: Path, threads: int) -> dict[str, Any]:
-    """Time one trajectory on some threads."""
-    environment = {**os.environ, "OMP_NUM_THREADS": str(threads)}
-    command = [sys.executable, "-m", "benchmarks.stretches", str(run), str(STRETCHES)]
-    said = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True).stdout
-    found: dict[str, Any] = json.loads(said)
-    return found
-
-
-def row_of(count: int, threads: int, found: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """A row of the table: of every stretch the least of all repetitions."""
+def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
+    """Time one trajectory again and again; return a row of the table, of every stretch the least time."""
+    command = [sys.executable, "-m", "benchmarks.scaling", "--stretches", str(run)]
+    found = [
+        json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
+        for _ in range(repeats)
+    ]
     each = 1e6 / (LENGTH * STRETCHES * count)
-    least = {name: each * float(np.min([one[name] for one in found], axis=0).sum()) for name in ("wall", "processor")}
-    return {
-        "N [-]": count,
-        "threads [-]": threads,
-        WALL: least["wall"],
-        PROCESSOR: least["processor"],
-        TOUCHES: found[0]["touches"],
-        HEIGHT: 1e3 * found[0]["height"],
-        MEMORY: max(one["memory"] for one in found),
-        "repetitions [-]": len(found),
-    }
-
-
-def with_ratios(table: Any) -> Any:
-    """Growth against N = 100 on one thread, and how much faster more threads are."""
-    wide = table.pivot_table(index="N [-]", columns="threads [-]", values=WALL)
-    table = table.copy()
-    alone = table["N [-]"].map(wide[1]) if 1 in wide else np.nan
-    table["faster than one thread [1]"] = alone / table[WALL]
-    base = table[(table["N [-]"] == 100) & (table["threads [-]"] == 1)][PROCESSOR]
-    growth = table[PROCESSOR] / (base.iloc[0] if len(base) else np.nan)
-    table["growth against N = 100 [1]"] = growth.where(table["threads [-]"] == 1)
-    return table
-
-
-def draw(table: Any, folder: Path, said: str) -> None:
-    """Cost per smarticle and memory over N."""
-    with style():
-        figure = blank_figure(7.0, 2.6)
-        left, right = figure.subplots(1, 2)
-        for threads, colour in zip(sorted(table["threads [-]"].unique()), (BLUE, ORANGE, GREY), strict=False):
-            rows = table[table["threads [-]"] == threads]
-            label = f"{threads} thread{'s' if threads > 1 else ''}"
-            left.plot(rows["N [-]"], rows[WALL], "o-", color=colour, label=label)
-            right.plot(rows["N [-]"], rows[MEMORY], "o-", color=colour, label=label)
-        left.set_ylabel("wall time per step\nand smarticle [µs]")
-        left.set_ylim(bottom=0)
-        right.set_ylabel("peak memory [MiB]")
-        right.set_ylim(bottom=0)
-        for axes in (left, right):
-            axes.set_xscale("log")
-            axes.set_xlabel("smarticles N [-]")
-        left.legend()
-        figure.tight_layout()
-        add_footer(figure, [said])
-        save(figure, folder / "scaling", formats=("png",))
+    wall, processor = (each * np.min([one.pop(kind) for one in found], axis=0).sum() for kind in ("wall", "processor"))
+    return {"N [-]": count, WALL: wall, PROCESSOR: processor, **found[-1]}
 
 
 def main() -> None:
-    """Pour what is not there, time, and write table and figure."""
+    """Pour what is not there, time, and write the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=__doc__)
     parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, help="numbers of smarticles")
-    parser.add_argument("--threads", type=int, nargs="+", default=[1, 2], help="numbers of threads")
     parser.add_argument("--repeats", type=int, default=10, help="of each trajectory (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("out/scaling"), help="folder for pours, table and figure")
-    arguments = parser.parse_args()
-    folder, pours = arguments.out, arguments.out / "pours"
+    parser.add_argument("--out", type=Path, default=Path("out/scaling"), help="folder for pours and table")
+    parser.add_argument("--stretches", type=Path, metavar="RUN", help="only time this pile once, JSON to stdout")
+    given = parser.parse_args()
+    if given.stretches:
+        print(json.dumps(stretches(given.stretches)))
+        return
+    pours, rows = given.out / "pours", []
     pours.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for count in arguments.counts:
+    recording = {"frame_interval_s": 1.0, "checkpoint_interval_s": 0.4}
+    for count in given.counts:
         if not (pours / str(count) / "done.json").exists():
-            run_child(pours, str(count), scene_of(count))
-        found: dict[int, list[dict[str, Any]]] = {threads: [] for threads in arguments.threads}
-        for _ in range(arguments.repeats):
-            for threads, told in found.items():
-                told.append(stretches(pours / str(count), threads))
-        rows += [row_of(count, threads, told) for threads, told in found.items()]
-        table = with_ratios(pd.DataFrame(rows))
-        table.to_csv(folder / "scaling.csv", index=False, float_format="%.4g")
+            rest = {"type": "relax", "duration_s": 0.5}
+            run_child(pours, str(count), pile(count, rest, engine="links", recording=recording))
+        rows.append(row_of(pours / str(count), count, given.repeats))
+        table = pd.DataFrame(rows)
+        table["growth against the least N [1]"] = table[PROCESSOR] / table[PROCESSOR].iloc[0]
+        table.to_csv(given.out / "scaling.csv", index=False, float_format="%.4g")
         print(table[table["N [-]"] == count].to_string(index=False, float_format=lambda x: f"{x:.3g}"), flush=True)
-    load = f"load of the machine at the end {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
-    draw(table, folder, f"python {' '.join(['-m benchmarks.scaling', *sys.argv[1:]])}; {platform.machine()}, {load}")
-    print(f"table and figure: {folder}")
+    print(f"table: {given.out / 'scaling.csv'}; load of the machine at the end {os.getloadavg()[0]:.1f}")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,15 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
-Readers take a run directory (see ARCHITECTURE.md); measures are pure functions of NumPy arrays and
+Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and
 return frozen results. Lengths are in metres, times in seconds. `heights`,
 `entanglement` and `linking` are functions of the modules of the same name and are imported from there.
 """
 
+from dem.record.document import Phase
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import PhaseRecord, RunManifest, read_run
+from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass
@@ -60,9 +61,9 @@ __all__ = [
     "PackingChange",
     "PackingFraction",
     "PackingProfile",
-    "PhaseRecord",
+    "Phase",
     "RecordedForces",
-    "RunManifest",
+    "Run",
     "Series",
     "UndefinedMeasureError",
     "centres_of_mass",
@@ -80,6 +81,7 @@ __all__ = [
     "measure_run",
     "neighbours_in_contact",
     "nematic_order",
+    "open_run",
     "packing_change",
     "packing_fraction",
     "packing_profile",
@@ -88,7 +90,6 @@ __all__ = [
     "read_forces",
     "read_frame",
     "read_frames",
-    "read_run",
     "read_series",
     "strong_contacts",
     "summarise_run",

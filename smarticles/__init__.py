@@ -4,7 +4,7 @@
 
     scene = smarticles.Scene(seed=1, count=20, fidelity="draft", engine="links", phases=[{"type": "deposit"}])
     done = smarticles.run(scene, "runs/a")
-    done.series["com_height_m"], done.frames[-1].vertices, done.table()
+    done.series["com_height_m"], done.frames[-1].vertices, smarticles.measure(done)
     smarticles.measures.link_crossings(done.frames[-1].vertices)
     many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
     many.table(by="aspect_ratio")
@@ -17,11 +17,12 @@ from typing import Any
 
 _HOMES = {
     "InputError": "dem.errors",
-    "RunDirectory": "smarticles.public",
+    "Run": "dem.record.run",
     "RunError": "dem.errors",
     "SweepDirectory": "smarticles.public",
     "Scene": "dem.scene.scene",
     "load_scene": "dem.scene.reading",
+    "measure": "smarticles.public",
     "read": "smarticles.public",
     "read_sweep": "smarticles.public",
     "run": "smarticles.public",

@@ -14,10 +14,9 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest, read_run
 from dem.record.names import FRAME, MANIFEST, SERIES, collection
+from dem.record.run import Run, open_run
 from dem.record.series import read_series
-from postprocess.scene_file import read_scene
 from postprocess.statistics.points import marked
 from smarticles.measuring import PHASE, grouped, measured, values_in
 from templates.sweep.folder import MANIFEST as SWEEP
@@ -108,13 +107,13 @@ def _kind(path: Path) -> str:
 
 
 def _runs(one: Path, other: Path) -> Comparison:
-    first, second = read_run(one), read_run(other)
+    first, second = open_run(one), open_run(other)
     return Comparison(
         kind="run",
-        scene=differences(read_scene(one).values, read_scene(other).values),
+        scene=differences(first.scene, second.scene),
         versions=differences(_made_by(first), _made_by(second)),
         only={},
-        bits={first.name: same_bits(one, other)},
+        bits={first.manifest.name: same_bits(one, other)},
         measures=_beside(_begun(one), _begun(other), list(PHASE)),
     )
 
@@ -124,8 +123,13 @@ def _begun(path: Path) -> pd.DataFrame:
     return measured([path]) if (path / collection(FRAME)).is_file() else pd.DataFrame(columns=list(PHASE))
 
 
-def _made_by(run: RunManifest) -> dict[str, Any]:
-    return {"engine": run.engine, **run.versions, "threads": run.threads, "status": run.status}
+def _made_by(run: Run) -> dict[str, Any]:
+    return {
+        "engine": run.manifest.engine,
+        **run.manifest.versions,
+        "threads": run.manifest.threads,
+        "status": run.status.state,
+    }
 
 
 def _sweeps(one: Folder, other: Folder) -> Comparison:
@@ -161,7 +165,7 @@ def _versions(folder: Folder) -> dict[str, Any]:
     found: dict[str, list[Any]] = {}
     for entry in folder.entries:
         if (folder.run(entry) / MANIFEST).is_file():
-            for name, value in _made_by(read_run(folder.run(entry))).items():
+            for name, value in _made_by(open_run(folder.run(entry))).items():
                 values = found.setdefault(name, [])
                 if name != "status" and value not in values:
                     values.append(value)

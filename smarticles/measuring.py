@@ -108,9 +108,10 @@ def _tables(directories: Sequence[Path], frames: bool, costly: Costly, jobs: int
 
 
 def _one(directory: Path, *, frames: bool, costly: Costly) -> pd.DataFrame:
+    from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    return (measure_run if frames else summarise_run)(directory, costly=costly)
+    return (measure_run if frames else summarise_run)(Run(directory), costly=costly)
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:

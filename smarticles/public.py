@@ -14,9 +14,9 @@ from typing import Any, overload
 import pandas as pd
 
 from dem.errors import InputError, RunError
+from dem.record.run import Run, open_run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
-from postprocess import FrameSequence, RunManifest, Series, read_frames, read_run, read_series
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
 from smarticles.scene_sweep import write_sweep
@@ -24,57 +24,9 @@ from smarticles.sweeps import complete, make_folder
 from templates.local.runner import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
 
-# What the columns of a series of vectors are, by their number.
-_COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
-
 
 @dataclass(frozen=True)
-class RunDirectory:
-    """What is in a run directory; each part is read when it is asked for, once.
-
-    Args:
-        path: the directory.
-    """
-
-    path: Path
-
-    @cached_property
-    def manifest(self) -> RunManifest:
-        """What made the run, and how it ended."""
-        return read_run(self.path)
-
-    @cached_property
-    def frames(self) -> FrameSequence:
-        """The recorded frames, each read when it is asked for."""
-        return read_frames(self.path)
-
-    @cached_property
-    def series(self) -> Series:
-        """The recorded time series, as arrays."""
-        return read_series(self.path)
-
-    def recorded(self) -> pd.DataFrame:
-        """The recorded time series as a table: one row per sample, units in its column names."""
-        series = self.series
-        columns = {name: series[name] for name in ("time_s", "phase")}
-        for name, values in series.data.items():
-            parts = values[:, None] if values.ndim == 1 else values
-            marks = _COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
-            for mark, part in zip(marks, parts.T, strict=True):
-                columns[f"{name}{mark}"] = part
-        return pd.DataFrame(columns)
-
-    def table(self, *, frames: bool = False) -> pd.DataFrame:
-        """All measures as a table, units in its column names, as `smarticles measure` gives them.
-
-        Args:
-            frames: one row per frame; else one per phase, means over its last frames with their standard errors.
-        """
-        return measured([self.path], frames=frames)
-
-
-@dataclass(frozen=True)
-class SweepDirectory(Sequence[RunDirectory]):
+class SweepDirectory(Sequence[Run]):
     """The runs of a sweep in its order, and tables of all of them.
 
     Args:
@@ -98,16 +50,16 @@ class SweepDirectory(Sequence[RunDirectory]):
         return len(self.folder.entries)
 
     @overload
-    def __getitem__(self, index: int) -> RunDirectory: ...
+    def __getitem__(self, index: int) -> Run: ...
 
     @overload
-    def __getitem__(self, index: slice) -> list[RunDirectory]: ...
+    def __getitem__(self, index: slice) -> list[Run]: ...
 
-    def __getitem__(self, index: int | slice) -> RunDirectory | list[RunDirectory]:
+    def __getitem__(self, index: int | slice) -> Run | list[Run]:
         entries = self.folder.entries[index]
         if isinstance(entries, tuple):
-            return [RunDirectory(self.folder.run(entry)) for entry in entries]
-        return RunDirectory(self.folder.run(entries))
+            return [Run(self.folder.run(entry)) for entry in entries]
+        return Run(self.folder.run(entries))
 
     def table(self, *, by: str | Sequence[str] | None = None, frames: bool = False) -> pd.DataFrame:
         """All measures of the runs that have begun, with what the sweep varies as columns.
@@ -129,7 +81,7 @@ class SweepDirectory(Sequence[RunDirectory]):
 
 def run(
     scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
-) -> RunDirectory:
+) -> Run:
     """Run a scene into a run directory, as `smarticles run` does, in a process of its own.
 
     Of its own, because YADE and what draws never meet in one.
@@ -158,18 +110,29 @@ def run(
         said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a word"]
         text = said[-1].removeprefix("smarticles: ").removeprefix("error: ")
         raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
-    return RunDirectory(Path(out))
+    return Run(Path(out))
 
 
-def read(directory: Path | str) -> RunDirectory:
-    """A run directory, finished or not.
+def read(directory: Path | str) -> Run:
+    """Open a run directory, finished or not.
 
     Raises:
         InputError: it is none.
     """
-    found = RunDirectory(Path(directory))
-    _ = found.manifest  # what is no run directory is refused here, not at the first use
-    return found
+    return open_run(directory)
+
+
+def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
+    """All measures of a run as a table, units in its column names, as `smarticles measure` gives them.
+
+    Args:
+        run: a run, or its directory.
+        frames: one row per frame; else one per phase, means over its last frames with their standard errors.
+
+    Raises:
+        InputError: it is no run, or has no frames yet.
+    """
+    return measured([run.path if isinstance(run, Run) else Path(run)], frames=frames)
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:

@@ -91,8 +91,8 @@ def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, 
     """
     from dem.engine.cores import threads_warning  # noqa: PLC0415
     from dem.engine.lammps.ranks import RANKS, check_ranks  # noqa: PLC0415
-    from dem.record.manifest import read_run  # noqa: PLC0415
     from dem.record.names import MANIFEST  # noqa: PLC0415
+    from dem.record.run import Run  # noqa: PLC0415
 
     many = scene.engine == "lammps"
     if many and threads is not None and threads > 1:
@@ -106,7 +106,7 @@ def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, 
         raise InputError(msg)
     wanted = 1 if scene.engine == "links" else ranks if many else threads
     if wanted is None:
-        wanted = read_run(out).threads if resume and (out / MANIFEST).is_file() else 1
+        wanted = Run(out).manifest.threads if resume and (out / MANIFEST).is_file() else 1
     if many:
         check_ranks(wanted)
         os.environ[RANKS], wanted = str(wanted), 1

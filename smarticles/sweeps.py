@@ -13,7 +13,7 @@ from dem.errors import RunError
 
 if TYPE_CHECKING:
     from dem.scene.scene import Scene
-    from templates.local.runner import Outcome
+    from templates.local.display import Outcome
     from templates.sweep.expand import Point
     from templates.sweep.folder import Folder
     from templates.sweep.sweep_file import Sweep
@@ -97,13 +97,13 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     """The same, but a run that failed is told, not raised."""
     from rich.console import Console  # noqa: PLC0415
 
-    from templates.local.display import display_for  # noqa: PLC0415
+    from templates.local.display import Display  # noqa: PLC0415
     from templates.local.runner import run_folder  # noqa: PLC0415
     from templates.slurm.submission import refuse_queued  # noqa: PLC0415
 
     refuse_queued(folder)
     try:
-        return run_folder(folder, display_for(Console(stderr=True)), slots=jobs)
+        return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
         msg = f"finished runs are kept; go on with: {command}"
         raise KeyboardInterrupt(msg) from None

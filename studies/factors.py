@@ -12,8 +12,7 @@ from itertools import product
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
-from postprocess.scene_file import read_scene
+from dem.record.run import Run
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.factorial import paired_differences
 from postprocess.statistics.seeds import mean_over_seeds
@@ -57,18 +56,18 @@ QUANTITIES = (
 SIGNS = {CROSSINGS: ("⟨N⟩", 1), HEIGHT: ("h/h0", 1), PHI_ACTIVE: ("φ_f", -1), ENERGY: ("energy per smarticle [J]", 1)}
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure the shape change, and which rules it went by."""
     row = procedure_row(run)
     if row[PROCEDURE] != SHAPE:
-        msg = f"{run.directory}: {row[PROCEDURE]}, where factors are of shape changes; leave it out"
+        msg = f"{run.path}: {row[PROCEDURE]}, where factors are of shape changes; leave it out"
         raise InputError(msg)
-    scene = read_scene(run.directory)
-    motor, contact = scene.part("motor"), scene.part("contact")
+    scene = run.scene
+    motor, contact = scene.get("motor"), scene.get("contact")
     return {
-        LAW: str(motor.values["law"]) if motor else "",
-        FRICTION: contact.number("friction_smarticle") if contact else float("nan"),
-        RADIUS: run.container_radius,
+        LAW: str(motor["law"]) if motor else "",
+        FRICTION: contact["friction_smarticle"] if contact else float("nan"),
+        RADIUS: run.manifest.container_radius_m,
         **row,
     }
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pandas as pd
 
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.motors import APART
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.report import figures as style
@@ -580,11 +580,11 @@ ENTANGLEMENT = (
 )
 
 
-def heights(run: RunManifest) -> History:
+def heights(run: Run) -> History:
     """Read h/h0 against the time since the activity began."""
     values, times = height_history(run)
     active = next(phase for phase in run.phases if phase.type not in ("deposit", "relax"))
-    end = 0.0 if active.start is None or active.end is None else active.end - active.start
+    end = 0.0 if active.start_s is None or active.end_s is None else active.end_s - active.start_s
     return History(times=times, values=values, active=end)
 
 

@@ -1,4 +1,4 @@
-"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it, and folders that are still to become such a pair.
+"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it.
 
 A variant of the sweep is a study of its own, `strength-code` of `strength.yaml@code`, but for `quick`, which is the
 quick variant of them all. Nothing large is imported before a study is loaded.
@@ -18,20 +18,6 @@ from typing import TYPE_CHECKING
 import yaml
 
 from dem.errors import InputError, nearest
-from studies import (
-    casting,
-    chain,
-    collapse,
-    engines,
-    finite_size,
-    fracture,
-    friction,
-    gravish,
-    landscape,
-    melting,
-    sensitivity,
-)
-from studies.base.shipped import Shipped
 
 if TYPE_CHECKING:
     from studies.framework.study import Study
@@ -95,43 +81,19 @@ def _scripts() -> list[Script]:
         name, quick = file.stem.replace("_", "-"), QUICK in variants
         found.append(Script(name=name, module=file.stem, quick=quick))
         found += [
-            Script(
-                name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and "yade" not in variant
-            )
-            for variant in variants
+            Script(name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and not on_yade)
+            for variant, changes in variants.items()
             if variant != QUICK
+            for on_yade in [(changes.get("constants") or {}).get("engine") == "yade"]  # which takes no minutes
         ]
     return found
 
 
-_FOLDERS: tuple[Shipped, ...] = (
-    gravish.SHIPPED,
-    friction.SHIPPED,
-    friction.CONTACTS,
-    friction.COMPACTION,
-    sensitivity.SHIPPED,
-    sensitivity.SECTION,
-    fracture.SHIPPED,
-    fracture.CODE,
-    landscape.SHIPPED,
-    finite_size.SHIPPED,
-    melting.SHIPPED,
-    melting.CODE,
-    casting.SHIPPED,
-    casting.CODE,
-    collapse.SHIPPED,
-    chain.SHIPPED,
-    chain.BODIES,
-    engines.SHIPPED,
-)
-
-STUDIES: Mapping[str, Shipped | Script] = MappingProxyType(
-    {**{study.name: study for study in _scripts()}, **{study.name: study for study in _FOLDERS}}
-)
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})
 """By name."""
 
 
-def shipped(name: str) -> Shipped | Script:
+def shipped(name: str) -> Script:
     """A shipped study.
 
     Raises:

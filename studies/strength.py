@@ -19,14 +19,11 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest
-from dem.record.series import read_series
+from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.heights import heights
 from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, moving_mean, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.scene_file import read_phases, read_scene
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.seeds import SeedMean, slope_within
@@ -152,36 +149,36 @@ QUANTITIES = {
 }
 
 
-def measure(run: RunManifest) -> Row:
+def measure(run: Run) -> Row:
     """Measure the pile before it is torn, the force on the hook, and what came off."""
     procedure = prepared_by(run, "remove-container", PULL)
     pulled = run.phases[-1]
     rest, free = pulled.index - 2, pulled.index - 1
-    settings = read_phases(run.directory)
-    hooks = read_scene(run.directory).part("hooks")
-    table = summarise_run(run.directory, definitions=[DEFINITION], phases={rest}).set_index("phase")
-    frames = read_frames(run.directory)
+    settings = run.scene["phases"]
+    hooks = run.scene.get("hooks")
+    table = summarise_run(run, definitions=[DEFINITION], phases={rest}).set_index("phase")
+    frames = run.frames
     phases = [frames.in_phase(index) for index in (rest, free, pulled.index)]
     if hooks is None or rest not in table.index or not all(phases):
-        msg = f"{run.directory}: no hooks, or no frame of the rest, of remove-container or of {PULL}; run it again"
+        msg = f"{run.path}: no hooks, or no frame of the rest, of remove-container or of {PULL}; run it again"
         raise InputError(msg)
     walled, before, torn = (phase[-1] for phase in phases)
-    upper = hooks.number("upper_height_m")
-    pull = read_pull(run, read_series(run.directory), pulled.index)
-    weight, highest, held = run.count * weight_of_one(run), peak(pull), held_fast(pull, settings[pulled.index])
-    limit = settings[pulled.index].values.get("force_limit_N")
+    upper = hooks["upper_height_m"]
+    pull = read_pull(run, run.series, pulled.index)
+    weight, highest, held = run.manifest.count * weight_of_one(run), peak(pull), held_fast(pull, settings[pulled.index])
+    limit = settings[pulled.index].get("force_limit_N")
     centres = centres_of_mass(before.vertices)[:, 2]
     level = heights(before.vertices, floor_z=before.floor_z)
     rose = centres_of_mass(torn.vertices)[:, 2] - centres > float(pull.raised[-1]) / 2
     lowest = float(before.vertices[rose, :, 2].min(axis=1).mean()) - before.floor_z if rose.any() else math.nan
     return {
         PROCEDURE: procedure,
-        THETA: settings[2].number("theta_deg") if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.aspect_ratio, 6),
+        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
         UPPER: upper,
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
         ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
         CROSSINGS: table.loc[rest]["crossings mean [-]"],
         ABOVE: float((centres - before.floor_z > upper).mean()),
@@ -189,25 +186,25 @@ def measure(run: RunManifest) -> Row:
         KEPT: level.mean_com / heights(walled.vertices, floor_z=walled.floor_z).mean_com,
         PEAK: highest.force / weight,
         RAISED: highest.raised,
-        WORK: pull.work / weight / run.middle_length,
+        WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
         THROUGH: (held_at(pull, highest.time) - pull.held[0]) / weight,
         HELD_FAST: float(held),
-        LIMIT: (float(limit) if isinstance(limit, int | float) else math.inf) / run.count / weight_of_one(run),
+        LIMIT: (float(limit) if isinstance(limit, int | float) else math.inf) / run.manifest.count / weight_of_one(run),
         CARRIED: math.nan if held else float(rose.mean()),
         BREAK: math.nan if held else lowest,
         "time without the wall [s]": duration(run.phases[free]),
-        "scene_sha256": run.scene_sha256,
-        "run": run.directory.name,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
     }
 
 
-def force_history(run: RunManifest) -> History:
+def force_history(run: Run) -> History:
     """Read the force over n W_s against the hook's way [mm]."""
-    pull = read_pull(run, read_series(run.directory), run.phases[-1].index)
+    pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     way = 1e3 * np.interp(times, pull.edges, pull.raised)
-    return History(times=way, values=force / run.count / weight_of_one(run), active=0.0)
+    return History(times=way, values=force / run.manifest.count / weight_of_one(run), active=0.0)
 
 
 def compared(runs: pd.DataFrame) -> pd.DataFrame:
@@ -246,7 +243,7 @@ def _works(table: pd.DataFrame) -> str:
     return "; ".join(f"{name} {_ranked(table, quantity, ALL)}" for quantity, name in names.items())
 
 
-def _other_order(table: pd.DataFrame) -> Outcome:
+def other_order(table: pd.DataFrame) -> Outcome:
     """Find pairs of procedures that differ clearly both in ⟨N⟩ and in peak force, in one sense or in opposite ones."""
     pairs: dict[bool, list[str]] = {True: [], False: []}
     effects = []
@@ -269,7 +266,8 @@ def _other_order(table: pd.DataFrame) -> Outcome:
     return Outcome(note=note, verdict=verdict)
 
 
-def _harder_but_brittle(table: pd.DataFrame) -> list[Effect]:
+def harder_but_brittle(table: pd.DataFrame) -> list[Effect]:
+    """Compare peak force and displacement at the peak after shape change with those after internal oscillation."""
     one, other = (bool(of(table, name)[HELD_FAST].any()) for name in (SHAPE, INTERNAL))
     harder, sooner = (less(table, quantity, SHAPE, INTERNAL) for quantity in (PEAK, RAISED))
     unknown = one or other
@@ -340,7 +338,7 @@ FINDINGS = (
     Finding(
         id="other-order-than-crossings",
         says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
-        outcome=_other_order,
+        outcome=other_order,
         rows=over_heights,
         found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
         "clearly in the same sense",
@@ -349,7 +347,7 @@ FINDINGS = (
         id="harder-but-brittle",
         says="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
         "oscillation",
-        outcome=_harder_but_brittle,
+        outcome=harder_but_brittle,
         rows=over_heights,
         found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
         "that its fracture tests support this, not by which measure",
@@ -409,7 +407,8 @@ FIGURES = (
         panels=UPPER,
         panel="hook {:g} mm above the floor",
         panel_scale=1e3,
-        width=0.5,  # mm: the side of the hook's bars
+        width=0.5,  # the side of the hook's bars
+        unit="mm",
         x_label="hook raised by [mm]",
         y_label=r"force on the hook $F/(n W_\mathrm{s})$ [-]",
     ),

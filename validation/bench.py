@@ -62,14 +62,7 @@ def law_of(scene: Scene) -> ContactLaw:
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """The contact law that a scene would have, its dashpots sized for the ball's own mass.
-
-    Args:
-        restitution: of a ball against the floor, and of two balls [1].
-        friction: Coulomb coefficient [1].
-        tangential: ks over kn [1].
-        dashpot: cs over cn [1].
-    """
+    """The contact law that a scene would have, its dashpots sized for the ball's own mass."""
     critical = 2 * damping_ratio(restitution) * math.sqrt(STIFFNESS * BALL_MASS)
     return ContactLaw(
         normal_stiffness=STIFFNESS,

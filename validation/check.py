@@ -1,31 +1,43 @@
-"""What a case says: checks, each good or not."""
+"""Results of a case: checks, each good or not."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Answer:
-    """One quantity, measured and in theory: a check whose answer is on paper.
+    """One quantity, measured and in theory.
 
     Args:
-        quantity: what it is.
-        unit: of it.
+        what: quantity and unit, as in `speed [m/s]`.
         theory: the answer on paper [unit].
         measured: what the engine gave [unit].
         tolerance: largest error that passes, relative to the scale [1].
-        reason: of the tolerance.
         scale: what the error is relative to [unit]; 0: the theory itself.
+        reason: of the tolerance.
     """
 
-    quantity: str
-    unit: str
+    what: str
     theory: float
     measured: float
     tolerance: float
-    reason: str
     scale: float = 0.0
+    reason: str = ""
+
+    def because(self, reason: str) -> Answer:
+        """Return it with the reason of its tolerance."""
+        return replace(self, reason=reason)
+
+    @property
+    def quantity(self) -> str:
+        """What was measured."""
+        return self.what.rpartition(" [")[0]
+
+    @property
+    def unit(self) -> str:
+        """Unit of all numbers."""
+        return self.what.rpartition(" [")[2].removesuffix("]")
 
     @property
     def error(self) -> float:
@@ -56,22 +68,21 @@ class Check:
 
 
 def below(what: str, measured: float, limit: float) -> Check:
-    """A number that must be below a limit; one that is no number is not."""
+    """Check that a number is below a limit; a NaN is not."""
     return Check(what, f"{measured:.4g}", f"< {limit:.4g}", bool(measured < limit))
 
 
 def above(what: str, measured: float, limit: float) -> Check:
-    """A number that must be above a limit."""
+    """Check that a number is above a limit."""
     return Check(what, f"{measured:.4g}", f"> {limit:.4g}", bool(measured > limit))
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """A number that must be what is expected, within an error."""
+    """Check that a number is the expected one, within an error."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def says(text: str | None, *parts: str) -> Check:
-    """An error that must contain some words."""
-    return Check(
-        "the error says", text or "nothing", " … ".join(parts), text is not None and all(p in text for p in parts)
-    )
+    """Check that an error contains some words."""
+    good = text is not None and all(part in text for part in parts)
+    return Check("the error says", text or "nothing", " … ".join(parts), good)

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
+from dem.engine.demand import contact_law_of
 from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.kind import contact_law_of
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motors import LAWS
 from dem.engine.links.shape import shape_of
@@ -102,15 +102,15 @@ class LinksAccess:
     arm_share = 0.5
 
     def ball(self) -> Particle:
-        """See the interface: there are no balls; an upright stub meets things with its round end."""
+        # There are no balls; an upright stub meets things with its round end.
         return _bar(2 * BALL_RADIUS, STUB_THICKNESS, BALL_RADIUS / 2)
 
     def roller(self) -> Particle:
-        """See the interface: a bar that lies across its way, with the ball's moment about its axis, I = m t²/6."""
+        # A bar that lies across its way, with the ball's moment about its axis, I = m t²/6.
         return _bar(5 * BALL_RADIUS, BALL_RADIUS * math.sqrt(12 / 5), BALL_RADIUS)
 
     def ends(self, particle: Particle) -> Array:
-        """See the interface: ends of links, hinges once."""
+        # Ends of links, hinges once.
         shape, boxes = shape_of(particle), particle.boxes
         places = [np.array([side * shape.end, 0.0, 0.0]) for side in (-1, 1)]
         for link, side in ((0, -1), (2, 1)):
@@ -119,7 +119,6 @@ class LinksAccess:
         return boxes.to_body(np.array([place + np.array([0.0, 0.0, z]) for place in places for z in shape.offsets]))
 
     def swept(self, particle: Particle) -> Array:
-        """See the interface."""
         shape, boxes, found = shape_of(particle), particle.boxes, []
         starts = {0: -shape.half, 1: -shape.end, 2: shape.half}
         for link in shape.kinds:
@@ -129,15 +128,13 @@ class LinksAccess:
         return boxes.to_body(np.concatenate(found))
 
     def pin_stiffness(self, scene: Scene) -> float:
-        """See the interface."""
         return math.inf
 
     def spring_shafts(self) -> dict[str, Any]:
-        """See the interface: the shafts of motors that halt are rigid, those of motors that slip are springs."""
+        # The shafts of motors that halt are rigid, those of motors that slip are springs.
         return {"law": "slip"}
 
     def build(self, particle: Particle, law: ContactLaw, *, dt: float, gravity: float = 0.0) -> Pushed:
-        """See the interface."""
         return Pushed(
             particle=particle,
             cylinder=Cylinder(radius=0.5, height=0.2, facets=16),
@@ -148,7 +145,6 @@ class LinksAccess:
         )
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Pushed:
-        """See the interface."""
         motor = scene.motor
         return Pushed(
             particle=scene.particle,
@@ -167,7 +163,6 @@ class LinksAccess:
         )
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
-        """See the interface."""
         own = _own(engine)
         bodies = own._world.posed()
         row, axes = bodies.plane[k], bodies.axes[k]
@@ -176,12 +171,11 @@ class LinksAccess:
         bodies.momentum[k] = axes @ inertia @ axes.T @ np.asarray(spin, float)
 
     def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
-        """See the interface."""
         assert isinstance(engine, Pushed)
         engine.forces[k, link] = np.asarray(force, float)
 
     def hold(self, engine: Engine) -> None:
-        """See the interface: it becomes too heavy to move, and something bears its weight."""
+        # It becomes too heavy to move, and something bears its weight.
         own = _own(engine)
         world = own._world
         middle = own.state().link_positions[0, 1].copy()
@@ -198,7 +192,6 @@ class LinksAccess:
             self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
-        """See the interface."""
         world = _own(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))
         assert motors is not None
@@ -213,7 +206,7 @@ class LinksAccess:
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """See the interface: all smarticles share one mass, so that the weight alone becomes larger."""
+        # All smarticles share one mass, so that the weight alone becomes larger.
         own = _own(engine)
         if not isinstance(own, Pushed):
             own.__class__ = Pushed  # a run's engine, built by its kind
@@ -225,20 +218,18 @@ class LinksAccess:
         own.grown = own.time, rise
 
     def floor_force(self, engine: Engine) -> Array:
-        """See the interface."""
         felt = _own(engine)._world.ground.force
         found: Array = felt[FLOOR] + felt[WALL]
         return found
 
     def torques(self, engine: Engine) -> Array:
-        """See the interface: the mean since the last look."""
+        # The mean since the last look.
         readings = engine.motors.readings
         assert readings is not None
         found: Array = readings.torques[0].copy()
         return found
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """See the interface."""
         bodies, particle = _own(engine)._world.bodies, engine.particle
         x, y, z = bodies.position[1]
         reach, radius = particle.reach, particle.radius
@@ -258,7 +249,6 @@ class LinksAccess:
             }[what]
 
     def heat(self, engine: Engine, share: float) -> None:
-        """See the interface."""
         world = _own(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 

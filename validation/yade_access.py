@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
+from dem.engine.demand import contact_law_of
 from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of, hinge_law, motor_law
+from dem.engine.yade.kind import hinge_law, motor_law
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
@@ -56,31 +57,24 @@ class YadeAccess:
     arm_share = 1.0
 
     def ball(self) -> Particle:
-        """See the interface."""
         return ball()
 
     def roller(self) -> Particle:
-        """See the interface."""
         return ball()
 
     def ends(self, particle: Particle) -> Array:
-        """See the interface."""
         return particle.centres
 
     def swept(self, particle: Particle) -> Array:
-        """See the interface."""
         return particle.centres
 
     def pin_stiffness(self, scene: Scene) -> float:
-        """See the interface."""
         return hinge_law(scene).pin_stiffness
 
     def spring_shafts(self) -> dict[str, Any]:
-        """See the interface."""
         return {}
 
     def build(self, particle: Particle, law: ContactLaw, *, dt: float, gravity: float = 0.0) -> YadeEngine:
-        """See the interface."""
         return YadeEngine(
             particle=particle,
             cylinder=Cylinder(radius=0.5, height=0.2, facets=16),
@@ -91,7 +85,6 @@ class YadeAccess:
         )
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> YadeEngine:
-        """See the interface."""
         return YadeEngine(
             particle=scene.particle,
             cylinder=Cylinder(radius=0.5, height=scene.cylinder.height, facets=16),
@@ -103,7 +96,6 @@ class YadeAccess:
         )
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
-        """See the interface."""
         own = _own(engine)
         bodies, vector = own._omega.bodies, own._yade.vector
         clump, (v, w) = bodies[own._assembly.bodies[k]].state, (np.asarray(velocity, float), np.asarray(spin, float))
@@ -119,18 +111,15 @@ class YadeAccess:
             member.angVel = clump.angVel
 
     def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
-        """See the interface."""
         own = _own(engine)
         own._omega.forces.setPermF(own._assembly.bodies[3 * k + link], own._yade.vector(*np.asarray(force, float)))
 
     def hold(self, engine: Engine) -> None:
-        """See the interface."""
         body, zero = bodies_of(engine)[1], _own(engine)._yade.vector(0, 0, 0)
         body.blockedDOFs = "xyzXYZ"
         body.vel, body.angVel, body.angMom = zero, zero, zero
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
-        """See the interface."""
         own = _own(engine)
         vector, inertias = own._yade.vector, own.particle.boxes.link_inertias[:, 2]
         for body, (along, across, spin), inertia in zip(bodies_of(engine), links, inertias, strict=True):
@@ -138,21 +127,17 @@ class YadeAccess:
             body.angMom = vector(0, 0, float(spin * inertia))
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """See the interface."""
         heavy = bodies_of(engine)[k]
         heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
 
     def floor_force(self, engine: Engine) -> Array:
-        """See the interface."""
         return _own(engine).container_force()
 
     def torques(self, engine: Engine) -> Array:
-        """See the interface."""
         found: Array = _own(engine).motors._hinges.torques()[0]
         return found
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """See the interface."""
         own = _own(engine)
         links = len(own._assembly.bodies) // 3
         body = bodies_of(engine)[2 * links - 1]
@@ -175,7 +160,6 @@ class YadeAccess:
             body.pos = vector(*places[what])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """See the interface."""
         omega = _own(engine)._omega
         for material in (omega.materials[label] for label in (SMARTICLE_MATERIAL, WALL_MATERIAL)):
             material.cn, material.cs = -share * material.cn, 0.0

@@ -1,163 +1,233 @@
-"""Our engines beside the rivals: `python -m benchmarks.rivals`.
+"""Compare our engines with others: `python -m benchmarks.rivals`.
 
 A pile per seed is poured once, on links; every engine gets its poses, lets them rest, and shakes them at Γ = 2 and
-30 Hz, or swings the barbs by 10° where it has motors. Every simulation is a process of its own on one thread, one after
-the other, seed by seed. Timed is the activity alone, by processor time. Rows go to `rivals.csv` as they come, where a
-later call with the same `--out` goes on; table and figure are made of them. What is not installed is left out, in one
-line each.
+30 Hz, or swings the barbs by 10° where it has motors. Every simulation is a process of its own on one thread. Timed is
+the activity alone, by processor time. Rows go to `rivals.csv` as they come, where a later call with the same `--out`
+goes on; medians over seeds go to `rivals_medians.csv` and a figure. What is not installed is left out.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
+import os
 import platform
+import resource
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from benchmarks.rivals import figure, running
+from benchmarks.rivals.given import CREEP, Given
 from benchmarks.rivals.ours import RESIDUAL
+from benchmarks.rivals.overlap import deepest, solid_of
 from benchmarks.rivals.settings import ACTIVITIES, ENGINES, SETTINGS, Setting
-from benchmarks.rivals.table import markdown, medians, verdicts
-from dem.errors import InputError
+from benchmarks.runs import PAPER_PER_LAYER, folder_of, pile, run_child
+from dem.body.state import State
 from dem.run.run import versions
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+from postprocess import packing_fraction
 
-QUICK_COUNT, QUICK_SECONDS = 20, 0.05
+Array = NDArray[np.float64]
+
 LOOK = 0.01  # s between two looks at the poses; at 30 Hz ten phases of the shaking
-# Engines that keep an account of energies, and at what setting.
+REST = 0.3  # s before the activity
+# A round bar as thick as the section's diagonal: only corners at the barbs' tips reach out of it, so that the pile
+# overlaps in no engine by much, whatever its shapes. Thinner ones settle a little before anything is measured.
+POUR = {"engine": "links", "fidelity": {"base": "standard", "diameter_m": 1.37e-3}}
+# Engines that keep an account of energies; it costs time, and is kept in a run of its own, of the first seed.
 ACCOUNTED, ACCOUNTED_AT = ("links", "yade"), "standard"
+KEYS = ["activity", "engine", "setting"]
+COST, STEP, MEMORY = "cost [s/s]", "dt [s]", "peak memory [MiB]"
+DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of looks [m]", "of the true boxes [m]"
+PHI_REST, PHI_END, SINKING = "phi at rest [1]", "phi at the end [1]", "sinks at rest [m/s]"
+SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of it are cheaper by [1]"
 
 
-def planned(engines: Sequence[str], seeds: Sequence[int]) -> Iterator[tuple[Setting, str, int, bool]]:
-    """Setting, activity, seed, and whether the account of energies is kept: what is run, in this order.
-
-    An account costs time, so that it is kept in a run of its own, of the first seed.
-    """
-    for seed in seeds:
-        for setting in SETTINGS:
-            if setting.engine not in engines or (setting.costly and seed != seeds[0]):
-                continue
-            for activity in setting.activities:
-                yield setting, activity, seed, False
-                if setting.engine in ACCOUNTED and seed == seeds[0] and setting.name == ACCOUNTED_AT:
-                    yield setting, activity, seed, True
+def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
+    """Return the data of a scene; small piles stay wide enough for a straight smarticle."""
+    data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
+    data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
+    return data
 
 
-def missing_from(rows: pd.DataFrame, setting: Setting, activity: str, seed: int, *, account: bool) -> bool:
-    """Whether the rows lack a run."""
-    if rows.empty:
-        return True
-    same = (rows["engine"] == ENGINES[setting.engine].title) & (rows["setting"] == setting.name)
-    same &= (rows["activity"] == activity) & (rows["seed"] == seed)
-    return bool(rows[same & (rows["account"] == account)].empty)
+def scene_of(
+    setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, look: float, account: bool
+) -> dict[str, Any]:
+    """Return the scene of a setting: take over, rest, act."""
+    recording = {"frame_interval_s": look, "series_interval_s": look, "checkpoint_interval_s": None}
+    if account:
+        recording["dissipation_interval_s"] = look
+    data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
+    data["phases"] = [
+        {"type": "take-over", "run": str(poured.absolute())},
+        {"type": "relax", "duration_s": REST},
+        {"type": activity, "duration_s": seconds, **ACTIVITIES[activity]},
+    ]
+    return data
 
 
-def joined(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows that were timed; of those with an account, what it misses alone."""
-    timed = rows[~rows["account"]]
-    if RESIDUAL not in rows:
-        return timed
-    keys = ["engine", "setting", "activity", "seed"]
-    return timed.drop(columns=RESIDUAL).merge(rows.loc[rows["account"], [*keys, RESIDUAL]], on=keys, how="left")
+def perform(task: Path) -> None:
+    """Simulate a task in this process: YADE and PyVista never meet in one, and peak memory is that of one engine."""
+    told = json.loads(task.read_text(encoding="utf-8"))
+    given = Given(parse_scene(told["scene"], source=str(task)), task.parent, told["look_s"])
+    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[told['engine']].module}")
+    outcome = module.simulate(given, told["knobs"])
+    np.savez(task.with_suffix(".npz"), positions=outcome.positions, frames=outcome.frames)
+    used = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    # A program that was started has the engine; this process, what feeds it.
+    row = {"processor_s": outcome.processor_s, STEP: outcome.time_step, MEMORY: (used[1] or used[0]) / 1024}
+    row |= {"version": outcome.version, **outcome.more}
+    task.with_suffix(".row.json").write_text(json.dumps(row), encoding="utf-8")
 
 
-def run_all(folder: Path, arguments: argparse.Namespace, engines: Sequence[str]) -> pd.DataFrame:
-    """Run what the folder's table lacks.
+def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace, *, account: bool) -> Any:
+    """Simulate in a process of its own and measure; return a row of the table.
 
     Raises:
-        InputError: the table is of another pile or time, or the pile's scene is refused.
+        subprocess.CalledProcessError: it failed; its message is on stderr.
     """
-    path = folder / "rivals.csv"
-    rows = pd.read_csv(path) if path.exists() else pd.DataFrame()
-    for column, value in ((running.COUNT, arguments.count), (running.SECONDS, arguments.seconds)):
-        if len(rows) and (rows[column] != value).any():
-            msg = f"--out {folder}: has rows of {column} {rows[column].iloc[0]:g}, not {value:g}; choose another folder"
-            raise InputError(msg)
-    for setting, activity, seed, account in planned(engines, arguments.seeds):
-        if activity not in arguments.activities or not missing_from(rows, setting, activity, seed, account=account):
-            continue
-        pile = running.pour(folder, count=arguments.count, seed=seed)
-        try:
-            row = running.run(
-                folder, setting, activity, pile,
-                count=arguments.count, seed=seed, seconds=arguments.seconds, look=LOOK, account=account,
-            )  # fmt: skip
-        except subprocess.CalledProcessError as error:
-            print(f"{setting.engine}, {setting.name}, {activity}, seed {seed}: failed, status {error.returncode}")
-            continue
-        rows = pd.concat([rows, pd.DataFrame([{**row, "account": account}])], ignore_index=True)
-        rows.to_csv(path, index=False)
-        told = f"{row[running.COST]:8.2f} s/s, {1e3 * row[running.DEPTH]:.4f} mm deep"
-        print(f"{row['engine']:7s} {setting.name:28s} {activity} seed {seed}: {told}", flush=True)
-    return rows
+    count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
+    if not (poured / "done.json").exists():
+        run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
+    place = folder / (f"{setting.key}-{activity}-{count}-{seed}" + ("-account" if account else ""))
+    place.mkdir(exist_ok=True)
+    scene = scene_of(setting, activity, poured, count=count, seed=seed, seconds=seconds, look=LOOK, account=account)
+    task = place / "task.json"
+    asked = {"engine": setting.engine, "knobs": dict(setting.knobs), "scene": scene, "look_s": LOOK}
+    task.write_text(json.dumps(asked), encoding="utf-8")
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+    command = [sys.executable, "-m", "benchmarks.rivals", "--task", str(task)]
+    subprocess.run(command, check=True, env={**os.environ, **one_thread})
+    told = json.loads(task.with_suffix(".row.json").read_text(encoding="utf-8"))
+    with np.load(task.with_suffix(".npz")) as poses:
+        found = measured(parse_scene(scene, source=str(place)), setting.shape, poses["positions"], poses["frames"])
+    cost = told.pop("processor_s") / seconds
+    return {"N [1]": count, "activity [s]": seconds, COST: cost, **found, **told}
 
 
-def machine() -> str:
-    """Processor and cores."""
-    model = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [
-            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
+def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
+    """Measure overlaps and packing of a simulation, see `benchmarks.rivals.given.Outcome`."""
+    before, rested, *acting = zip(positions, frames, strict=True)
+    depths = np.array(
+        [[deepest(solid_of(kind, scene.particle, *pose)) for kind in (shape, "boxes")] for pose in acting]
+    )
+    boxes, radius = scene.particle.boxes, scene.container.radius_m
+
+    def packed(positions: Array, frames: Array) -> float:
+        still = np.zeros_like(positions)
+        vertices = State(boxes, positions, frames, still, still).vertices
+        return packing_fraction(vertices, radius=radius, solid_volume=boxes.volume).value
+
+    return {
+        DEPTH: float(depths[:, 0].max()),
+        MEAN_DEPTH: float(depths[:, 0].mean()),
+        BOX_DEPTH: float(depths[:, 1].max()),
+        PHI_REST: packed(*rested),
+        PHI_END: float(np.mean([packed(*pose) for pose in acting[-max(1, len(acting) // 4) :]])),
+        SINKING: float((before[0] - rested[0])[..., 2].mean()) / CREEP,
+    }
+
+
+def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
+    """Yield each setting, with the columns that identify a run."""
+    first = given.seeds[0]
+    for seed in given.seeds:
+        for setting in SETTINGS:
+            if setting.engine not in engines or (setting.costly and seed != first):
+                continue
+            accounts = setting.engine in ACCOUNTED and seed == first and setting.name == ACCOUNTED_AT
+            for activity in filter(given.activities.__contains__, setting.activities):
+                for account in (False, True) if accounts else (False,):
+                    yield (
+                        setting,
+                        {
+                            "engine": ENGINES[setting.engine].title,
+                            "setting": setting.name,
+                            "activity": activity,
+                            "seed": seed,
+                            "account": account,
+                        },
+                    )
+
+
+def medians(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return one line per activity, engine and setting, and what links cost at its overlap and at a tenth of it."""
+    columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
+    groups = rows[~rows["account"]].groupby(KEYS, sort=False)
+    table = groups[columns].median().assign(**{"seeds [1]": groups["seed"].nunique()})
+    if RESIDUAL in rows:
+        table[RESIDUAL] = rows[rows["account"]].groupby(KEYS)[RESIDUAL].median()
+    table = table.reset_index()
+    links = table[table["engine"] == "links"]
+    for column, share in ((SAME, 1.0), (TENTH, 0.1)):
+        table[column] = [
+            row[COST] / links[(links["activity"] == row["activity"]) & (links[DEPTH] <= share * row[DEPTH])][COST].min()
+            for row in table.to_dict("records")
         ]
-        model = f"{len(names)} x {names[0]}" if names else model
-    return f"{model}, {platform.system()} {platform.release()}"
+    return table
+
+
+def draw(path: Path, table: pd.DataFrame) -> None:
+    """Draw cost against overlap, a panel per activity."""
+    activities = list(table["activity"].unique())
+    figure = Figure(figsize=(4.0 * len(activities), 4.0), layout="constrained")
+    panels = figure.subplots(1, len(activities), sharey=True, squeeze=False)[0]
+    for axes, activity in zip(panels, activities, strict=True):
+        for engine, own in table[table["activity"] == activity].groupby("engine", sort=False):
+            axes.loglog(1e3 * own[DEPTH], own[COST], "o", label=engine)
+        axes.set(title=activity, xlabel="deepest overlap [mm]", ylabel="processor time per simulated time [s/s]")
+        axes.legend()
+    figure.savefig(path, dpi=200)
 
 
 def main() -> int:
-    """Run all; write the table, the figure and the origin."""
+    """Run all; write the tables, the figure and the origin."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rivals", description=__doc__)
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES), help="(default: all)")
     parser.add_argument("--activities", nargs="+", choices=ACTIVITIES, default=list(ACTIVITIES))
     parser.add_argument("--count", type=int, default=270, help="smarticles (default: %(default)s)")
     parser.add_argument("--seconds", type=float, default=0.4, help="of the activity [s] (default: %(default)s)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="piles; what is costly has the first")
-    parser.add_argument("--quick", action="store_true", help="a small pile, and little time")
-    parser.add_argument("--analyse", action="store_true", help="run nothing: table and figure of the rows in --out")
-    parser.add_argument("--out", type=Path, default=None, help="folder (default: a new one); goes on if it exists")
-    arguments = parser.parse_args()
-    if arguments.quick:
-        arguments.count, arguments.seconds, arguments.seeds = QUICK_COUNT, QUICK_SECONDS, [1]
-    if arguments.count < 1 or arguments.seconds < LOOK:
-        parser.error(f"--count {arguments.count}, --seconds {arguments.seconds:g}: at least 1 and {LOOK:g} s")
-    folder = arguments.out or Path("out") / f"rivals-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
-    folder.mkdir(parents=True, exist_ok=True)
-    engines = [] if arguments.analyse else arguments.engines
-    for engine in engines:
-        if ENGINES[engine].missing:
-            print(ENGINES[engine].missing)
-    present = [engine for engine in engines if ENGINES[engine].missing is None]
-    try:
-        rows = run_all(folder, arguments, present)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
-    if rows.empty:
+    parser.add_argument("--out", type=Path, help="folder (default: a new one); goes on if it exists")
+    parser.add_argument("--task", type=Path, help="only simulate this task, in this process")
+    given = parser.parse_args()
+    if given.task:
+        perform(given.task)
+        return 0
+    folder = folder_of("rivals", given.out)
+    missing = {engine: ENGINES[engine].missing for engine in given.engines}
+    print(*filter(None, missing.values()), sep="\n")
+    path = folder / "rivals.csv"
+    rows = pd.read_csv(path).to_dict("records") if path.exists() else []
+    for setting, keys in planned([engine for engine, reason in missing.items() if not reason], given):
+        if any(all(row[key] == value for key, value in keys.items()) for row in rows):
+            continue
+        try:
+            found = run(folder, setting, keys["activity"], keys["seed"], given, account=keys["account"])
+        except subprocess.CalledProcessError as error:
+            print(f"{keys}: failed, status {error.returncode}")
+            continue
+        rows.append({**keys, **found})
+        pd.DataFrame(rows).to_csv(path, index=False)
+        print(f"{keys}: {found[COST]:8.2f} s/s, {1e3 * found[DEPTH]:.4f} mm deep", flush=True)
+    if not rows:
         print("nothing was run", file=sys.stderr)
         return 1
-    table = medians(joined(rows))
-    said = verdicts(table)
+    table = medians(pd.DataFrame(rows))
     table.to_csv(folder / "rivals_medians.csv", index=False, float_format="%.4g")
-    origin = {
-        "machine": machine(),
-        "command": f"python -m benchmarks.rivals {' '.join(sys.argv[1:])}",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "count": arguments.count,
-        "seconds": arguments.seconds,
-        "versions": {**versions(("links", "")), **dict(rows.groupby("engine")["version"].first())},
-    }
+    origin = {"machine": platform.platform(), "command": " ".join(sys.argv), "versions": versions(("links", ""))}
     (folder / "rivals.json").write_text(json.dumps(origin, indent=2) + "\n", encoding="utf-8")
-    (folder / "rivals.md").write_text(markdown(table, said), encoding="utf-8")
-    about = f"N = {arguments.count}, l/w = 0.7; {origin['machine']}; git {origin['versions']['git']}"
-    figure.draw(
-        folder / "rivals", table, [about, "Medians over seeds; overlap of the shapes that each engine keeps apart."]
-    )
-    print((folder / "rivals.md").read_text(encoding="utf-8"))
+    draw(folder / "rivals.png", table)
+    print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
     return 0
 
 

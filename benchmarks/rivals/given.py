@@ -136,15 +136,13 @@ class Outcome:
 
 
 class Stepped(Protocol):
-    """A simulation that is advanced from look to look."""
+    """A simulation that is advanced from look to look, its current dt [s] and the engine's name and version."""
 
     @property
-    def time_step(self) -> float:
-        """The dt of now [s]."""
+    def time_step(self) -> float: ...  # noqa: D102
 
     @property
-    def version(self) -> str:
-        """Of the engine, its name with it."""
+    def version(self) -> str: ...  # noqa: D102
 
     def begin(self) -> None:
         """The activity begins."""

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.rivals.given import Array, Given, Knobs, Outcome, simulated
-from benchmarks.rivals.solids import halves_of
+from benchmarks.rivals.overlap import halves_of
 
 MIDDLE = 1  # the link that carries the two others
 SERVO = 0.02  # rad behind its target at which a servo has its full torque

@@ -7,31 +7,20 @@ are segments of no length) as far as their axes are nearer than a diameter. Link
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dem.body.particle import LINKS, Boxes, Particle
+from dem.engine.links.shape import shape_of
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 PARALLEL = 1e-9  # squared sine of an angle below which two edges have no common normal of their own
-
-
-class Solid(Protocol):
-    """The parts that smarticles are made of at one instant."""
-
-    @property
-    def owners(self) -> Indices:
-        """(B,) number of the smarticle that each part belongs to."""
-
-    def candidates(self) -> Indices:
-        """(P, 2) pairs of parts that may be in each other."""
-
-    def depths(self, pairs: Indices) -> Array:
-        """(P,) how deep pairs of parts are in each other [m]; not positive where they are apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +40,11 @@ class Bars:
     owners: Indices
 
     def candidates(self) -> Indices:
-        """See `Solid.candidates`."""
+        """(P, 2) pairs of parts that may be in each other."""
         return _near(self.centres, np.linalg.norm(self.halves, axis=1))
 
     def depths(self, pairs: Indices) -> Array:
-        """See `Solid.depths`: least overlap over the fifteen axes on which convex boxes can be told apart."""
+        """(P,) least overlap [m] over the fifteen axes on which convex boxes can be told apart."""
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -89,12 +78,12 @@ class Swept:
     owners: Indices
 
     def candidates(self) -> Indices:
-        """See `Solid.candidates`."""
+        """(P, 2) pairs of parts that may be in each other."""
         reaches = np.linalg.norm(self.ends - self.starts, axis=1) / 2 + self.radius
         return _near((self.starts + self.ends) / 2, reaches)
 
     def depths(self, pairs: Indices) -> Array:
-        """See `Solid.depths`."""
+        """(P,) how deep pairs of parts are in each other [m]; not positive where they are apart."""
         one, other = pairs.T
         return 2 * self.radius - distances(self.starts[one], self.ends[one], self.starts[other], self.ends[other])
 
@@ -121,7 +110,7 @@ def distances(starts: Array, ends: Array, others: Array, other_ends: Array) -> A
     return nearest
 
 
-def deepest(solid: Solid) -> float:
+def deepest(solid: Bars | Swept) -> float:
     """How deep the deepest two parts of different smarticles are in each other [m]; 0 where none are."""
     pairs = solid.candidates()
     pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
@@ -144,3 +133,49 @@ def _near(centres: Array, reaches: Array) -> Indices:
     meet = np.linalg.norm(centres[one] - centres[other], axis=1) < reaches[one] + reaches[other]
     near: Indices = pairs[meet]
     return near
+
+
+SHAPES = ("boxes", "strands", "spheres")
+
+
+def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
+    """Return what an engine keeps apart: boxes, strands of links, or spheres of YADE and LAMMPS.
+
+    Positions are (N, 3, 3), the centres of the links [m]; frames (N, 3, 3, 3), their axes as columns [1].
+    """
+    parts: Mapping[str, Callable[[Particle, Array, Array], Bars | Swept]]
+    parts = {"boxes": _boxes, "strands": _strands, "spheres": _spheres}
+    return parts[shape](particle, positions, frames)
+
+
+def halves_of(boxes: Boxes) -> Array:
+    """(3, 3) half the sides of the links, along the axes of their frames [m]."""
+    sections = np.tile([boxes.thickness_in_plane, boxes.thickness_normal], (LINKS, 1))
+    return np.column_stack([boxes.lengths, sections]) / 2
+
+
+def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
+    count = len(positions)
+    halves = np.tile(halves_of(particle.boxes), (count, 1))
+    return Bars(positions.reshape(-1, 3), frames.reshape(-1, 3, 3), halves, np.repeat(np.arange(count), LINKS))
+
+
+def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
+    """As `dem.engine.links.shape` describes them: barbs begin at the hinge and end a radius before the tip."""
+    shape = shape_of(particle)
+    spans = {0: (-shape.arm, shape.tip - shape.arm), 1: (-shape.end, shape.end), 2: (-shape.arm, shape.tip - shape.arm)}
+    ends: tuple[list[Array], list[Array]] = ([], [])
+    for link in shape.kinds:
+        for offset in shape.offsets:
+            for kept, along in zip(ends, spans[int(link)], strict=True):
+                kept.append(positions[:, link] + along * frames[:, link, :, 0] + offset * frames[:, link, :, 2])
+    starts, stops = (np.concatenate(kept) for kept in ends)
+    owners = np.tile(np.arange(len(positions)), len(starts) // len(positions))
+    return Swept(starts, stops, shape.radius, owners)
+
+
+def _spheres(particle: Particle, positions: Array, frames: Array) -> Swept:
+    turned = np.einsum("nsij,sj->nsi", frames[:, particle.links], particle.local_centres)
+    centres = (positions[:, particle.links] + turned).reshape(-1, 3)
+    owners = np.repeat(np.arange(len(positions)), len(particle.links))
+    return Swept(centres, centres, particle.radius, owners)

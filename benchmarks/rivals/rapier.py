@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.rivals.given import FACETS, Array, Given, Knobs, Outcome, rigid_links, simulated
-from benchmarks.rivals.solids import halves_of
+from benchmarks.rivals.overlap import halves_of
 
 # Lengths there over lengths here. Times and densities stay, so that gravity grows as lengths do, and masses as volumes.
 SCALE = 100.0

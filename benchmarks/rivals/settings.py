@@ -23,7 +23,7 @@ class Setting:
     Args:
         engine: a key of `ENGINES`.
         name: of the setting.
-        shape: what it keeps apart, see `benchmarks.rivals.solids`.
+        shape: what it keeps apart, see `benchmarks.rivals.overlap`.
         activities: that it can do.
         scene: keys of the scene that differ.
         knobs: that are not of the scene.
@@ -80,13 +80,7 @@ ENGINES: Mapping[str, Peer] = {
 }
 
 BOTH = (SHAKE, OSCILLATE)
-STIFFNESSES: Mapping[str, float] = {
-    "2 N/mm": 2e3,
-    "4 N/mm": 4e3,
-    "32 N/mm": 3.2e4,
-    "256 N/mm": 2.56e5,
-    "2048 N/mm": 2.048e6,
-}
+STIFFNESSES = (2e3, 4e3, 3.2e4, 2.56e5, 2.048e6)  # N/m
 
 
 def _ours() -> Iterator[Setting]:
@@ -95,10 +89,10 @@ def _ours() -> Iterator[Setting]:
         yield Setting(
             engine="links", name=name, shape="strands", activities=BOTH, scene={"engine": "links", "fidelity": name}
         )
-    for name, stiffness in STIFFNESSES.items():
+    for stiffness in STIFFNESSES:
         stiffer = {"base": "standard", "stiffness_N_per_m": stiffness}
         yield Setting(
-            engine="links", name=name, shape="strands", activities=BOTH, costly=stiffness > 1e6,
+            engine="links", name=f"{stiffness / 1e3:g} N/mm", shape="strands", activities=BOTH, costly=stiffness > 1e6,
             scene={"engine": "links", "fidelity": stiffer},
         )  # fmt: skip
     for name in ("draft", "standard", "reference"):
@@ -109,15 +103,9 @@ def _ours() -> Iterator[Setting]:
 
 
 def _mujoco(time_step: float, contact: float) -> Mapping[str, Any]:
-    """Solver of the trials; Newton's and elliptic cones took longer at equal overlap.
-
-    Args:
-        time_step: dt [s].
-        contact: time constant of contacts [s]; 0.02 is what MuJoCo ships, 2 dt the least that it allows.
-    """
-    return {
-        "time_step": time_step, "solver": "CG", "iterations": 50, "cone": "pyramidal", "solref": [contact, 1.0]
-    }  # fmt: skip
+    """Return the solver of the trials; a contact's time constant is 0.02 s as shipped, and 2 dt at least."""
+    solver = {"solver": "CG", "iterations": 50, "cone": "pyramidal"}
+    return {"time_step": time_step, **solver, "solref": [contact, 1.0]}
 
 
 def _theirs() -> Iterator[Setting]:

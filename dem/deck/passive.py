@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dem.body.state import State
+from dem.engine.demand import contact_law_of
 from dem.errors import InputError
 from dem.phases.relax import Relax
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.take_over import TakeOver, poses_of
-from dem.physics.contact import ContactLaw, contact_law
+from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_steps
 from dem.scene.carried import foreign
 from dem.scene.scene import Scene
@@ -81,7 +82,7 @@ def passive(scene: Scene, target: str) -> PassiveScene:
         scene=scene,
         phases=[first, *(phase for phase in others if isinstance(phase, Relax | Shake | RemoveContainer))],
         time_step=min(time_steps(scene)),
-        law=contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m),
+        law=contact_law_of(scene),
         state=State.rigid(scene.particle.boxes, poses.positions, turns, still, still),
     )
     _check_depths(told, target)

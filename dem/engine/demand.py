@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
+from dem.physics.contact import ContactLaw, contact_law
 from dem.setting.contact import Contact
 from dem.setting.container import Cylinder
 from dem.setting.fidelity import Fidelity
@@ -85,3 +86,8 @@ class Demand(Protocol):
 
     def calls_for(self, effect: EffectName) -> bool:
         """Whether a phase calls for an effect."""
+
+
+def contact_law_of(scene: Demand) -> ContactLaw:
+    """Return the contact law of a scene, the same on all engines."""
+    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)

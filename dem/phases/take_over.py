@@ -35,12 +35,8 @@ STRIDE = 10  # steps between looks at whether what overlaps flies apart; a conta
 # Sphere diameters that a vertex may be from its place in the scene's shape. A hinge on YADE gives way by 0.01 in a
 # pile, and contacts at rest are about as deep, so that it makes no more overlap than there is.
 MOST_OFF = 0.02
-_SHAPE = {  # keys of a smarticle, and what the manifest of a run calls them
-    "aspect_ratio": "aspect_ratio",
-    "middle_length_m": "middle_length",
-    "thickness_normal_m": "thickness_normal",
-    "thickness_in_plane_m": "thickness_in_plane",
-}
+# Keys of a smarticle that run.json has too.
+_SHAPE = ("aspect_ratio", "middle_length_m", "thickness_normal_m", "thickness_in_plane_m")
 
 
 class TakeOver(Part, Phase):
@@ -148,9 +144,9 @@ class TakeOver(Part, Phase):
             "sha256": self.sha256,
             "time_s": taken.frame.time,
             "fastest_m_per_s": taken.fastest,
-            "scene_sha256": taken.run.scene_sha256,
-            "seed": taken.run.seed,
-            "engine": taken.run.engine,
+            "scene_sha256": taken.run.manifest.scene_sha256,
+            "seed": taken.run.manifest.seed,
+            "engine": taken.run.manifest.engine,
         }
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
@@ -250,8 +246,8 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
     Raises:
         InputError: they are others, or do not fit into its container; one line with key, value and the way out.
     """
-    if taken.run.planar:
-        msg = f"phases.0.run: {taken.run.directory} is a run in a plane; take over one in a container"
+    if taken.run.manifest.planar:
+        msg = f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
         raise InputError(msg)
     _check_smarticle(scene, taken)
     _check_room(scene, taken)
@@ -262,17 +258,19 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
 
 
 def _check_smarticle(scene: SceneView, taken: Taken) -> None:
-    for key, name in _SHAPE.items():
-        here, there = getattr(scene.smarticle, key), getattr(taken.run, name)
+    for key in _SHAPE:
+        here, there = getattr(scene.smarticle, key), getattr(taken.run.manifest, key)
         if not math.isclose(here, there, rel_tol=1e-9):
             unit = "" if key == "aspect_ratio" else " m"
             msg = (
-                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run.directory}, which phases.0 "
+                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, which phases.0 "
                 "(take-over) takes over; use the same, or another run"
             )
             raise InputError(msg)
     if taken.frame.count != scene.count:
-        whole = "" if taken.frame.count == taken.run.count else f" of {taken.run.count}, poured so far"
+        whole = (
+            "" if taken.frame.count == taken.run.manifest.count else f" of {taken.run.manifest.count}, poured so far"
+        )
         msg = (
             f"count: {scene.count} here, but {taken}, which phases.0 (take-over) takes over, holds "
             f"{taken.frame.count}{whole}; use the same, or another frame"

@@ -8,7 +8,7 @@ from typing import Any, Self
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
-from dem.plan.advice import warnings_of
+from dem.plan.advice import expected_overlaps, warnings_of
 from dem.plan.effects import Decision, decide
 from dem.plan.protocol import protocol_lines
 from dem.plan.steps import stable_step, time_steps
@@ -57,6 +57,10 @@ class Plan:
     strands: int = 0
     correction: float = 1.0
     protocol: tuple[str, ...] = ()
+    overlap_impact: float = 0.0
+    """Of the hardest impact, estimated, in diameters [1]."""
+    overlap_weight: float = 0.0
+    """Under the pile's weight, estimated, in diameters [1]."""
 
     def corrected(self, factor: float) -> Self:
         """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
@@ -77,6 +81,8 @@ class Plan:
             *self._engine_to_text(),
             *self.protocol,
             self._steps_to_text(),
+            f"contacts give way by about {self.overlap_impact:.2g} d in the hardest impact, "
+            f"{self.overlap_weight:.2g} d under the pile's weight",
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
         ]
@@ -164,6 +170,7 @@ def plan(scene: Scene) -> Plan:
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
+    impact, weight = expected_overlaps(scene)
     return Plan(
         name=scene.name,
         count=scene.count,
@@ -181,6 +188,8 @@ def plan(scene: Scene) -> Plan:
         planar=scene.plane is not None,
         engine=scene.engine,
         fidelity=scene.fidelity.base,
+        overlap_impact=impact / particle.chain.diameter,
+        overlap_weight=weight / particle.chain.diameter,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),

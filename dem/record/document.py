@@ -1,98 +1,211 @@
-"""JSON files of a run directory, read with a complaint in one line for whatever is not what it should be."""
+"""JSON files of a run directory: `run.json` with `done.json` or `failed.json`, and `progress.json`."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, ClassVar, Literal, Self
 
-from dem.record.files import cannot_read
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
-REMEDY = "give the directory of a run made by this version of `smarticles run`"
+from dem.errors import RunError, shown
+from dem.record.files import cannot_read, write_text
+from dem.record.names import DONE, FAILED
+
+REMEDY = "give the directory of a run made by `smarticles run`"
 
 
-@dataclass(frozen=True)
-class Document:
-    """A JSON object with its file, so that every complaint can name both.
+class Document(BaseModel):
+    """A JSON object with typed keys; keys of other versions are passed over."""
 
-    Args:
-        path: the file.
-        data: its content, or an object in it.
-    """
-
-    path: Path
-    data: Mapping[str, Any]
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, strict=True)
+    remedy: ClassVar[str] = REMEDY
 
     @classmethod
-    def read(cls, path: Path) -> Document:
-        """The object that a file holds.
+    def read(cls, path: Path) -> Self:
+        """Read the object that a file holds.
 
         Raises:
-            InputError: There is none.
+            InputError: It is missing, damaged, or lacks a key; one line with file, key and value.
         """
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            cannot_read("manifest", path, error, REMEDY)
-        if not isinstance(data, dict):
-            cannot_read("manifest", path, "it holds no JSON object", REMEDY)
-        return cls(path, data)
+            return cls.model_validate_json(path.read_bytes())
+        except OSError as error:
+            cannot_read("manifest", path, error, cls.remedy)
+        except ValidationError as error:
+            found = error.errors(include_url=False)[0]
+            key = ".".join(map(str, found["loc"]))
+            text = found["msg"].removeprefix("Value error, ")
+            got = (
+                "" if found["type"] in ("missing", "json_invalid", "value_error") else f", got {shown(found['input'])}"
+            )
+            cannot_read("manifest", path, f"{key}: {text}{got}" if key else text + got, cls.remedy)
 
-    def _get(self, key: str) -> Any:
+    def write(self, path: Path, *, make_folder: bool = False) -> None:
+        """Write it whole, without keys that are None.
+
+        Raises:
+            RunError: It cannot be written.
+        """
+        write_text(path, self.model_dump_json(indent=2, exclude_none=True) + "\n", make_folder=make_folder)
+
+
+class Phase(Document):
+    """One phase of a run: `run.json` has its time step, `done.json` when it began and ended, and what it cost."""
+
+    index: NonNegativeInt
+    type: str
+    time_step_s: PositiveFloat | None = None
+    start_s: NonNegativeFloat | None = None
+    end_s: NonNegativeFloat | None = None
+    wall_s: NonNegativeFloat | None = None
+    cpu_s: NonNegativeFloat | None = None
+
+
+class Manifest(Document):
+    """What made a run, `run.json`.
+
+    Attributes:
+        format: Version of the run directory.
+        versions: Version of each program that took part.
+        engine: Absent in manifests written before the key was added.
+        threads: Threads that the engine ran with; ranks on lammps.
+        fidelity: Name of the fidelity that the scene's is based on.
+        count: Number of smarticles of the scene.
+        aspect_ratio: l/w [-].
+        thickness_normal_m: Thickness t1 along the normal of the smarticle's plane.
+        thickness_in_plane_m: Thickness t2 in the smarticle's plane.
+        middle_thickness_in_plane_m: That of the middle link, where it has its own.
+        solid_volume_m3: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2.
+        container_radius_m: Of the widest tier.
+        packing_radius_m: Radius that packing fractions are computed with, where it is not the container's.
+        container_tiers: Cylinders of different radii that stand on each other.
+        planar: Whether all motion is confined to a plane, without a container.
+        channel_width_m: Distance of the two walls in the plane; None without.
+        sphere_diameter_m: Diameter of the spheres that stand for a smarticle.
+        time_step_s: The shortest of its phases.
+        taken_over: Where its smarticles come from, if from another run.
+    """
+
+    format: Literal[1] = 1
+    name: str
+    scene_sha256: str
+    seed: NonNegativeInt
+    command: str
+    started: str
+    versions: Mapping[str, str]
+    engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
+    threads: NonNegativeInt
+    fidelity: str
+    count: PositiveInt
+    aspect_ratio: NonNegativeFloat
+    middle_length_m: PositiveFloat
+    barb_length_m: NonNegativeFloat
+    thickness_normal_m: PositiveFloat
+    thickness_in_plane_m: PositiveFloat
+    middle_thickness_in_plane_m: PositiveFloat | None = None
+    smarticle_mass_kg: PositiveFloat
+    solid_volume_m3: PositiveFloat
+    container_radius_m: PositiveFloat
+    packing_radius_m: PositiveFloat | None = None
+    container_tiers: PositiveInt = 1
+    planar: bool = False
+    channel_width_m: PositiveFloat | None = None
+    sphere_diameter_m: PositiveFloat
+    spheres_per_smarticle: PositiveInt
+    time_step_s: PositiveFloat
+    phases: tuple[Phase, ...]
+    taken_over: Mapping[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _numbered(self) -> Self:
+        if [phase.index for phase in self.phases] != list(range(len(self.phases))):
+            msg = "'phases' must be numbered 0, 1, 2, …"
+            raise ValueError(msg)
+        return self
+
+    @property
+    def thicknesses_in_plane_m(self) -> tuple[float, float, float]:
+        """Of barb 1, middle link, barb 2 [m]."""
+        middle = self.middle_thickness_in_plane_m
+        return (self.thickness_in_plane_m, middle or self.thickness_in_plane_m, self.thickness_in_plane_m)
+
+    @property
+    def bulge_m(self) -> float:
+        """By how much the middle link is thicker than the barbs, to either side in the plane [m]."""
+        return (self.thicknesses_in_plane_m[1] - self.thickness_in_plane_m) / 2
+
+    @property
+    def measured_radius_m(self) -> float:
+        """Radius that packing fractions are computed with [m]."""
+        return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
+
+    def walled(self, phase: int) -> bool:
+        """Whether the container's wall is there in the phase of an index."""
+        return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
+
+    def fills_cylinder(self, phase: int) -> bool:
+        """Whether the pile fills one cylinder then, so that packing fractions have a meaning."""
+        return self.container_tiers == 1 and self.walled(phase)
+
+
+class Done(Document):
+    """How a run that is done went, `done.json`, the last of its files."""
+
+    status: Literal["done"] = "done"
+    time_s: NonNegativeFloat
+    steps: NonNegativeInt
+    wall_s: NonNegativeFloat
+    cpu_s: NonNegativeFloat | None = None
+    phases: tuple[Phase, ...]
+
+    def mark(self, out: Path) -> None:
+        """Write it into a run directory.
+
+        Raises:
+            RunError: It cannot be written.
+        """
+        (out / FAILED).unlink(missing_ok=True)
+        self.write(out / DONE)
+
+
+Ended = Literal["failed", "interrupted"]
+
+
+class Failed(Document):
+    """Why a run ended too early, `failed.json`; `checkpoint_s` is the simulated time of its last good checkpoint."""
+
+    status: Ended
+    cause: str
+    time_s: NonNegativeFloat
+    checkpoint_s: NonNegativeFloat | None = None
+
+    def mark(self, out: Path) -> None:
+        """Write it into a run directory; silent where the disk is full, since the cause is on the terminal too."""
         try:
-            return self.data[key]
-        except KeyError:
-            cannot_read("manifest", self.path, f"key '{key}' is missing", REMEDY)
+            self.write(out / FAILED)
+        except RunError:
+            return
 
-    def _refuse(self, key: str, value: object, wanted: str) -> NoReturn:
-        cannot_read("manifest", self.path, f"'{key}' must be {wanted}: got {value!r}", REMEDY)
 
-    def text(self, key: str) -> str:
-        """Text.
+class Progress(Document):
+    """How far a run is that goes on, `progress.json`, at most a second old."""
 
-        Raises:
-            InputError: There is none.
-        """
-        value = self._get(key)
-        if not isinstance(value, str):
-            self._refuse(key, value, "text")
-        return value
-
-    def integer(self, key: str, *, least: int = 0) -> int:
-        """A whole number, no less than the least.
-
-        Raises:
-            InputError: There is none.
-        """
-        value = self._get(key)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            self._refuse(key, value, f"a whole number, {least} or more")
-        return value
-
-    def number(self, key: str, *, positive: bool = False) -> float:
-        """A finite number, not negative.
-
-        Raises:
-            InputError: There is none.
-        """
-        value = self._get(key)
-        wanted = "a finite number > 0" if positive else "a finite number >= 0"
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self._refuse(key, value, wanted)
-        if not math.isfinite(value) or value < 0 or (positive and value == 0):
-            self._refuse(key, value, wanted)
-        return float(value)
-
-    def phases(self) -> list[Document]:
-        """The objects in its list of phases.
-
-        Raises:
-            InputError: There is none.
-        """
-        value = self._get("phases")
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            self._refuse("phases", value, "a list of objects")
-        return [Document(self.path, item) for item in value]
+    phase: str | None = None
+    phase_index: int | None = None
+    time_s: float | None = None
+    end_s: float | None = None
+    phi: float | None = None
+    count: int | None = None
+    wall_s: float | None = None
+    checkpoint_s: float | None = None

@@ -1,4 +1,4 @@
-"""Forces at contacts at one recorded time: a small VTK file of lines, one for each contact; see ARCHITECTURE.md."""
+"""Forces at contacts at one time: a small VTK file of lines, one per contact; see docs/reference/files.md."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def read_forces(frame: Frame) -> RecordedForces:
         InputError: The run recorded none, or the file is damaged.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
     """
     path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
     points, data = _content(path)

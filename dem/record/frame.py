@@ -1,6 +1,6 @@
 """One frame: a small VTK file of the centrelines of all smarticles at one recorded time; and one of their spheres.
 
-ARCHITECTURE.md describes the format.
+docs/reference/files.md describes the format.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class Frame:
         path: The file it came from.
         time: Simulated time [s].
         floor_z: Height of the container's floor [m]; heights are measured from it.
-        phase: Index into `RunManifest.phases`.
+        phase: Index into `Run.phases`.
         vertices: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has
             at that time.
         smarticle_ids: (N,) int64.
@@ -192,7 +192,7 @@ def read_frame(path: Path | str) -> Frame:
     """Reads one frame file.
 
     Args:
-        path: A `.vtu` file as described in ARCHITECTURE.md.
+        path: A `.vtu` file as described in docs/reference/files.md.
 
     Returns:
         The frame.
@@ -201,7 +201,7 @@ def read_frame(path: Path | str) -> Frame:
         InputError: The file is missing, damaged, or lacks what a frame must have.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
     """
     path = Path(path)
     return _FrameReader(path, read_mesh(path)).frame()

@@ -123,7 +123,7 @@ class FrameSequence(Sequence[Frame]):
         """The frames of one phase, found by bisection: phases follow each other in time.
 
         Args:
-            phase: Index into `RunManifest.phases`.
+            phase: Index into `Run.phases`.
 
         Returns:
             Its frames; empty if the run has not recorded any.
@@ -146,7 +146,7 @@ def read_frames(directory: Path | str) -> FrameSequence:
         InputError: `frames.pvd` is missing, damaged or not in time order.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
 
     Example:
         >>> for frame in read_frames("runs/pile")[-2:]:

@@ -1,4 +1,4 @@
-"""The files of a run directory and the formats of those that have one; ARCHITECTURE.md says what is in them."""
+"""The files of a run directory and the formats of those that have one; docs/reference/files.md says what is in them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ SPHERE = "sphere"
 FORCE = "force"
 """Noun of the pictures of forces at contacts."""
 
-MANIFEST_FORMAT = 1
 SERIES_FORMAT = 1
 CHECKPOINT_FORMAT = 4
 

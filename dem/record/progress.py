@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import time
@@ -10,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dem.errors import RunError
-from dem.record.files import write_text
+from dem.record.document import Progress
 from dem.record.names import PROGRESS
 
 INTERVAL = 1.0  # s of wall time between updates
@@ -78,19 +77,19 @@ class ProgressWriter:
             return
         self._last = now
         shown_phi = phi if math.isfinite(phi) else None
-        data = {
-            "phase": self._phase,
-            "phase_index": self._index,
-            "time_s": time,
-            "end_s": self._end,
-            "phi": shown_phi,
-            "count": count,
-            "wall_s": now - self._begun,
-            "checkpoint_s": self._checkpoint,
-        }
+        said = Progress(
+            phase=self._phase,
+            phase_index=self._index,
+            time_s=time,
+            end_s=self._end,
+            phi=shown_phi,
+            count=count,
+            wall_s=now - self._begun,
+            checkpoint_s=self._checkpoint,
+        )
         try:
             if self.folder.is_dir():  # one that was taken away is not made again
-                write_text(self.folder / PROGRESS, json.dumps(data))
+                said.write(self.folder / PROGRESS)
         except RunError:
             # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import logging
 import os
 from collections.abc import Iterator
@@ -90,20 +89,6 @@ def in_use(out: Path) -> bool:
     except OSError:
         return False  # nobody ever did, or it is not ours to look at
     return False
-
-
-def recorded_scene_hash(out: Path) -> str:
-    """Hash of the scene that a run directory was made from.
-
-    Raises:
-        InputError: its manifest cannot be read.
-    """
-    path = out / MANIFEST
-    try:
-        return str(json.loads(path.read_text(encoding="utf-8"))["scene_sha256"])
-    except (OSError, ValueError, KeyError, TypeError):
-        msg = f"{path}: cannot be read; start the run anew in another --out"
-        raise InputError(msg) from None
 
 
 @contextmanager

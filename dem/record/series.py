@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -19,9 +19,13 @@ from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
-from dem.record.manifest import RunManifest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PERIOD = 1.0  # s of wall time between two writings of a series that grows
+# What the columns of a series of vectors are, by their number.
+_COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
@@ -136,6 +140,17 @@ class Series:
         times: NDArray[np.float64] = self.data["time_s"]
         return times
 
+    def table(self) -> pd.DataFrame:
+        """The series as a table: one row per sample, units in its column names."""
+        import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
+
+        columns = {name: self[name] for name in ("time_s", "phase")}
+        for name, values in self.data.items():
+            parts = values[:, None] if values.ndim == 1 else values
+            marks = _COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
+            columns |= {f"{name}{mark}": part for mark, part in zip(marks, parts.T, strict=True)}
+        return pd.DataFrame(columns)
+
     def nearest(self, time: float) -> int:
         """Index of the sample nearest in time.
 
@@ -146,17 +161,6 @@ class Series:
             Index into every array.
         """
         return int(np.argmin(np.abs(self.time - time)))
-
-
-def lost_series(run: RunManifest) -> str | None:
-    """What is to be told of a run that is done and whose series is not there; None: there is nothing to tell."""
-    path = run.directory / names.SERIES
-    if run.status != "done" or path.exists():
-        return None
-    return (
-        f"{path}: is gone, although the run is done, so that all that was recorded in it is missing from tables; put "
-        f"it back, or run {run.directory / names.SCENE} anew elsewhere"
-    )
 
 
 def read_series(directory: Path | str) -> Series:
@@ -172,7 +176,7 @@ def read_series(directory: Path | str) -> Series:
         InputError: The file is missing, damaged, or lacks what it must have.
 
     Source:
-        ARCHITECTURE.md, "The run directory".
+        docs/reference/files.md.
 
     Example:
         >>> series = read_series("runs/pile")

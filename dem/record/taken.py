@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.frames import read_frames
-from dem.record.manifest import RunManifest, read_run
-from dem.record.rundir import in_use
+from dem.record.run import Run, open_run
 
 LAST = "last"
 """The frame at the end of a run that is done."""
@@ -29,7 +27,7 @@ class Taken:
         frame: the frame.
     """
 
-    run: RunManifest
+    run: Run
     number: int
     frame: Frame
 
@@ -49,10 +47,10 @@ class Taken:
         return float(np.linalg.norm(self.frame.link_velocity, axis=-1).max())
 
     def __str__(self) -> str:
-        return f"frame {self.number} of {self.run.directory}"
+        return f"frame {self.number} of {self.run.path}"
 
 
-def take(run: Path, frame: int | str) -> Taken:
+def take(path: Path, frame: int | str) -> Taken:
     """Read a frame of a run, by its number or `LAST`.
 
     Raises:
@@ -60,16 +58,17 @@ def take(run: Path, frame: int | str) -> Taken:
             `frame`, the key that is wrong.
     """
     try:
-        manifest, frames = read_run(run), read_frames(run)
+        run = open_run(path)
+        frames, state = run.frames, run.status.state
     except InputError as error:
         msg = f"run: {error}"
         raise InputError(msg) from None
-    if in_use(run):
+    if state == "running":
         msg = f"run: {run} is still being computed; wait until it is done: smarticles status {run}"
         raise InputError(msg)
-    if frame == LAST and manifest.status != "done":
+    if frame == LAST and state != "done":
         msg = (
-            f"frame: {LAST}, but {run} is {manifest.status}; go on with it (smarticles resume {run}), or give the "
+            f"frame: {LAST}, but {run} is {state}; go on with it (smarticles resume {run}), or give the "
             "number of a frame"
         )
         raise InputError(msg)
@@ -78,7 +77,7 @@ def take(run: Path, frame: int | str) -> Taken:
         msg = f"frame: {number}, but the frames of {run} are 0 … {len(frames) - 1}; use one of them, or {LAST}"
         raise InputError(msg)
     try:
-        return Taken(manifest, number, frames[number])
+        return Taken(run, number, frames[number])
     except InputError as error:
         msg = f"frame: {error}"
         raise InputError(msg) from None

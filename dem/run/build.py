@@ -31,6 +31,10 @@ SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or 
 # Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
 # slip through each other; shaking at Γ = 10, draft, reaches 0.4.
 DEPTH_LIMIT = 0.5
+# The same on links, whose contacts stiffen without bound before axes meet: a load of a hundred piles does not reach it.
+BARRIER_LIMIT = 0.9
+# Of what was dissipated, which the energy ledger of links may miss; that of YADE is sampled, as often as a scene asks.
+MISSED_LIMIT = 0.05
 # Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
 # results resolves.
 RISE_LIMIT = 0.5
@@ -86,7 +90,8 @@ def build_watchdog(scene: Scene) -> Watchdog:
         cylinder=scene.cylinder,
         speed=SPEED_MARGIN * max(fall, *(phase.peak_speed(gravity) for phase in scene.phases)),
         gap=GAP_LIMIT * diameter,
-        depth=DEPTH_LIMIT * diameter,
+        depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
+        missed=MISSED_LIMIT if scene.smooth else math.inf,
         # Without gravity there is no such measure.
         energy=RISE_LIMIT * diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -57,6 +58,8 @@ class Recorder:
     sphere_every: int = 1
     samples: int = 0
     """Taken so far."""
+    residual: str | None = None
+    """What the run says of its energy ledger, if it ended now."""
     next_step: int = 0
     """When the next one is due."""
 
@@ -92,6 +95,10 @@ class Recorder:
         # After the frame is written: the last picture of a run that fails is worth having.
         if self.samples % (self.watch_every or max(1, round(WATCH_STEPS * engine.time_step / self.interval))) == 0:
             self.watch(engine, state)
+        if "energy_residual_J" in row and not math.isnan(row["energy_residual_J"]):
+            self.residual = self.watchdog.check_residual(
+                row["energy_residual_J"], dissipated=row["dissipated_energy_J"], time=engine.time
+            )
         self.progress.update(time=engine.time, phi=row["packing_fraction"], count=engine.count)
         self.samples += 1
         self.schedule(engine)

@@ -21,11 +21,12 @@ from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.advice import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
+from dem.record.document import Done, Ended, Failed, Manifest, Phase
 from dem.record.files import write_text
-from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed, read_run, write_manifest
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE
 from dem.record.progress import ProgressWriter
-from dem.record.rundir import claimed, log_of, recorded_scene_hash
+from dem.record.run import Run
+from dem.record.rundir import claimed, log_of
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.comparing import difference
@@ -84,7 +85,8 @@ def run_scene(
             if not has_checkpoint(out):
                 _check_sources(scene)
         else:
-            write_manifest(manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads))
+            made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
+            made.write(out / MANIFEST, make_folder=True)
         if not (out / SCENE).exists():
             # Killed between the two, a run is resumed: what tells a run is the manifest.
             write_text(out / SCENE, dump_scene(scene, out))
@@ -111,7 +113,7 @@ def _check_sources(scene: Scene) -> None:
 
 def _check_scene(scene: Scene, out: Path) -> None:
     """Refuse to go on, or to call done, what was made from another scene."""
-    made = recorded_scene_hash(out)
+    made = Run(out).manifest.scene_sha256
     if made == scene_hash(scene):
         return
     try:
@@ -161,7 +163,8 @@ def _run(
         if resume:
             _restore(simulation, scene, out, log, threads)
         phases = simulation.run()
-        mark_done(out, time=engine.time, steps=engine.steps, wall=simulation.wall, cpu=simulation.cpu, phases=phases)
+        wall, cpu = simulation.wall, simulation.cpu
+        Done(time_s=engine.time, steps=engine.steps, wall_s=wall, cpu_s=cpu, phases=phases).mark(out)
     except RunError as error:
         raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
     except StopRequestedError as error:
@@ -180,7 +183,14 @@ def _run(
     return RunOutcome(out, engine.time, engine.steps, simulation.wall)
 
 
-def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, *, status: str, cause: str) -> str:
+def _mark_ended(
+    simulation: Simulation | None,
+    out: Path,
+    log: logging.Logger,
+    *,
+    status: Ended,
+    cause: str,
+) -> str:
     """Write the series that was taken, and say why a run ends too early.
 
     Returns:
@@ -194,7 +204,7 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, *
             good = "none" if checkpoint is None else f"t = {checkpoint:.4f} s"
             cause = f"{cause} (last good checkpoint: {good})"
     log.error("%s", cause)
-    mark_failed(out, status=status, cause=cause, time=time, checkpoint=checkpoint)
+    Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(out)
     return cause
 
 
@@ -207,7 +217,7 @@ def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logge
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
-    begun = read_run(out).threads
+    begun = Run(out).manifest.threads
     if begun != threads:
         workers = engine_kind(scene.engine).workers
         simulation.warn(
@@ -229,7 +239,7 @@ def _keep_series(simulation: Simulation | None) -> None:
 
 def manifest(
     scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
-) -> RunManifest:
+) -> Manifest:
     """What makes the run, and the numbers that measures need.
 
     Args:
@@ -241,8 +251,8 @@ def manifest(
         threads: that it runs with.
     """
     particle, boxes = scene.particle, scene.smarticle.boxes
-    return RunManifest(
-        directory=out,
+    return Manifest(
+        format=1,
         name=scene.name,
         scene_sha256=scene_hash(scene),
         seed=scene.seed,
@@ -254,26 +264,25 @@ def manifest(
         fidelity=scene.fidelity.base,
         count=scene.count,
         aspect_ratio=scene.smarticle.aspect_ratio,
-        middle_length=boxes.middle_length,
-        barb_length=boxes.barb_length,
-        thickness_normal=boxes.thickness_normal,
-        thickness_in_plane=boxes.thickness_in_plane,
-        middle_thickness_in_plane=boxes.middle_thickness_in_plane,
-        smarticle_mass=boxes.mass,
-        solid_volume=boxes.volume,
-        container_radius=scene.container.radius_m,
-        packing_radius=scene.container.packing_radius_m,
+        middle_length_m=boxes.middle_length,
+        barb_length_m=boxes.barb_length,
+        thickness_normal_m=boxes.thickness_normal,
+        thickness_in_plane_m=boxes.thickness_in_plane,
+        middle_thickness_in_plane_m=boxes.middle_thickness_in_plane,
+        smarticle_mass_kg=boxes.mass,
+        solid_volume_m3=boxes.volume,
+        container_radius_m=scene.container.radius_m,
+        packing_radius_m=scene.container.packing_radius_m,
         container_tiers=1 + len(scene.cylinder.upper),
-        sphere_diameter=particle.chain.diameter,
+        sphere_diameter_m=particle.chain.diameter,
         spheres_per_smarticle=len(particle.centres),
-        time_step=min(steps),
+        time_step_s=min(steps),
         phases=tuple(
-            PhaseRecord(index=k, type=phase.kind, time_step=dt)
+            Phase(index=k, type=phase.kind, time_step_s=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
         ),
-        status="unfinished",
         planar=scene.plane is not None,
-        channel_width=None if scene.plane is None else scene.plane.width_m,
+        channel_width_m=None if scene.plane is None else scene.plane.width_m,
         taken_over=_origin(scene, out),
     )
 

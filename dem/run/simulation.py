@@ -16,6 +16,7 @@ from dem.engine.interface import Engine, Saved
 from dem.errors import RunError
 from dem.phases.phase import Stage
 from dem.record.checkpoint import Checkpoint, write_checkpoint
+from dem.record.document import Phase
 from dem.record.names import CHECKPOINT
 from dem.run.recorder import Recorder
 from dem.scene.reading import scene_hash
@@ -61,11 +62,11 @@ class Simulation:
     _cpu_began: float = field(default_factory=time.process_time)
     _stop_requested: bool = False
 
-    def run(self) -> list[dict[str, Any]]:
+    def run(self) -> tuple[Phase, ...]:
         """Run to the end of the last phase, from wherever the simulation stands.
 
         Returns:
-            One entry per phase for `done.json`.
+            The phases with their times.
 
         Raises:
             RunError: a phase failed.
@@ -83,7 +84,9 @@ class Simulation:
             # What was just loaded has been looked at, and knows its contacts from the next step on.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
-        return self._performed
+        if self.recorder.residual:
+            self.warn(self.recorder.residual)
+        return tuple(Phase(**entry) for entry in self._performed)
 
     def _run_phase(self) -> None:
         phase = self.scene.phases[self._phase]

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.errors import refuse
+from dem.errors import RunError, refuse
 from dem.physics.overlaps import Glance, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
+SAID_SHARE = 0.2  # of the limit of what the energy ledger may miss, from where on a run says so at its end
 BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 
@@ -30,6 +31,7 @@ class Watchdog:
         gap: [m]; a hinge whose links are farther apart is broken.
         depth: [m]; contacts that overlap by more no longer keep bodies apart.
         energy: [J]; smarticles that gain more from nowhere are blowing up.
+        missed: [1]; the energy ledger may miss this share of what was dissipated.
     """
 
     cylinder: Cylinder
@@ -37,6 +39,7 @@ class Watchdog:
     gap: float = math.inf
     depth: float = math.inf
     energy: float = math.inf
+    missed: float = math.inf
     # What kinetic and potential energy less the work done may amount to from now on [J].
     _ceiling: float = math.inf
 
@@ -132,13 +135,15 @@ class Watchdog:
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"
         )
-        way_out = "raise fidelity.stiffness_N_per_m, or load the pile less"
+        # Forces grow at least linearly with the overlap.
+        factor = 2 * overlaps.deepest / self.depth
+        way_out = f"raise fidelity.stiffness_N_per_m, about {factor:.2g} times, or load the pile less"
         if overlaps.held:
             # However stiff: between the two, a contact is all that can give way.
             first = overlaps.held[0]
-            cause += (
-                f"; smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
-                f"{first.apart:.3g} m"
+            cause = (
+                f"smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
+                f"{first.apart:.3g} m: only its contacts can give way, the deepest by {overlaps.deepest:.3g} m"
             )
             way_out = (
                 "set hooks.upper_height_m and lower_height_m further apart than w"
@@ -178,6 +183,30 @@ class Watchdog:
                 LOWER_STEP,
             )
         self._ceiling = min(self._ceiling, energy + elastic)
+
+    def check_residual(self, residual: float, *, dissipated: float, time: float) -> str | None:
+        """Judge what the energy ledger misses.
+
+        Args:
+            residual: energy added and work done, less everything stored and dissipated [J].
+            dissipated: by contacts, hinges and welding since the start [J].
+            time: simulated time [s].
+
+        Returns:
+            What the run says if it ends now; None where the residual is small.
+
+        Raises:
+            RunError: the residual is too large, with cause and way out.
+        """
+        if not abs(residual) > SAID_SHARE * self.missed * dissipated > 0.0:
+            return None
+        share = 100 * abs(residual) / dissipated
+        text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
+        # At the beginning, when next to nothing was dissipated, a share says nothing.
+        if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
+            msg = f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}"
+            raise RunError(msg)
+        return f"{text}; {LOWER_STEP}"
 
 
 def _speeds(state: State) -> Array:

@@ -14,7 +14,7 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize, hsv_to_rgb, t
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.bodies.fields import Field, checked_field, link_values
 from postprocess.report import figures
 
@@ -106,21 +106,21 @@ class ColourScale:
         return found
 
 
-def colour_field(name: str | None, run: RunManifest) -> Field:
+def colour_field(name: str | None, run: Run) -> Field:
     """Return the field to colour by: crossings, or of motion in a plane, which has none, the number of the smarticle.
 
     Raises:
         InputError: It is no field, or the run has no such.
     """
-    usual = "smarticle_id" if run.planar else "crossings"
+    usual = "smarticle_id" if run.manifest.planar else "crossings"
     field = checked_field(usual if name is None else ALIASES.get(name, name))
     if not field.available_for(run):
-        msg = f"{run.directory}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
+        msg = f"{run.path}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
         raise InputError(msg)
     return field
 
 
-def scalars(field: Field, frame: Frame, run: RunManifest) -> NDArray[np.float64]:
+def scalars(field: Field, frame: Frame, run: Run) -> NDArray[np.float64]:
     """Return values (N, 3) to colour by, one per link: of a vector its length; NaN where there is none."""
     values = link_values(field, frame, run)
     if values is None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dem.errors import InputError, nearest
-from dem.record.forces import has_forces, read_forces
+from dem.record.forces import read_forces
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass, link_lengths
 from postprocess.geometry.region import Region
@@ -59,8 +59,8 @@ class Field:
     kind: Literal["count", "value", "name"] = "value"
     of: Literal["smarticle", "link"] = "smarticle"
     meaning: str
-    take: Callable[[Frame, RunManifest], NDArray[Any] | None]
-    available_for: Callable[[RunManifest], bool] = lambda _: True
+    take: Callable[[Frame, Run], NDArray[Any] | None]
+    available_for: Callable[[Run], bool] = lambda _: True
     costly: bool = False
     label: str = ""
     shown: tuple[float, str] | None = None
@@ -74,42 +74,44 @@ class Field:
         return self.name if unit == "-" else f"{self.name} [{unit}]"
 
 
-def _speed(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
-    sections = np.array(run.thicknesses_in_plane) / run.thickness_in_plane
+def _speed(frame: Frame, run: Run) -> NDArray[np.float64]:
+    sections = np.array(run.manifest.thicknesses_in_plane_m) / run.manifest.thickness_in_plane_m
     weights = (link_lengths(frame.vertices) * sections)[:, :, None]
     velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
     speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
     return speed
 
 
-def _recorded(name: str) -> Callable[[Frame, RunManifest], NDArray[Any] | None]:
+def _recorded(name: str) -> Callable[[Frame, Run], NDArray[Any] | None]:
     return lambda frame, _: frame.cell_data.get(name)
 
 
-def _labels(find: Callable[[Frame, RunManifest], Clusters]) -> Callable[[Frame, RunManifest], NDArray[Any]]:
-    def take(frame: Frame, run: RunManifest) -> NDArray[Any]:
+def _labels(find: Callable[[Frame, Run], Clusters]) -> Callable[[Frame, Run], NDArray[Any]]:
+    def take(frame: Frame, run: Run) -> NDArray[Any]:
         return find(frame, run).labels if frame.count else np.empty(0, dtype=np.int64)
 
     return take
 
 
-def _local_packing(frame: Frame, run: RunManifest) -> NDArray[np.float64]:
+def _local_packing(frame: Frame, run: Run) -> NDArray[np.float64]:
     """(N,) [-]; NaN where a smarticle has no cell, or no wall bounds them."""
-    if not run.fills_cylinder(frame.phase) or frame.count == 0:
+    if not run.manifest.fills_cylinder(frame.phase) or frame.count == 0:
         return np.full(frame.count, np.nan)
     top = float(frame.vertices[..., 2].max())
     # Of a cylinder that holds everything only the part inside the wall is asked for: outside no image bounds a cell.
-    pile = Region(radius=run.container_radius, bottom=frame.floor_z, top=top)
-    spacing = run.middle_length / CELLS_PER_LENGTH
+    pile = Region(radius=run.manifest.container_radius_m, bottom=frame.floor_z, top=top)
+    spacing = run.manifest.middle_length_m / CELLS_PER_LENGTH
     try:
-        found = local_packing(frame.vertices, pile, pile, solid_volume=run.solid_volume, spacing=spacing).volumes
+        found = local_packing(
+            frame.vertices, pile, pile, solid_volume=run.manifest.solid_volume_m3, spacing=spacing
+        ).volumes
     except UndefinedMeasureError:
         return np.full(frame.count, np.nan)
     closed = np.isfinite(found) & (found > 0)
-    return np.where(closed, run.solid_volume / np.where(closed, found, 1.0), np.nan)
+    return np.where(closed, run.manifest.solid_volume_m3 / np.where(closed, found, 1.0), np.nan)
 
 
-def _pressed(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
+def _pressed(frame: Frame, _: Run) -> NDArray[np.float64]:
     """(N,) [N]."""
     forces = read_forces(frame)
     found, between = forces.contacts, forces.between
@@ -119,7 +121,7 @@ def _pressed(frame: Frame, _: RunManifest) -> NDArray[np.float64]:
     return total
 
 
-def _chain(frame: Frame, _: RunManifest) -> NDArray[Any]:
+def _chain(frame: Frame, _: Run) -> NDArray[Any]:
     """(N,) numbers; each its own where nobody touches."""
     try:
         return force_chains(frame).labels
@@ -210,7 +212,7 @@ FIELDS: tuple[Field, ...] = (
         meaning=f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at "
         "floor, wall and the pile's highest point; NaN without one cylindrical wall",
         take=_local_packing,
-        available_for=lambda run: in_space(run) and run.container_tiers == 1,
+        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
         costly=True,
     ),
     Field(
@@ -218,7 +220,7 @@ FIELDS: tuple[Field, ...] = (
         unit="N",
         meaning="sum of the normal forces at all its contacts, boundaries among them; runs that record forces",
         take=_pressed,
-        available_for=lambda run: has_forces(run.directory),
+        available_for=lambda run: run.forces is not None,
     ),
     Field(
         name="force_chain",
@@ -226,7 +228,7 @@ FIELDS: tuple[Field, ...] = (
         kind="name",
         meaning="number of its cluster of smarticles joined by forces above the mean, 0 the largest; likewise",
         take=_chain,
-        available_for=lambda run: has_forces(run.directory),
+        available_for=lambda run: run.forces is not None,
     ),
     Field(
         name="angle_rad",
@@ -263,7 +265,7 @@ FIELDS: tuple[Field, ...] = (
 BY_NAME: Mapping[str, Field] = MappingProxyType({field.name: field for field in FIELDS})
 
 
-def fields_of(run: RunManifest) -> tuple[Field, ...]:
+def fields_of(run: Run) -> tuple[Field, ...]:
     """Return the fields that a run's frames may have."""
     return tuple(field for field in FIELDS if field.available_for(run))
 
@@ -280,7 +282,7 @@ def checked_field(name: str) -> Field:
     return BY_NAME[name]
 
 
-def link_values(field: Field, frame: Frame, run: RunManifest) -> NDArray[Any] | None:
+def link_values(field: Field, frame: Frame, run: Run) -> NDArray[Any] | None:
     """Return values (N, 3) of a field, or vectors (N, 3, 3), one per link; None where the frame does not have it."""
     values = field.take(frame, run)
     if values is None or field.of == "link":

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem.errors import InputError, nearest
-from dem.record.forces import NO_FORCES, RecordedForces, has_forces, read_forces
+from dem.record.forces import NO_FORCES, RecordedForces, read_forces
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.bodies.fields import Field, link_values
 from postprocess.bodies.surroundings import read_surroundings
 from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
@@ -95,10 +95,10 @@ class Bodies:
     """
 
     def __init__(
-        self, run: RunManifest, kinds: Sequence[str] = USUAL, fields: Sequence[Field] = (), *, cut: bool = False
+        self, run: Run, kinds: Sequence[str] = USUAL, fields: Sequence[Field] = (), *, cut: bool = False
     ) -> None:
-        if "forces" in kinds and not has_forces(run.directory):
-            msg = f"{run.directory}: records no forces; {NO_FORCES}"
+        if "forces" in kinds and run.forces is None:
+            msg = f"{run.path}: records no forces; {NO_FORCES}"
             raise InputError(msg)
         self.run = run
         self.kinds = kinds
@@ -129,7 +129,9 @@ class Bodies:
     def _smarticles(self, frame: Frame) -> pv.PolyData:
         run = self.run
         mesh = link_boxes(
-            frame.vertices, thickness_normal=run.thickness_normal, thickness_in_plane=run.thicknesses_in_plane
+            frame.vertices,
+            thickness_normal=run.manifest.thickness_normal_m,
+            thickness_in_plane=run.manifest.thicknesses_in_plane_m,
         )
         owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
         for field in self._fields:
@@ -140,12 +142,12 @@ class Bodies:
 
     def _wall(self, frame: Frame) -> pv.PolyData | None:
         run, floor = self.run, frame.floor_z
-        if run.planar:
-            if run.channel_width is None:
+        if run.manifest.planar:
+            if run.manifest.channel_width_m is None:
                 return None
-            half, (first, last) = run.channel_width / 2, self._span
+            half, (first, last) = run.manifest.channel_width_m / 2, self._span
             return joined(
-                pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.thickness_normal]])
+                pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.manifest.thickness_normal_m]])
                 for y in (-half, half)
             )
         top = float(frame.vertices[..., 2].max(initial=floor)) - floor
@@ -158,11 +160,11 @@ class Bodies:
         """Return the wall of a container that stands at a height [m]."""
         corners = self.around.corners
         if not corners:
-            top = self._top + self.run.middle_length if self.around.height is None else self.around.height
-            corners = [(self.run.container_radius, 0.0), (self.run.container_radius, top)]
+            top = self._top + self.run.manifest.middle_length_m if self.around.height is None else self.around.height
+            corners = [(self.run.manifest.container_radius_m, 0.0), (self.run.manifest.container_radius_m, top)]
         if self._cut:
             *below, (radius, height) = corners
-            margin = self.run.middle_length / 4
+            margin = self.run.manifest.middle_length_m / 4
             corners = [*below, (radius, min(height, max(4 * margin, self._top + margin, below[-1][1] + margin)))]
         line = pv.MultipleLines(np.array([(radius, 0.0, base + height) for radius, height in corners]))
         wall: pv.PolyData = line.extrude_rotate(resolution=_ROUND, capping=False).triangulate()
@@ -170,9 +172,9 @@ class Bodies:
         return wall
 
     def _floor(self, frame: Frame) -> pv.PolyData | None:
-        if self.run.planar:
+        if self.run.manifest.planar:
             return None
-        radius = max(self.run.container_radius, self._reach)
+        radius = max(self.run.manifest.container_radius_m, self._reach)
         floor: pv.PolyData = pv.Disc(
             center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=_ROUND
         ).triangulate()
@@ -201,7 +203,7 @@ class Bodies:
         return mesh
 
     def _crossings(self, frame: Frame) -> pv.PolyData | None:
-        if self.run.planar or frame.count == 0:
+        if self.run.manifest.planar or frame.count == 0:
             return None
         found = link_passages(frame.vertices)
         if not len(found.i):
@@ -303,7 +305,7 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
     return mesh
 
 
-def solid(kind: str, mesh: pv.PolyData, run: RunManifest, *, largest: float | None = None) -> pv.PolyData:
+def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
     """Return a body as triangles alone.
 
     Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
@@ -315,7 +317,7 @@ def solid(kind: str, mesh: pv.PolyData, run: RunManifest, *, largest: float | No
         run: The run.
         largest: Normal force of the thickest tube [N]; that of this mesh if not given.
     """
-    thin = min(run.thickness_in_plane, run.thickness_normal)
+    thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":
         mesh = mesh.tube(radius=thin / 10, n_sides=8, capping=True)
     if kind == "forces":
@@ -326,7 +328,7 @@ def solid(kind: str, mesh: pv.PolyData, run: RunManifest, *, largest: float | No
         mesh = bare.tube(radius=1.0, scalars="radius", absolute=True, n_sides=8, capping=True)
     if kind == "crossings":
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
-        mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.middle_length / 3)
+        mesh = mesh.glyph(geom=arrow, orient="direction", scale=False, factor=run.manifest.middle_length_m / 3)
     triangles: pv.PolyData = mesh.triangulate()
     return triangles
 

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
-from dem.record.names import SERIES
-from dem.record.series import Series, read_series
+from dem.record.run import Run, SceneData
+from dem.record.series import Series
 from postprocess.measures.mould import read_tiers
-from postprocess.scene_file import Settings, read_phases, read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -120,55 +118,53 @@ class Surroundings:
         return raised if raised <= top else None
 
 
-def read_surroundings(run: RunManifest) -> Surroundings:
+def read_surroundings(run: Run) -> Surroundings:
     """Read the rigid boundaries of a run from its scene and its series.
 
     Raises:
         InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
     """
-    scene = read_scene(run.directory)
-    phases = read_phases(run.directory)
-    series = read_series(run.directory) if (run.directory / SERIES).exists() else None
-    container, hooks = scene.part("container"), scene.part("hooks")
+    scene, phases = run.scene, run.scene["phases"]
+    series = run.series if run.has_series else None
+    hooks = scene.get("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
-    limited = container is not None and container.values.get("height_m") is not None
     return Surroundings(
-        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run.directory)),
-        height=container.number("height_m", positive=True) if container is not None and limited else None,
-        floor_alone=frozenset(phase.index for phase in phases if phase.values.get("moves") == "floor"),
+        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
+        height=(scene.get("container") or {}).get("height_m"),
+        floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
         removed=removed,
         lift=None if removed is None else _lift(phases[removed], _start(run, removed, series)),
         hooks=None if hooks is None else _hooks(hooks, series),
-        strings=_strings(run, series) if run.planar else None,
+        strings=_strings(run, series) if run.manifest.planar else None,
     )
 
 
-def _start(run: RunManifest, index: int, series: Series | None) -> float | None:
+def _start(run: Run, index: int, series: Series | None) -> float | None:
     """Return when a phase begins [s]; a phase that is not done began with the last sample of the one before."""
-    start = run.phases[index].start
+    start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
     return start
 
 
-def _lift(phase: Settings, start: float | None) -> tuple[float, float, float] | None:
-    if phase.values.get("speed_m_per_s") is None or start is None:
+def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] | None:
+    if phase.get("speed_m_per_s") is None or start is None:
         return None
-    return start, start + phase.number("duration_s"), phase.number("speed_m_per_s")
+    return start, start + phase["duration_s"], phase["speed_m_per_s"]
 
 
-def _hooks(settings: Settings, series: Series | None) -> DrawnHooks:
+def _hooks(settings: SceneData, series: Series | None) -> DrawnHooks:
     """Return the hooks of a scene; without a series the upper one is where it started."""
-    times, upper = np.zeros(1), np.array([settings.number("upper_height_m")])
+    times, upper = np.zeros(1), np.array([settings["upper_height_m"]])
     if series is not None:
         times, upper = series.time, series["hook_upper_z_m"] - series["container_z_m"]
-    side, length = settings.number("side_m"), settings.number("length_m")
+    side, length = settings["side_m"], settings["length_m"]
     # Older scenes have two crosses alike.
-    lower_length = settings.number("lower_length_m") if "lower_length_m" in settings.values else length
-    count = round(settings.number("lower_bars")) if "lower_bars" in settings.values else 1
+    lower_length = settings["lower_length_m"] if "lower_length_m" in settings else length
+    count = round(settings["lower_bars"]) if "lower_bars" in settings else 1
     return DrawnHooks(
         bars=(_bars(lower_length, side, count), _bars(length, side, 1)),
-        lower=settings.number("lower_height_m"),
+        lower=settings["lower_height_m"],
         times=times,
         upper=upper,
     )
@@ -203,7 +199,7 @@ def knots(vertices: NDArray[np.float64], from_hinge: float) -> NDArray[np.float6
     return np.array(points)
 
 
-def _strings(run: RunManifest, series: Series | None) -> ChainStrings | None:
+def _strings(run: Run, series: Series | None) -> ChainStrings | None:
     """Return the strings of a run's strain test; None where there is no such phase.
 
     They are tied to the chain as it was laid out; a chain that moved before it was pulled has them where they are to
@@ -212,20 +208,24 @@ def _strings(run: RunManifest, series: Series | None) -> ChainStrings | None:
     Source:
         `dem.body.chain.Chain`: how a chain is laid out.
     """
-    phases = {phase.type: phase for phase in read_phases(run.directory)}
+    planned = run.scene["phases"]
+    phases = {phase["type"]: phase for phase in planned}
     if _STRAIN not in phases or _ARRANGE not in phases:
         return None
-    strain, gap = phases[_STRAIN], phases[_ARRANGE].number("gap_m")
-    radius, barb = run.sphere_diameter / 2, run.barb_length
-    offset = barb + gap + run.bulge + radius  # of the two rows of middle links
-    from_hinge = barb - radius if strain.values.get("tied_at") == "tip" else offset / 2
-    reach = ((run.count - 1) * (run.middle_length - 2 * radius - gap) + run.middle_length) / 2
-    length = strain.number("string_length_m", positive=True)
+    strain, gap = phases[_STRAIN], phases[_ARRANGE]["gap_m"]
+    index = planned.index(strain)
+    radius, barb = run.manifest.sphere_diameter_m / 2, run.manifest.barb_length_m
+    offset = barb + gap + run.manifest.bulge_m + radius  # of the two rows of middle links
+    from_hinge = barb - radius if strain.get("tied_at") == "tip" else offset / 2
+    reach = (
+        (run.manifest.count - 1) * (run.manifest.middle_length_m - 2 * radius - gap) + run.manifest.middle_length_m
+    ) / 2
+    length = strain["string_length_m"]
     ends = reach + np.sqrt(length**2 - (from_hinge - offset / 2) ** 2)
     return ChainStrings(
-        phase=strain.index,
-        start=_start(run, strain.index, series) or 0.0,
-        speed=strain.number("speed_m_per_s"),
+        phase=index,
+        start=_start(run, index, series) or 0.0,
+        speed=strain["speed_m_per_s"],
         from_hinge=from_hinge,
         anchors=np.array([[-ends, 0.0, 0.0], [ends, 0.0, 0.0]]),
     )

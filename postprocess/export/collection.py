@@ -12,7 +12,7 @@ import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.bodies.meshes import Bodies
 
 SCRIPT = "show_in_paraview.py"
@@ -59,14 +59,14 @@ def write_collection(folder: Path, bodies: Bodies, frames: Iterable[tuple[int, F
     return len(nothing)
 
 
-def _write(folder: Path, kind: str, mesh: pv.PolyData, frame: tuple[int, float, int], run: RunManifest) -> None:
+def _write(folder: Path, kind: str, mesh: pv.PolyData, frame: tuple[int, float, int], run: Run) -> None:
     number, time, phase = frame
     # The name by which VTK's readers know the time.
     mesh.field_data["TimeValue"] = np.array([time])
     mesh.field_data["phase"] = np.array([phase])
-    mesh.field_data["middle_length_m"] = np.array([run.middle_length])
-    mesh.field_data["thickness_m"] = np.array([min(run.thickness_in_plane, run.thickness_normal)])
-    for name, value in (("run_name", run.name), ("scene_sha256", run.scene_sha256)):
+    mesh.field_data["middle_length_m"] = np.array([run.manifest.middle_length_m])
+    mesh.field_data["thickness_m"] = np.array([min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)])
+    for name, value in (("run_name", run.manifest.name), ("scene_sha256", run.manifest.scene_sha256)):
         # PyVista takes no alphabet but the Latin one without accents.
         text = vtkStringArray()
         text.SetName(name)

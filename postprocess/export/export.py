@@ -12,7 +12,7 @@ from pathlib import Path
 from dem.errors import InputError, RunError, nearest
 from dem.record.frame import Frame
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.bodies.fields import IDENTITY, fields_of
 from postprocess.bodies.meshes import Bodies, checked_kinds
 from postprocess.export.collection import write_collection
@@ -67,13 +67,13 @@ def export_run(
     if every_frame and time is not None:
         msg = f"--time {time:g}: all frames are asked for; leave --time or --all out"
         raise InputError(msg)
-    run = read_run(directory)
+    run = open_run(directory)
     fields = fields_of(run)
     kinds = checked_kinds(wanted, unwanted, also=[field.name for field in fields])
     frames = read_frames(directory)
     chosen = range(len(frames)) if every_frame else [len(frames) - 1 if time is None else frames.nearest(time)]
     folder = every_frame or to == "vtp"
-    path = _checked_output(run.directory, output, to, folder=folder)
+    path = _checked_output(run.path, output, to, folder=folder)
     carried = [field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)]
     bodies = Bodies(run, kinds, carried)
     bodies.hold(frames[index] for index in chosen)

@@ -79,8 +79,8 @@ class Painter:
     def _provenance(self, frame: Frame) -> dict[str, Any]:
         run = self._bodies.run
         return {
-            "run_name": run.name,
-            "scene_sha256": run.scene_sha256,
+            "run_name": run.manifest.name,
+            "scene_sha256": run.manifest.scene_sha256,
             "time_s": frame.time,
             "unit": "m",
             "coloured_by": self._field.name,

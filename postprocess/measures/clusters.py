@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices
 from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact, touching_pairs
@@ -81,7 +81,7 @@ def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
 
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        diameter: Of the sphere that sweeps the links [m], `RunManifest.sphere_diameter`.
+        diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
 
     Returns:
         The clusters.
@@ -94,7 +94,7 @@ def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def contact_graph(frame: Frame, run: RunManifest) -> Clusters:
+def contact_graph(frame: Frame, run: Run) -> Clusters:
     """Smarticles joined by contact by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
 
     Raises:
@@ -173,17 +173,17 @@ def joined_clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> C
     return Clusters(labels=ranks[found].astype(np.int64), sizes=sizes[order].astype(np.int64))
 
 
-def _spans_of(clusters: Clusters, frame: Frame, run: RunManifest) -> tuple[float, float, float]:
-    vertices, diameter = frame.vertices, run.sphere_diameter
+def _spans_of(clusters: Clusters, frame: Frame, run: Run) -> tuple[float, float, float]:
+    vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
     height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
     # After its wall is gone a pile has nothing to span from.
-    walled = run.walled(frame.phase)
-    width = walled and spans_width(clusters, vertices, diameter=diameter, wall_radius=run.container_radius)
+    walled = run.manifest.walled(frame.phase)
+    width = walled and spans_width(clusters, vertices, diameter=diameter, wall_radius=run.manifest.container_radius_m)
     return clusters.largest, float(height), float(width) if walled else math.nan
 
 
-def _in_one_cylinder(run: RunManifest) -> bool:
-    return not run.planar and run.container_tiers == 1
+def _in_one_cylinder(run: Run) -> bool:
+    return not run.manifest.planar and run.manifest.container_tiers == 1
 
 
 MEASURES = tuple(

@@ -14,11 +14,10 @@ from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.chains import Chain, spheres, strands
 from postprocess.geometry.links import checked_vertices, link_lengths, swept_axes
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-from postprocess.scene_file import read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -83,7 +82,7 @@ def touching_pairs(vertices: ArrayLike, diameter: float) -> ContactPairs:
 
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        diameter: Of the sphere [m], `RunManifest.sphere_diameter`.
+        diameter: Of the sphere [m], `Run.sphere_diameter`.
 
     Returns:
         The pairs, sorted by i, then j.
@@ -93,13 +92,13 @@ def touching_pairs(vertices: ArrayLike, diameter: float) -> ContactPairs:
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(diameter) and diameter > 0):
-        msg = f"diameter must be above 0 m: got {diameter} m; give RunManifest.sphere_diameter"
+        msg = f"diameter must be above 0 m: got {diameter} m; give Run.sphere_diameter"
         raise InputError(msg)
     # Contacts that only just touch are lost to the rounding of vertices otherwise.
     return contact_pairs(swept_axes(vertices, diameter), diameter * (1 + 1e-9))
 
 
-def pairs_in_contact(frame: Frame, run: RunManifest) -> ContactPairs:
+def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     """Pairs of smarticles that touch by the shapes that the run's engine gave them.
 
     Frames hold how many others a smarticle touches, not which; chains of spheres, or strands that a sphere sweeps, tell
@@ -129,21 +128,21 @@ def pairs_in_contact(frame: Frame, run: RunManifest) -> ContactPairs:
     return _merged(pairs.i // chain.rows, pairs.j // chain.rows, pairs.distance, len(vertices))
 
 
-def chain_of(run: RunManifest) -> Chain:
+def chain_of(run: Run) -> Chain:
     """What stands for a smarticle of a run.
 
     Raises:
         InputError: The scene of the run cannot be read.
     """
-    fidelity = read_scene(run.directory).part("fidelity")
-    rows = 1 if fidelity is None else int(fidelity.number("rows", positive=True))
-    pitch = 1.0 if fidelity is None else fidelity.number("pitch", positive=True)
+    fidelity = run.scene.get("fidelity")
+    rows = 1 if fidelity is None else fidelity["rows"]
+    pitch = 1.0 if fidelity is None else fidelity["pitch"]
     return Chain(
-        diameter=run.sphere_diameter,
+        diameter=run.manifest.sphere_diameter_m,
         rows=rows,
-        width=run.thickness_normal,
-        pitch=pitch * run.sphere_diameter if run.engine == "yade" else 0.0,
-        bulge=run.bulge,
+        width=run.manifest.thickness_normal_m,
+        pitch=pitch * run.manifest.sphere_diameter_m if run.manifest.engine == "yade" else 0.0,
+        bulge=run.manifest.bulge_m,
     )
 
 
@@ -272,7 +271,7 @@ def without_support(
     Args:
         vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         contacts: (N,) how many other smarticles each one touches, `Frame.contacts`.
-        diameter: Of the sphere that sweeps the links [m], `RunManifest.sphere_diameter`.
+        diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
         floor_z: Height of the floor [m].
         wall_radius: Of the wall about the axis x = y = 0 [m]; None: there is no wall.
 
@@ -310,17 +309,17 @@ def at_wall(vertices: ArrayLike, *, diameter: float, wall_radius: float) -> NDAr
     return touching
 
 
-def _statistics_of(frame: Frame, _: RunManifest) -> tuple[float, float, float]:
+def _statistics_of(frame: Frame, _: Run) -> tuple[float, float, float]:
     return float(frame.contacts.std()), float(frame.contacts.max()), float((frame.contacts == 0).mean())
 
 
-def _rattlers_of(frame: Frame, run: RunManifest) -> tuple[float]:
+def _rattlers_of(frame: Frame, run: Run) -> tuple[float]:
     loose = without_support(
         frame.vertices,
         frame.contacts,
-        diameter=run.sphere_diameter,
+        diameter=run.manifest.sphere_diameter_m,
         floor_z=frame.floor_z,
-        wall_radius=run.container_radius if run.walled(frame.phase) else None,
+        wall_radius=run.manifest.container_radius_m if run.manifest.walled(frame.phase) else None,
     )
     return (float(loose.mean()),)
 
@@ -344,6 +343,6 @@ MEASURES = (
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
         # The walls of a mould's tiers are not one wall.
-        told_of=lambda run: in_space(run) and run.container_tiers == 1,
+        told_of=lambda run: in_space(run) and run.manifest.container_tiers == 1,
     ),
 )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
@@ -310,7 +310,7 @@ def _sorted_nonzero(
     return i[order], j[order], number[order]
 
 
-def _entanglement_of(frame: Frame, _: RunManifest) -> tuple[float, int]:
+def _entanglement_of(frame: Frame, _: Run) -> tuple[float, int]:
     tangle = entanglement(frame.vertices)
     return tangle.mean, int(tangle.has_plane.sum())
 

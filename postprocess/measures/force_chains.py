@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dem.errors import InputError
-from dem.record.forces import RecordedForces, has_forces, read_forces
+from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity
@@ -151,7 +151,7 @@ def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters
     return joined_clusters(frame.count, pairs[:, 0], pairs[:, 1])
 
 
-def _taken_of(frame: Frame, _: RunManifest) -> tuple[float, ...]:
+def _taken_of(frame: Frame, _: Run) -> tuple[float, ...]:
     forces = read_forces(frame)
     between = forces.between
     normal, tangential = forces.contacts.normal[between], forces.contacts.tangential[between]
@@ -183,6 +183,6 @@ MEASURES = (
             Quantity("force chain largest share", "-"),
         ),
         take=_taken_of,
-        told_of=lambda run: has_forces(run.directory),
+        told_of=lambda run: run.forces is not None,
     ),
 )

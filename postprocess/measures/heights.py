@@ -9,8 +9,8 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
 from dem.record.packing import second_highest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
@@ -111,7 +111,7 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
 _PERCENTILE = 95.0
 
 
-def _heights_of(frame: Frame, _: RunManifest) -> tuple[float, ...]:
+def _heights_of(frame: Frame, _: Run) -> tuple[float, ...]:
     levels = heights(frame.vertices, floor_z=frame.floor_z, percentile=_PERCENTILE)
     return levels.mean_com, levels.second_highest_com, levels.top
 

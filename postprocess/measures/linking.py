@@ -16,7 +16,7 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.geometry.links import checked_vertices, close_pairs
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
@@ -138,7 +138,7 @@ def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     return product
 
 
-def _linking_of(frame: Frame, _: RunManifest) -> tuple[float]:
+def _linking_of(frame: Frame, _: Run) -> tuple[float]:
     return (linking(frame.vertices).mean,)
 
 

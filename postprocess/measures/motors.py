@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import RunManifest
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.registry import PhaseMeasure, Quantity
 
@@ -80,9 +80,9 @@ def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
     return [int(k) for k in chosen] if np.array_equal(np.round(multiples[chosen]), wanted) else []
 
 
-def _sampled_work_of(run: RunManifest, series: Series, phase: int) -> tuple[float, ...]:
+def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
     """From the first frame on, and the least and greatest of beginning at any frame of the first 0.1 s."""
-    frames = read_frames(run.directory).in_phase(phase)
+    frames = run.frames.in_phase(phase)
     begun = [sampled(frames[first:]) for first in range(int(np.searchsorted(frames.times, _first_end(frames))))]
     found = [_work_of([frames[first + k] for k in chosen]) for first, chosen in enumerate(begun)]
     known = [work for work in found if not math.isnan(work)]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dem.record.run import Run
 from postprocess.geometry.links import checked_vertices, link_lengths
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.region import Region
-from postprocess.scene_file import read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -88,11 +87,11 @@ def cast(
     )
 
 
-def read_tiers(directory: Path | str) -> tuple[Region, ...]:
+def read_tiers(run: Run) -> tuple[Region, ...]:
     """The tiers of a run's container, heights above its floor.
 
     Args:
-        directory: A run directory.
+        run: A run.
 
     Returns:
         The tiers from below; none where the container is one cylinder.
@@ -100,11 +99,11 @@ def read_tiers(directory: Path | str) -> tuple[Region, ...]:
     Raises:
         InputError: The file is missing or damaged, or a tier lacks its sizes.
     """
-    container = read_scene(directory).part("container")
+    container = run.scene.get("container")
     found, bottom = [], 0.0
-    for tier in container.parts("tiers") if container is not None else ():
-        top = bottom + tier.number("height_m", positive=True)
-        found.append(Region(radius=tier.number("radius_m", positive=True), bottom=bottom, top=top))
+    for tier in (container or {}).get("tiers") or ():
+        top = bottom + tier["height_m"]
+        found.append(Region(radius=tier["radius_m"], bottom=bottom, top=top))
         bottom = top
     return tuple(found)
 

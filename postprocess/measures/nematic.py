@@ -10,7 +10,7 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
@@ -86,7 +86,7 @@ def nematic_order(directions: ArrayLike) -> NematicOrder:
     )
 
 
-def _nematic_of(frame: Frame, _: RunManifest) -> tuple[float, float, float]:
+def _nematic_of(frame: Frame, _: Run) -> tuple[float, float, float]:
     order = nematic_order(np.diff(checked_vertices(frame.vertices), axis=1)[:, 1])
     return order.order, math.degrees(order.polar_angle), order.upright
 

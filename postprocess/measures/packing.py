@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
 from dem.record.packing import filled
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import checked_vertices
 from postprocess.geometry.region import Region, inner_region
@@ -153,7 +153,7 @@ def packing_fraction(
     return PackingFraction(value=value, definition=definition, height=height)
 
 
-def packing_of(frame: Frame, run: RunManifest, *, definition: str) -> float:
+def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
     """Packing fraction of a frame of a run [-]; NaN where it has no meaning.
 
     Args:
@@ -161,25 +161,25 @@ def packing_of(frame: Frame, run: RunManifest, *, definition: str) -> float:
         run: The run.
         definition: Key of `DEFINITIONS`.
     """
-    if not run.fills_cylinder(frame.phase):
+    if not run.manifest.fills_cylinder(frame.phase):
         return math.nan
     # The costly ones look inside the pile, where it is only the wall that can be in the way.
-    radius = run.container_radius if definition in COSTLY_DEFINITIONS else run.measured_radius
+    radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
     try:
         return packing_fraction(
             frame.vertices,
             radius=radius,
-            solid_volume=run.solid_volume,
+            solid_volume=run.manifest.solid_volume_m3,
             definition=definition,
             floor_z=frame.floor_z,
-            thickness_normal=run.thickness_normal,
-            thickness_in_plane=run.thickness_in_plane,
+            thickness_normal=run.manifest.thickness_normal_m,
+            thickness_in_plane=run.manifest.thickness_in_plane_m,
         ).value
     except UndefinedMeasureError:
         return math.nan
 
 
-def _packing(definition: str, frame: Frame, run: RunManifest) -> tuple[float]:
+def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
     return (packing_of(frame, run, definition=definition),)
 
 

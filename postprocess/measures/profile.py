@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import Run
 from postprocess.geometry.voxel import solid_points
 
 if TYPE_CHECKING:
@@ -105,11 +103,11 @@ def packing_profile(
     return profile
 
 
-def profile_table(directory: Path | str, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
+def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
     """φ(r, z) of the last frame of each phase of a run that has one.
 
     Args:
-        directory: A run directory.
+        run: A run.
         rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given.
 
@@ -119,12 +117,11 @@ def profile_table(directory: Path | str, *, rings: int = 6, layer: float | None 
     Raises:
         InputError: The run is in a plane, its container is no one cylinder, or as `packing_profile`.
     """
-    run = read_run(directory)
-    if run.planar or run.container_tiers > 1:
-        what = "moves in a plane" if run.planar else f"has a container of {run.container_tiers} tiers"
-        msg = f"{run.directory}: φ(r, z) is of one upright cylinder: this run {what}; leave out the profile"
+    if run.manifest.planar or run.manifest.container_tiers > 1:
+        what = "moves in a plane" if run.manifest.planar else f"has a container of {run.manifest.container_tiers} tiers"
+        msg = f"{run.path}: φ(r, z) is of one upright cylinder: this run {what}; leave out the profile"
         raise InputError(msg)
-    frames = read_frames(directory)
+    frames = run.frames
     rows: list[dict[str, object]] = []
     for phase in run.phases:
         part = frames.in_phase(phase.index)
@@ -133,16 +130,16 @@ def profile_table(directory: Path | str, *, rings: int = 6, layer: float | None 
         frame = part[-1]
         profile = packing_profile(
             frame.vertices,
-            radius=run.container_radius,
-            thickness_normal=run.thickness_normal,
-            thickness_in_plane=run.thickness_in_plane,
+            radius=run.manifest.container_radius_m,
+            thickness_normal=run.manifest.thickness_normal_m,
+            thickness_in_plane=run.manifest.thickness_in_plane_m,
             floor_z=frame.floor_z,
             rings=rings,
             layer=layer,
         )
         rows += [
             {
-                "run": str(run.directory),
+                "run": str(run.path),
                 "phase": phase.index,
                 "phase type": phase.type,
                 "time [s]": frame.time,

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run, SceneData
 from dem.record.series import Series
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
-from postprocess.scene_file import Settings, read_phases, read_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,7 +91,7 @@ class Peak:
     raised: float
 
 
-def read_pull(run: RunManifest, series: Series, phase: int) -> HookPull:
+def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     """A hook's history in a phase, so far as it has come.
 
     Args:
@@ -108,7 +107,7 @@ def read_pull(run: RunManifest, series: Series, phase: int) -> HookPull:
     # The hooks move with the container, which does not move now.
     height = series["hook_upper_z_m"]
     if len(inside) < 2 or inside[0] == 0 or not np.isfinite(force[inside]).all():
-        msg = f"{series.path}: no force of a hook throughout phase {phase} of {run.directory}; run it again"
+        msg = f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again"
         raise InputError(msg)
     span = np.concatenate([[inside[0] - 1], inside])
     resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
@@ -124,13 +123,13 @@ def read_pull(run: RunManifest, series: Series, phase: int) -> HookPull:
     )
 
 
-def weight_of_one(run: RunManifest) -> float:
+def weight_of_one(run: Run) -> float:
     """W_s, weight of one smarticle [N].
 
     Raises:
         InputError: The scene cannot be read, or does not tell gravity.
     """
-    return run.smarticle_mass * read_scene(run.directory).number("gravity_m_per_s2")
+    return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
 def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -168,7 +167,7 @@ def freed(pull: HookPull, window: float = WINDOW) -> float:
     return float(times[held[-1] + 1])
 
 
-def held_fast(pull: HookPull, asked: Settings) -> bool:
+def held_fast(pull: HookPull, asked: SceneData) -> bool:
     """Whether the hook was stopped by its force limit on the way, so that its peak is a lower bound.
 
     Args:
@@ -179,24 +178,24 @@ def held_fast(pull: HookPull, asked: Settings) -> bool:
         InputError: The scene does not say how far.
     """
     # A hook that nothing stops arrives within a time step.
-    return bool(pull.raised[-1] < 0.99 * asked.number("distance_m", positive=True))
+    return bool(pull.raised[-1] < 0.99 * asked["distance_m"])
 
 
-def _pull_of(run: RunManifest, series: Series, phase: int) -> tuple[float, ...]:
+def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
     """Measures of a pull for a table, forces over the weight of all smarticles, n W_s."""
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
-    ended = run.phases[phase].end is not None
+    ended = run.phases[phase].end_s is not None
     return (
-        highest.force / weight / run.count,
+        highest.force / weight / run.manifest.count,
         highest.time,
         highest.raised,
-        held_at(pull, highest.time) / weight / run.count,
+        held_at(pull, highest.time) / weight / run.manifest.count,
         pull.work,
         freed(pull),
         pull.left / weight,
         float(pull.raised[-1]),
-        float(held_fast(pull, read_phases(run.directory)[phase])) if ended else math.nan,
+        float(held_fast(pull, run.scene["phases"][phase])) if ended else math.nan,
     )
 
 

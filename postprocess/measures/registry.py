@@ -14,7 +14,7 @@ from functools import cache
 from importlib import import_module
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from dem.record.series import Series
 
 _PACKAGE = __name__.rpartition(".")[0]
@@ -81,12 +81,12 @@ class FrameMeasure:
     name: str
     place: int
     quantities: tuple[Quantity, ...]
-    take: Callable[[Frame, RunManifest], Sequence[float]]
-    told_of: Callable[[RunManifest], bool] = lambda _: True
+    take: Callable[[Frame, Run], Sequence[float]]
+    told_of: Callable[[Run], bool] = lambda _: True
     definition: str | None = None
     costly: bool = False
 
-    def columns(self, frame: Frame | None, run: RunManifest) -> dict[str, float]:
+    def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
         """Its values by column; NaN without a frame."""
         values = [float("nan")] * len(self.quantities) if frame is None else self.take(frame, run)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
@@ -107,10 +107,10 @@ class PhaseMeasure:
     name: str
     phases: tuple[str, ...]
     quantities: tuple[Quantity, ...]
-    take: Callable[[RunManifest, Series, int], Sequence[float]]
+    take: Callable[[Run, Series, int], Sequence[float]]
     told_of: Callable[[Series, int], bool]
 
-    def columns(self, run: RunManifest, series: Series, phase: int) -> dict[str, float]:
+    def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:
         """Its values by column; none where the phase is of another type or the series does not hold enough of it."""
         if run.phases[phase].type not in self.phases or not self.told_of(series, phase):
             return {}
@@ -118,9 +118,9 @@ class PhaseMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
-def in_space(run: RunManifest) -> bool:
+def in_space(run: Run) -> bool:
     """Whether smarticles move in space: in a plane all lie at one height, and each in the plane of all others."""
-    return not run.planar
+    return not run.manifest.planar
 
 
 @cache

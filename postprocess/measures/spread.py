@@ -10,7 +10,7 @@ import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
@@ -62,7 +62,7 @@ class FreePile:
 
 def free_pile(
     vertices: ArrayLike,
-    run: RunManifest,
+    run: Run,
     *,
     floor_z: float = 0.0,
     foot: tuple[float, float] = (0.0, 0.0),
@@ -86,11 +86,13 @@ def free_pile(
     vertices = checked_vertices(vertices)
     centre = centre_of_mass(vertices)
     return FreePile(
-        touching=contact_clusters(vertices, TOUCHING * run.sphere_diameter).largest,
+        touching=contact_clusters(vertices, TOUCHING * run.manifest.sphere_diameter_m).largest,
         entangled=entanglement_clusters(vertices).largest,
         radius_half=spread_radius(vertices, share=0.5),
         radius_most=spread_radius(vertices, share=0.95),
-        sloughed=share_outside(vertices, run.container_radius + OUTSIDE * run.middle_length, axis=middle(vertices)),
+        sloughed=share_outside(
+            vertices, run.manifest.container_radius_m + OUTSIDE * run.manifest.middle_length_m, axis=middle(vertices)
+        ),
         tilt=math.degrees(tilt(vertices, foot=foot, floor_z=floor_z)),
         offset=math.hypot(centre[0] - foot[0], centre[1] - foot[1]),
     )
@@ -237,17 +239,17 @@ def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radiu
     return shares
 
 
-def _free_pile_of(frame: Frame, run: RunManifest) -> tuple[float, ...]:
-    if run.walled(frame.phase):
+def _free_pile_of(frame: Frame, run: Run) -> tuple[float, ...]:
+    if run.manifest.walled(frame.phase):
         return (math.nan,) * 6
     pile = free_pile(frame.vertices, run, floor_z=frame.floor_z)
     return pile.touching, pile.entangled, pile.radius_half, pile.radius_most, pile.sloughed, pile.tilt
 
 
-def escaped(frame: Frame, run: RunManifest) -> int:
+def escaped(frame: Frame, run: Run) -> int:
     """Smarticles with their centre of mass beside or below the container."""
     centres = centres_of_mass(frame.vertices)
-    outside = np.hypot(centres[:, 0], centres[:, 1]) > run.container_radius
+    outside = np.hypot(centres[:, 0], centres[:, 1]) > run.manifest.container_radius_m
     return int((outside | (centres[:, 2] < frame.floor_z)).sum())
 
 
@@ -278,6 +280,6 @@ MEASURES = (
         ),
         take=_free_pile_of,
         # Of a run that takes its wall away.
-        told_of=lambda run: not (run.planar or run.walled(run.phases[-1].index)),
+        told_of=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
     ),
 )

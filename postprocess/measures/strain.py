@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
-from dem.record.series import Series, read_series
+from dem.record.run import Run
+from dem.record.series import Series
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
 Array = NDArray[np.float64]
@@ -104,23 +104,23 @@ def has_strain(series: Series) -> bool:
     return int(tied.sum()) >= LEAST_SAMPLES and bool((force[tied] > 0).any())
 
 
-def _strain_of(run: RunManifest, _: Series, __: int) -> tuple[float, ...]:
+def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
     """Measures of a strain test for a table; what its end tells is NaN while the run is not done."""
     found = measured(read_strain_test(run))
-    if run.status != "done":
+    if run.status.state != "done":
         found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
     return tuple(found[name] for name in QUANTITIES)
 
 
-def read_strain_test(run: RunManifest) -> StrainTest:
+def read_strain_test(run: Run) -> StrainTest:
     """The strain test of a run.
 
     Raises:
         InputError: There is none, or its series cannot be read.
     """
-    series = read_series(run.directory)
+    series = run.series
     if not has_strain(series):
-        msg = f"{run.directory}: no chain was pulled in this run; give runs of the study chain"
+        msg = f"{run.path}: no chain was pulled in this run; give runs of the study chain"
         raise InputError(msg)
     length, force = series["chain_length_m"], series["string_pulled_force_N"][:, 0]
     shown = np.isfinite(length)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.columns import EVERY
-from dem.record.frames import read_frames
-from dem.record.manifest import read_run
-from dem.record.names import SERIES
-from dem.record.series import Series, read_series
+from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.averages import Mean, mean_with_error
@@ -23,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
     from dem.record.frames import FrameSequence
-    from dem.record.manifest import RunManifest
+    from dem.record.run import Run
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
@@ -61,7 +57,7 @@ class PackingChange:
 
 
 def measure_run(
-    directory: Path | str,
+    run: Run,
     *,
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
@@ -73,7 +69,7 @@ def measure_run(
     recorded in `series.h5` is taken at the sample nearest in time, if that file exists.
 
     Args:
-        directory: A run directory.
+        run: A run; it may be done, failed or still going on.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Whether the costly ones among them are taken never, at the last frame of each
             phase recorded so far, or at every frame.
@@ -84,15 +80,15 @@ def measure_run(
     Raises:
         InputError: Unknown definition, or a file is missing or damaged.
     """
-    manifest, frames, series = _open(directory, definitions)
+    frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
-    for part in _phases(manifest, frames):
-        rows += _rows(part, manifest, series, definitions, costly, offset=len(rows))
+    for part in _phases(run, frames):
+        rows += _rows(part, run, series, definitions, costly, offset=len(rows))
     return pd.DataFrame(rows)
 
 
 def summarise_run(
-    directory: Path | str,
+    run: Run,
     *,
     last: int = LAST_FRAMES,
     definitions: Sequence[str] = tuple(DEFINITIONS),
@@ -107,7 +103,7 @@ def summarise_run(
     what it tells as a whole beside, see `registry.PhaseMeasure`.
 
     Args:
-        directory: A run directory.
+        run: A run; it may be done, failed or still going on.
         last: Frames to average; "frames averaged" says how many there were.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: When to take the costly ones among them, see `measure_run`.
@@ -120,12 +116,12 @@ def summarise_run(
         InputError: Unknown definition, `last` below 1, or a file is missing or damaged.
     """
     _check_last(last)
-    manifest, frames, series = _open(directory, definitions)
+    frames, series = _open(run, definitions)
     summaries = []
-    for part in _phases(manifest, frames):
+    for part in _phases(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
-        table = pd.DataFrame(_rows(part[-last:], manifest, series, definitions, costly))
+        table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
         final = table.iloc[-1]
         kept = [*_LABELS, "phase", "phase type"]
         summary = {name: final[name] for name in kept}
@@ -138,13 +134,13 @@ def summarise_run(
         if series is not None:
             # Of the whole phase, not of its last frames.
             for measure in phase_measures():
-                summary |= measure.columns(manifest, series, part[0].phase)
+                summary |= measure.columns(run, series, part[0].phase)
         summaries.append(summary)
     return pd.DataFrame(summaries)
 
 
 def packing_change(
-    directory: Path | str,
+    run: Run,
     *,
     definition: str = "second-highest-com",
     last: int = LAST_FRAMES,
@@ -156,7 +152,7 @@ def packing_change(
     it belong to another state of the pile.
 
     Args:
-        directory: A run directory.
+        run: A run; it may be done, failed or still going on.
         definition: Key of `packing.DEFINITIONS`.
         last: Frames to average; the results say how many there were.
         activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
@@ -171,16 +167,16 @@ def packing_change(
         changeInPhiAmp.m of wsavoie/SmarticleSim: means over 20 samples.
     """
     _check_last(last)
-    manifest, frames, _ = _open(directory, [definition])
+    frames, _ = _open(run, [definition])
     active = [
         phase.index
-        for phase in manifest.phases
+        for phase in run.phases
         if (phase.type not in PASSIVE_PHASES if activity is None else phase.type in activity)
     ]
     if not active or active[0] == 0:
-        types = ", ".join(phase.type for phase in manifest.phases)
+        types = ", ".join(phase.type for phase in run.phases)
         msg = (
-            f"run {directory} has no activity with a phase before it: its phases are {types}; "
+            f"run {run} has no activity with a phase before it: its phases are {types}; "
             f"name its types of activity or choose another run"
         )
         raise InputError(msg)
@@ -189,10 +185,10 @@ def packing_change(
     for phase in (before, after):
         part = frames.in_phase(phase)[-last:]
         if not part:
-            kind = manifest.phases[phase].type
-            msg = f"run {directory} has no frame of phase {phase} ({kind}) yet; wait or resume it"
+            kind = run.phases[phase].type
+            msg = f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it"
             raise InputError(msg)
-        means.append(mean_with_error([packing_of(frame, manifest, definition=definition) for frame in part]))
+        means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
     return PackingChange(
         before=means[0],
         after=means[1],
@@ -208,24 +204,22 @@ def _check_last(last: int) -> None:
         raise InputError(msg)
 
 
-def _open(directory: Path | str, definitions: Iterable[str]) -> tuple[RunManifest, FrameSequence, Series | None]:
+def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series | None]:
     for definition in definitions:
         if definition not in DEFINITIONS:
             msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"
             raise InputError(msg)
-    manifest = read_run(directory)
-    frames = read_frames(directory)
+    _ = run.manifest
     # A run that failed early may have frames and no series.
-    has_series = (manifest.directory / SERIES).exists()
-    return manifest, frames, read_series(directory) if has_series else None
+    return run.frames, run.series if run.has_series else None
 
 
-def _phases(manifest: RunManifest, frames: FrameSequence) -> list[FrameSequence]:
+def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
     """The frames of each phase that has any."""
-    parts = [frames.in_phase(phase.index) for phase in manifest.phases]
+    parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
         msg = (
-            f"frames of {manifest.directory} name phases that run.json does not have "
+            f"frames of {run.path} name phases that run.json does not have "
             f"(it has {len(parts)}), or not in order; run it again into a new directory"
         )
         raise InputError(msg)
@@ -234,7 +228,7 @@ def _phases(manifest: RunManifest, frames: FrameSequence) -> list[FrameSequence]
 
 def _rows(
     part: FrameSequence,
-    manifest: RunManifest,
+    run: Run,
     series: Series | None,
     definitions: Sequence[str],
     costly: Costly,
@@ -243,33 +237,33 @@ def _rows(
 ) -> list[dict[str, object]]:
     """One row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in frame_measures(definitions) if measure.told_of(manifest)]
+    measures = [measure for measure in frame_measures(definitions) if measure.told_of(run)]
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
-        row: dict[str, object] = _labels(manifest)
+        row: dict[str, object] = _labels(run)
         row |= {
             "frame": offset + number,
             "time [s]": frame.time,
             "phase": frame.phase,
-            "phase type": manifest.phases[frame.phase].type,
+            "phase type": run.phases[frame.phase].type,
         }
         for measure in measures:
-            row |= measure.columns(frame if take_costly or not measure.costly else None, manifest)
+            row |= measure.columns(frame if take_costly or not measure.costly else None, run)
         if series is not None:
             row |= _series_columns(series, frame.time)
         rows.append(row)
     return rows
 
 
-def _labels(manifest: RunManifest) -> dict[str, object]:
+def _labels(run: Run) -> dict[str, object]:
     values = (
-        str(manifest.directory),
-        manifest.name,
-        manifest.seed,
-        manifest.aspect_ratio,
-        manifest.count,
-        manifest.fidelity,
-        manifest.scene_sha256,
+        str(run.path),
+        run.manifest.name,
+        run.manifest.seed,
+        run.manifest.aspect_ratio,
+        run.manifest.count,
+        run.manifest.fidelity,
+        run.manifest.scene_sha256,
     )
     return dict(zip(_LABELS, values, strict=True))
 

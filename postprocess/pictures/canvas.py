@@ -24,7 +24,7 @@ from vtkmodules.vtkRenderingCore import vtkTextRenderer
 
 from dem.errors import InputError, RunError, nearest
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field
 from postprocess.bodies.fields import Field
 from postprocess.bodies.meshes import BOX_POINTS, Bodies, owners, solid
@@ -66,13 +66,13 @@ class Look:
     axes: NDArray[np.float64]
 
     @classmethod
-    def checked(cls, run: RunManifest, *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
+    def checked(cls, run: Run, *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
         """Return a look by names.
 
         Raises:
             InputError: Unknown field or view, or a bad size.
         """
-        name = view or ("top" if run.planar else "front")
+        name = view or ("top" if run.manifest.planar else "front")
         if name not in VIEWS:
             msg = f"view {name!r}: is not known; {nearest(name, VIEWS)}"
             raise InputError(msg)
@@ -122,7 +122,7 @@ def drawn(
     found = {}
     for kind, mesh in made.items():
         shape = mesh if kind in {"smarticles", "ghost"} else solid(kind, mesh, bodies.run, largest=largest)
-        if kind in {"wall", "ghost"} and not bodies.run.planar and np.hypot(*forward[:2]) > 1e-9:
+        if kind in {"wall", "ghost"} and not bodies.run.manifest.planar and np.hypot(*forward[:2]) > 1e-9:
             shape = shape.clean(tolerance=1e-6).clip(normal=(-forward[0], -forward[1], 0.0), origin=(0.0, 0.0, 0.0))
         found[kind] = shape.translate((0.0, 0.0, -frame.floor_z)).scale(MILLIMETRE)
     return found
@@ -199,7 +199,7 @@ class Canvas:
         self,
         look: Look,
         room: Rectangle,
-        run: RunManifest,
+        run: Run,
         *,
         columns: int = 1,
         scale: ColourScale | None = None,
@@ -232,7 +232,8 @@ class Canvas:
                     plotter.add_light(lamp, only_active=True)
                 if not quick:
                     plotter.enable_ssao(
-                        radius=0.6 * run.middle_length * MILLIMETRE, bias=0.4 * run.thickness_in_plane * MILLIMETRE,
+                        radius=0.6 * run.manifest.middle_length_m * MILLIMETRE,
+            bias=0.4 * run.manifest.thickness_in_plane_m * MILLIMETRE,
                         kernel_size=64, blur=True,
                     )  # fmt: skip
             self.turn(look.axes)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from dem.record.frame import Frame
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.pictures.canvas import Caption
@@ -15,12 +15,12 @@ DEFINITION = "second-highest-com"
 """Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
 
 
-def titles_of(runs: Sequence[RunManifest]) -> list[str]:
+def titles_of(runs: Sequence[Run]) -> list[str]:
     """Return the headings of runs beside each other: their names, with their folders where these are alike."""
-    names = [run.name for run in runs]
+    names = [run.manifest.name for run in runs]
     if len(set(names)) == len(names):
         return names
-    folders = [run.directory.resolve() for run in runs]
+    folders = [run.path.resolve() for run in runs]
     # As much of the path as tells them apart: runs of sweeps differ in their last part, others may not.
     depth = 1
     longest = max(len(folder.parts) for folder in folders)
@@ -29,7 +29,7 @@ def titles_of(runs: Sequence[RunManifest]) -> list[str]:
     return [f"{name} ({'/'.join(folder.parts[-depth:])})" for name, folder in zip(names, folders, strict=True)]
 
 
-def caption_of(frame: Frame, run: RunManifest, *, title: str, pace: str = "", force: float | None = None) -> Caption:
+def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: float | None = None) -> Caption:
     """Return the caption of a frame.
 
     Args:
@@ -39,13 +39,13 @@ def caption_of(frame: Frame, run: RunManifest, *, title: str, pace: str = "", fo
         pace: How fast a film plays; empty for a picture.
         force: Normal force of the thickest line of force [N]; None where none are drawn.
     """
-    count = f"{run.count}" if frame.count == run.count else f"{frame.count} of {run.count}"
+    count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
     when = f"t = {frame.time:.3f} s ({phase})"
-    lines = [f"l/w = {run.aspect_ratio:g}   N = {count}   {when}"]
+    lines = [f"l/w = {run.manifest.aspect_ratio:g}   N = {count}   {when}"]
     if pace:
         lines[0] += f"   {pace}"
-    if not run.planar:  # neither packing nor crossings have a meaning there
+    if not run.manifest.planar:  # neither packing nor crossings have a meaning there
         mean = entanglement(frame.vertices).mean
         passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {passed}")
@@ -54,14 +54,14 @@ def caption_of(frame: Frame, run: RunManifest, *, title: str, pace: str = "", fo
     return Caption(title, tuple(lines))
 
 
-def packing_text(frame: Frame, run: RunManifest) -> str:
+def packing_text(frame: Frame, run: Run) -> str:
     """Return φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
     value = packing_of(frame, run, definition=DEFINITION)
     if math.isfinite(value):
         return f"φ = {value:.4f} ({DEFINITION})"
-    if run.container_tiers > 1:
-        return f"no φ: a mould of {run.container_tiers} tiers"
-    if not run.walled(frame.phase):
+    if run.manifest.container_tiers > 1:
+        return f"no φ: a mould of {run.manifest.container_tiers} tiers"
+    if not run.manifest.walled(frame.phase):
         return "no φ: the wall is gone"
     if frame.count < 2:
         return "no φ: fewer than 2 smarticles"

@@ -40,7 +40,7 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
         RunError: This machine lacks the libraries to draw without a display.
     """
     frame, run = shot.frames[index], shot.run
-    if run.planar:
+    if run.manifest.planar:
         msg = f"smarticle {smarticle}: in a plane no link passes through another smarticle; draw the whole run"
         raise InputError(msg)
     found = np.flatnonzero(frame.smarticle_ids == smarticle)
@@ -70,7 +70,7 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
     if has_plane(frame.vertices[own][None])[0]:
         said = f"{links} link{'s' * (links != 1)} of {others} other{'s' * (others != 1)} through its plane"
     caption = Caption(
-        f"{run.name}: smarticle {smarticle}",
+        f"{run.manifest.name}: smarticle {smarticle}",
         (
             f"{said}   t = {frame.time:.3f} s ({run.phases[frame.phase].type})",
             "orange: the smarticle, faintly its plane; blue: links through it",

@@ -14,7 +14,7 @@ from PIL import Image
 from dem.errors import InputError
 from dem.record.forces import read_forces
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import RunManifest, read_run
+from dem.record.run import Run, open_run
 from postprocess.bodies.colours import ColourScale, Span, scalars, span
 from postprocess.bodies.fields import BY_NAME, IDENTITY
 from postprocess.bodies.meshes import USUAL, Bodies
@@ -37,7 +37,7 @@ Track = Callable[[Iterable[Image.Image], int], Iterable[Image.Image]]
 class Shot:
     """A run to be drawn."""
 
-    run: RunManifest
+    run: Run
     frames: FrameSequence = field(repr=False)
     bodies: Bodies = field(repr=False)
 
@@ -48,7 +48,7 @@ class Shot:
         Raises:
             InputError: Something of it is missing or damaged, or forces are wanted and not recorded.
         """
-        run = read_run(directory)
+        run = open_run(directory)
         kinds = (*USUAL, "forces") if forces else USUAL
         bodies = Bodies(run, kinds, [BY_NAME[name] for name in IDENTITY], cut=True)
         return cls(run=run, frames=read_frames(directory), bodies=bodies)
@@ -277,7 +277,7 @@ def _span(shots: Sequence[Shot], values: Sequence[dict[int, NDArray[np.float64]]
 
 
 def _look(shots: Sequence[Shot], color_by: str | None, size: tuple[int, int], view: str | None) -> Look:
-    if len({shot.run.planar for shot in shots}) > 1:
+    if len({shot.run.manifest.planar for shot in shots}) > 1:
         msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
         raise InputError(msg)
     return Look.checked(shots[0].run, color_by=color_by, size=size, view=view)
@@ -292,9 +292,7 @@ def common_times(shots: Sequence[Shot]) -> NDArray[np.float64]:
     low = max(float(shot.frames.times[0]) for shot in shots)
     high = min(float(shot.frames.times[-1]) for shot in shots)
     if low > high:
-        spans = ", ".join(
-            f"{shot.run.directory} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots
-        )
+        spans = ", ".join(f"{shot.run.path} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots)
         msg = f"the runs have no time in common: {spans}; compare runs that overlap in time"
         raise InputError(msg)
     inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]

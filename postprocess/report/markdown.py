@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from postprocess.statistics.findings import Finding, told_more
-
 
 def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """A table."""
     lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
     return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
-
-
-def findings_lines(found: Iterable[Finding]) -> list[str]:
-    """A table of findings."""
-    rows = (
-        (one.paper, one.ours, "; ".join(filter(None, [f"**{one.verdict}**", told_more(one.verdict)])), one.criterion)
-        for one in found
-    )
-    return table_lines(["finding in the paper", "ours (± standard error)", "verdict", "found if"], rows)
 
 
 def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
-import pandas as pd
 from scipy.special import stdtrit
 
 from postprocess.statistics.seeds import CONFIDENCE, SeedMean, Slope
@@ -44,23 +41,6 @@ CRITERION = (
     "one verdict in forty is still `found`"
 )
 """How verdicts come about, for footers."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """A finding of the paper and what our runs say of it.
-
-    Attributes:
-        paper: What the paper found.
-        ours: Our numbers; errors are standard errors.
-        verdict: Ours.
-        criterion: What "found" requires.
-    """
-
-    paper: str
-    ours: str
-    verdict: Verdict
-    criterion: str
 
 
 def judge(effect: Effect, *, threshold: float = 0.0) -> Verdict:
@@ -101,18 +81,6 @@ def told_more(verdict: Verdict) -> str:
     return f"an effect of this size would take {more:.2g} times as many runs"
 
 
-def all_of(verdicts: Sequence[Verdict]) -> Verdict:
-    """Of a finding that says several things: one that is clearly wrong is enough to refuse it."""
-    for verdict in ("not found", "no data"):
-        if verdict in verdicts:
-            return verdict
-    unresolved = [verdict for verdict in verdicts if verdict == "not resolved"]
-    if not unresolved:
-        return "found"
-    known = [verdict.more for verdict in unresolved if isinstance(verdict, Unresolved)]
-    return Unresolved(more=max(known)) if len(known) == len(unresolved) else "not resolved"
-
-
 def negative(effect: Effect) -> SeedMean:
     """The same effect with the other sign."""
     return SeedMean(
@@ -129,10 +97,3 @@ def told(effect: Effect, digits: int = 4, unit: str = "") -> str:
         return "no data"
     error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"
     return f"{effect.value:+.{digits}g}{error}{unit} (n = {effect.count})"
-
-
-def findings_table(found: Sequence[Finding]) -> pd.DataFrame:
-    """One row per finding."""
-    columns = {"paper": "finding in the paper", "ours": "ours", "verdict": "verdict", "criterion": "criterion"}
-    table = pd.DataFrame([[getattr(one, name) for name in columns] for one in found], columns=list(columns.values()))
-    return table.assign(needed=[told_more(one.verdict) for one in found])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 
 import pandas as pd
 
@@ -42,46 +42,8 @@ def seeds_of(group: pd.DataFrame) -> dict[str, object]:
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 
-def ordered(table: pd.DataFrame, columns: Sequence[str], *, named: str, order: Iterable[str]) -> pd.DataFrame:
-    """Rows sorted by columns, one of which holds names that have an order of their own.
-
-    Args:
-        table: The rows.
-        columns: To sort by, `named` among them.
-        named: The column of names.
-        order: All names, the first ones first.
-    """
-    ranks = {name: rank for rank, name in enumerate(order)}
-    return table.sort_values(
-        list(columns),
-        key=lambda column: column.map(ranks) if column.name == named else column,
-        ignore_index=True,
-    )
-
-
 def told_number(value: float, form: str, error: float = math.nan) -> str:
     """`0.123 ± 0.004`: a number with its error, as far as there are any; the error never has a sign."""
     if math.isnan(value):
         return "-"
     return f"{value:{form}}" + (f" ± {error:{form.removeprefix('+')}}" if math.isfinite(error) else "")
-
-
-def told_means(
-    points: pd.DataFrame, named: Mapping[str, Callable[[pd.Series], str]], shown: Mapping[str, tuple[str, str]]
-) -> ToldTable:
-    """Means with their standard errors for a person to read.
-
-    Args:
-        points: One row per point, see `averaged`.
-        named: What tells a point from others: header and cell.
-        shown: Header and format of each quantity.
-    """
-    header = [*named, *(name for name, _ in shown.values())]
-    rows = [
-        [
-            *(cell(point) for cell in named.values()),
-            *(told_number(point[name], form, point[marked(name, "SE")]) for name, (_, form) in shown.items()),
-        ]
-        for _, point in points.iterrows()
-    ]
-    return header, rows

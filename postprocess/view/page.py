@@ -117,7 +117,7 @@ class Viewer:
         view, state = self._view, self._state
         # All texts of the run are values, shown as they are: none becomes part of the page's code.
         state.trame__title = "smarticles"
-        state.run_name = view.run.name
+        state.run_name = view.run.manifest.name
         state.fields = colour_names(view.fields)
         state.field = view.field.name
         state.index, state.last = view.index, len(view.frames) - 1
@@ -183,7 +183,7 @@ class Viewer:
         view, state = self._view, self._state
         frame = view.frame
         view.draw()
-        state.caption = f"N = {frame.count} of {view.run.count}, {view.phase}"
+        state.caption = f"N = {frame.count} of {view.run.manifest.count}, {view.phase}"
         state.clock = f"t = {frame.time:.4g} s, frame {view.index} of {len(view.frames) - 1}"
         state.legend = view.legend()
         state.told = view.describe()

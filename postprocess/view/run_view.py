@@ -12,7 +12,7 @@ import pyvista as pv
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
 from postprocess.bodies.fields import IDENTITY, Field, fields_of, link_values
 from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies, owners
@@ -46,7 +46,7 @@ class RunView:
     """
 
     def __init__(self, directory: Path | str) -> None:
-        self.run = read_run(directory)
+        self.run = open_run(directory)
         self.frames: FrameSequence = read_frames(directory)
         frame = self.frames[-1]
         self.fields = tuple(
@@ -84,13 +84,13 @@ class RunView:
     def ended(self) -> bool:
         """Whether no more frames will come, as the run directory tells it now; so also where it is gone."""
         try:
-            return read_run(self.run.directory).status != "unfinished"
+            return open_run(self.run.path).status.state not in ("running", "stopped")
         except InputError:
             return True
 
     def grow(self) -> bool:
         """Look for new frames; whether there are any."""
-        frames = read_frames(self.run.directory)
+        frames = read_frames(self.run.path)
         grown = len(frames) > len(self.frames)
         self.frames = frames
         return grown
@@ -128,7 +128,7 @@ class RunView:
 
     def aim(self) -> None:
         """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
-        _, up, forward = axes_from(*VIEWS["top" if self.run.planar else "front"])
+        _, up, forward = axes_from(*VIEWS["top" if self.run.manifest.planar else "front"])
         camera = self.plotter.camera
         camera.focal_point, camera.position, camera.up = (0.0, 0.0, 0.0), tuple(-forward), tuple(up)
         self.plotter.reset_camera(render=False)

@@ -17,9 +17,8 @@ from smarticles.parsing import Commands, add_engine, add_scene, add_slots, engin
 from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
-    from studies.accuracy.ladder import Ladder
-    from studies.accuracy.rung import Rung
-    from studies.accuracy.study import Accuracy
+    from studies.framework.study import Study
+    from studies.ladder import Ladder, Rung
     from templates.sweep.expand import Point
     from templates.sweep.sweep_file import Sweep
 
@@ -100,7 +99,7 @@ class _Expanded:
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """`smarticles accuracy`."""
-    from studies.accuracy.rung import BASE  # noqa: PLC0415
+    from studies.ladder import BASE  # noqa: PLC0415
 
     expanded = _expanded(arguments)
     seeds = expanded.seeds
@@ -127,15 +126,15 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     )
 
 
-def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Accuracy:
-    from studies.accuracy.study import Accuracy  # noqa: PLC0415
+def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Study:
+    from studies.accuracy import study  # noqa: PLC0415
 
-    return Accuracy(rungs=rungs, expected_s=expected_s)
+    return study(rungs, expected_s)
 
 
 def _expanded(arguments: argparse.Namespace) -> _Expanded:
     from dem.scene.reading import load_scene  # noqa: PLC0415
-    from studies.accuracy.ladder import (  # noqa: PLC0415
+    from studies.ladder import (  # noqa: PLC0415
         affordable,
         build_ladder,
         default_seeds,

@@ -74,8 +74,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """`smarticles measure`."""
     import pandas as pd  # noqa: PLC0415
 
-    from dem.record.manifest import read_run  # noqa: PLC0415
-    from dem.record.series import lost_series  # noqa: PLC0415
+    from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -91,7 +90,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         raise InputError(msg)
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
-    for warning in filter(None, (lost_series(read_run(directory)) for directory in directories)):
+    for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     table = measured(arguments.directories, frames=arguments.frames)
     if by:
@@ -103,7 +102,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
-        rings = pd.concat([profile_table(directory) for directory in directories], ignore_index=True)
+        rings = pd.concat([profile_table(Run(directory)) for directory in directories], ignore_index=True)
         write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
         print(json.dumps(_records(table), indent=2, ensure_ascii=False))

@@ -105,11 +105,10 @@ def show_status(arguments: argparse.Namespace) -> int:
 
 
 def _look(directory: Path) -> _Look:
-    from dem.record.rundir import in_use  # noqa: PLC0415
     from templates.sweep.folder import MANIFEST, open_folder, run_status  # noqa: PLC0415
 
     if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
-        return _Look(name=directory.name, runs=[run_status(directory, active=in_use(directory))], queue=None)
+        return _Look(name=directory.name, runs=[run_status(directory)], queue=None)
     folder = open_folder(directory)
     runs, queue = _with_queue(folder.status(), directory)
     return _Look(name=folder.name, runs=runs, queue=queue)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.layout import columns, told_results
@@ -18,7 +17,7 @@ from studies import registry
 
 if TYPE_CHECKING:
     from studies.framework.runs import MeasuredRun
-    from studies.framework.study import Report
+    from studies.framework.study import Report, Study
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
 
@@ -86,7 +85,7 @@ def run_study(arguments: argparse.Namespace) -> int:
 def compute_and_analyse(
     folder: Folder,
     arguments: argparse.Namespace,
-    load: Callable[[], Any],
+    load: Callable[[], Study],
     *,
     note: str,
     pictured: Mapping[str, object],
@@ -107,7 +106,7 @@ def compute_and_analyse(
         RunError: a run failed.
     """
     earlier = earlier or {}
-    needed = replace(folder, entries=tuple(entry for entry in folder.entries if entry.name not in earlier))
+    needed = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished and not earlier:
@@ -126,7 +125,7 @@ def compute_and_analyse(
     return 0
 
 
-def _earlier(results: Path | None, folder: Folder, load: Callable[[], Any]) -> Mapping[str, MeasuredRun]:
+def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study]) -> Mapping[str, MeasuredRun]:
     """The runs of a sweep that an earlier analysis measured.
 
     Raises:
@@ -135,7 +134,7 @@ def _earlier(results: Path | None, folder: Folder, load: Callable[[], Any]) -> M
     if results is None:
         return {}
     study = load()
-    if not getattr(study, "from_tables", getattr(study, "told_by_tables", False)):
+    if not study.from_tables:
         msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
         raise InputError(msg)
     from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
@@ -204,13 +203,52 @@ def _scenes(points: Sequence[Point]) -> set[str]:
 
 def _note(name: str, file: Path, changed: Mapping[str, str], engine: str | None) -> str:
     """How what is run differs from the full study as it ships, one line."""
-    from studies.base.shipped import differences  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
     here = expand(changed_sweep(file, changed, engine=engine))
     lines = differences(here, expand(load_sweep(registry.study_file(name))))
     return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
+
+
+def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
+    """Say how a quick variant differs from the full study, found from the points themselves.
+
+    Returns:
+        Lines such as `9 runs instead of 24`, `l_over_w: only 0.4, 0.7 of 0.4, 0.5, 0.7` (what is
+        left out), `shake_s: 1.5 instead of 5.0` (what differs in the runs that both have), and `draws: 3` or
+        `draws: not there` of a variable that only one of them knows.
+    """
+    lines = [] if len(quick) == len(full) else [f"{len(quick)} runs instead of {len(full)}"]
+    twins = {point.name: point for point in full}
+    both = [(point, twins[point.name]) for point in quick if point.name in twins]
+    told: list[str] = []
+    for name in dict.fromkeys([*full[0].values, *quick[0].values]):
+        if not (name in full[0].values and name in quick[0].values):
+            lines.append(f"{name}: {_distinct(quick, name) or 'not there'}")
+            continue
+        some, every = _distinct(quick, name), _distinct(full, name)
+        changed = [pair for pair in both if pair[0].values[name] != pair[1].values[name]]
+        if changed:
+            here, there = (_distinct([pair[k] for pair in changed], name) for k in (0, 1))
+            lines.append(f"{name}: {here} instead of {there}")
+        elif some != every and not any(_follows(name, other, full) for other in told):
+            told.append(name)
+            lines.append(f"{name}: only {some} of {every}")
+    return lines
+
+
+def _distinct(points: Sequence[Point], name: str) -> str:
+    values = list(dict.fromkeys(point.values[name] for point in points if name in point.values))
+    if all(isinstance(value, int | float) for value in values):
+        values.sort()
+    return ", ".join(map(str, values))
+
+
+def _follows(name: str, other: str, points: Sequence[Point]) -> bool:
+    """Whether a variable is settled by another one, as the columns of a table are by its first."""
+    seen: dict[str, object] = {}
+    return all(seen.setdefault(str(point.values[other]), point.values[name]) == point.values[name] for point in points)
 
 
 def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:

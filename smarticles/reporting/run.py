@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError, RunError
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
-from dem.record.manifest import RunManifest, read_run
 from dem.record.names import FRAME, LOG, SCENE, SERIES, collection
-from dem.record.series import Series, read_series
+from dem.record.run import Run, open_run
+from dem.record.series import Series
 from dem.scene.reading import load_scene
 from smarticles.measuring import measured
 from smarticles.reporting.accuracy import accuracy_blocks
@@ -53,10 +53,10 @@ def run_page(directory: Path, table: Path | None, made: str) -> Page:
         InputError: it is no run directory, or a file of it is damaged.
     """
     directory = directory.resolve()
-    run = read_run(directory)
+    run = open_run(directory)
     scene, why_not = _scene(directory)
     return Page(
-        title=run.name,
+        title=run.manifest.name,
         about="run",
         lead=_lead(run),
         sections=(
@@ -81,28 +81,28 @@ def _scene(directory: Path) -> tuple[Scene | None, str]:
         return None, f"This version cannot read the scene of this run: {error}"
 
 
-def _lead(run: RunManifest) -> list[tuple[str, str]]:
+def _lead(run: Run) -> list[tuple[str, str]]:
     lead = [
-        ("status", run.status),
-        ("smarticles", str(run.count)),
-        ("l/w", f"{run.aspect_ratio:g}"),
-        ("engine", run.engine),
-        ("fidelity", run.fidelity),
-        ("seed", str(run.seed)),
+        ("status", run.status.state),
+        ("smarticles", str(run.manifest.count)),
+        ("l/w", f"{run.manifest.aspect_ratio:g}"),
+        ("engine", run.manifest.engine),
+        ("fidelity", run.manifest.fidelity),
+        ("seed", str(run.manifest.seed)),
     ]
-    if run.end_time is not None:
-        lead.append(("simulated", f"{run.end_time:.3g} s"))
-    if run.wall_time is not None:
-        lead.append(("computed in", f"{run.wall_time:.3g} s"))
+    if run.status.time_s is not None:
+        lead.append(("simulated", f"{run.status.time_s:.3g} s"))
+    if run.status.wall_s is not None:
+        lead.append(("computed in", f"{run.status.wall_s:.3g} s"))
     return lead
 
 
-def _ending(run: RunManifest) -> list[Block]:
-    if run.status == "done":
+def _ending(run: Run) -> list[Block]:
+    if run.status.state == "done":
         return []
     told = {"failed": "This run failed", "interrupted": "This run was interrupted"}
-    cause = f": {run.cause}" if run.cause else ""
-    return [Words(lines=[f"{told.get(run.status, 'This run has not finished')}{cause}."], tone="warning")]
+    cause = f": {run.status.cause}" if run.status.cause else ""
+    return [Words(lines=[f"{told.get(run.status.state, 'This run has not finished')}{cause}."], tone="warning")]
 
 
 def _measures(directory: Path) -> list[Block]:
@@ -122,14 +122,14 @@ def still_blocks(directory: Path, *, caption: str = "") -> list[Block]:
 
     if not (directory / collection(FRAME)).is_file():
         return []
-    run = read_run(directory)
+    run = open_run(directory)
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         try:
             picture = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
         except (InputError, RunError) as error:
             return [Words(lines=[f"No picture: {error}"], tone="note")]
-    kind = run.phases[-1].type if run.status == "done" else "its last frame"
-    alt = f"The {run.count} smarticles of {run.name} at the end of {kind}, drawn as their true boxes"
+    kind = run.phases[-1].type if run.status.state == "done" else "its last frame"
+    alt = f"The {run.manifest.count} smarticles of {run.manifest.name} at the end of {kind}, drawn as their true boxes"
     return [Figure(caption=caption or f"{alt}. Another view or time: smarticles render.", alt=alt, light=picture)]
 
 
@@ -147,16 +147,16 @@ def turntable_blocks(directory: Path, *, caption: str = "") -> list[Block]:
             views.append(address(content.getvalue(), "image/webp"))
     except (InputError, RunError):
         return []  # the still says why
-    run = read_run(directory)
-    alt = f"The last frame of {run.name} from all around"
+    run = open_run(directory)
+    alt = f"The last frame of {run.manifest.name} from all around"
     told = "Move the pointer across it, tap on it, or use the arrow keys: it turns."
     return [Turntable(caption=f"{caption or alt}. {told}", alt=alt, views=views, name="turntable")]
 
 
-def _curves(run: RunManifest) -> list[Block]:
-    if not (run.directory / SERIES).is_file():
+def _curves(run: Run) -> list[Block]:
+    if not (run.path / SERIES).is_file():
         return []
-    series = read_series(run.directory)
+    series = run.series
     spans = list(_spans(run, series))
     blocks: list[Block] = []
     for name, factor, unit, part in _CURVES:
@@ -178,13 +178,13 @@ def _curves(run: RunManifest) -> list[Block]:
     return blocks
 
 
-def _spans(run: RunManifest, series: Series) -> Iterator[tuple[float, float, str]]:
+def _spans(run: Run, series: Series) -> Iterator[tuple[float, float, str]]:
     """Start, end [s] and type of the phases that the series reaches."""
     for phase in run.phases:
         inside = series.time[series["phase"] == phase.index]
         if len(inside):
-            start = float(inside[0]) if phase.start is None else phase.start
-            yield start, float(inside[-1]) if phase.end is None else phase.end, phase.type
+            start = float(inside[0]) if phase.start_s is None else phase.start_s
+            yield start, float(inside[-1]) if phase.end_s is None else phase.end_s, phase.type
 
 
 def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Block]:
@@ -245,21 +245,21 @@ def warning_blocks(directories: dict[str, Path]) -> list[Block]:
     return [Table(caption=caption, header=["warning", "where"], rows=rows)]
 
 
-def _repeat(run: RunManifest, directory: Path) -> list[Block]:
+def _repeat(run: Run, directory: Path) -> list[Block]:
     rows = [
-        ["scene hash (SHA-256)", run.scene_sha256],
-        ["seed", str(run.seed)],
-        ["started", run.started],
-        ["threads", word(run.threads)],
-        *([f"version of {name}", version] for name, version in run.versions.items()),
+        ["scene hash (SHA-256)", run.manifest.scene_sha256],
+        ["seed", str(run.manifest.seed)],
+        ["started", run.manifest.started],
+        ["threads", word(run.manifest.threads)],
+        *([f"version of {name}", version] for name, version in run.manifest.versions.items()),
     ]
     # From the folder that the directory is in: where that lies on this machine is nobody else's.
     here, there = shlex.quote(directory.name), shlex.quote(f"{directory.name}-again")
     again = f"smarticles run {here}/{SCENE} --out {there}\nsmarticles compare {here} {there}"
     told = "One thread gives the same bits with the same versions; smarticles compare tells whether it did."
     return [
-        Listing(caption="The command of this run", text=run.command),
+        Listing(caption="The command of this run", text=run.manifest.command),
         Listing(caption="The same once more", text=again),
-        Words(lines=[told] if run.threads == 1 else ["Several threads: the same numbers only within rounding."]),
+        Words(lines=[told if run.manifest.threads == 1 else "Several threads: the same numbers only within rounding."]),
         Table(caption="What made it", header=["what", "value"], rows=rows),
     ]  # fmt: skip

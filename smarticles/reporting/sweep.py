@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dem.errors import InputError
 from dem.plan.effects import decide
 from dem.record.names import FRAME, collection
+from dem.record.run import Run
 from dem.scene.reading import load_scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
@@ -22,8 +23,7 @@ from smarticles.reporting.results import PROVENANCE, read_results
 from smarticles.reporting.run import scene_blocks, still_blocks, turntable_blocks, warning_blocks
 from smarticles.reporting.tables import short_table, whole_table, word
 from studies.registry import STUDIES
-from templates.sweep.files import read_json
-from templates.sweep.folder import MANIFEST, Entry, Folder, RunStatus, count_states
+from templates.sweep.folder import Entry, Folder, RunStatus, count_states
 from templates.sweep.sweep_file import SEED
 
 if TYPE_CHECKING:
@@ -219,10 +219,8 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 
 def _files(folder: Folder) -> list[Block]:
     """The files that the sweep was made of."""
-    files = (read_json(folder.path / MANIFEST) or {}).get("files")
-    if not isinstance(files, dict):
-        return []
-    return [Listing(caption=f"{name}", text=str(text), folded=True) for name, text in files.items()]
+    files = folder.manifest.files
+    return [Listing(caption=name, text=text, folded=True) for name, text in files.items()]
 
 
 def _effects(scenes: Mapping[str, Scene]) -> list[Block]:
@@ -240,19 +238,15 @@ def _effects(scenes: Mapping[str, Scene]) -> list[Block]:
 
 
 def _repeat(folder: Folder, results: Path | None) -> list[Block]:
-    manifest = read_json(folder.path / MANIFEST) or {}
-    versions = manifest.get("versions")
-    rows = [["made", word(manifest.get("created"))]]
-    rows += [
-        [f"version of {name}", word(one)] for name, one in (versions if isinstance(versions, dict) else {}).items()
-    ]
+    manifest = folder.manifest
+    rows = [["made", manifest.created], *([f"version of {name}", one] for name, one in manifest.versions.items())]
     used = Counter(_made_by(folder, entry) for entry in folder.entries)
     rows += [[f"made {count} of {len(folder.entries)} runs", told] for told, count in used.items() if told]
     header = ["run", *folder.entries[0].values, "scene hash (SHA-256)"]
     points = [[one.name, *map(word, one.values.values()), one.scene_sha256] for one in folder.entries]
     again = f"smarticles resume {shlex.quote(folder.path.resolve().name)}"
     return [
-        Listing(caption="The command that made it", text=folder.command),
+        Listing(caption="The command that made it", text=manifest.command),
         Listing(caption="What computes the runs that are missing", text=again),
         Table(caption="What made it", header=["what", "value"], rows=rows),
         Table(caption="All runs, what varies, and the hashes of their scenes", header=header, rows=points, folded=True),
@@ -262,6 +256,8 @@ def _repeat(folder: Folder, results: Path | None) -> list[Block]:
 
 def _made_by(folder: Folder, entry: Entry) -> str:
     """Engine and versions of a run, in one line."""
-    run = read_json(folder.run(entry) / "run.json") or {}
-    versions = run.get("versions")
-    return ", ".join(f"{name} {one}" for name, one in versions.items()) if isinstance(versions, dict) else ""
+    try:
+        versions = Run(folder.run(entry)).manifest.versions
+    except InputError:
+        return ""
+    return ", ".join(f"{name} {one}" for name, one in versions.items())

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -27,21 +28,11 @@ Engines = Literal["alike", "opposite", "links alone tells", "YADE alone tells"]
 """Verdicts of both engines on one finding: the same, one found and the other refused, or one not resolved."""
 
 _FOUND: Mapping[str, Verdict] = {
-    "found": "reproduced",
-    "not found": "not",
-    "not resolved": "not resolved",
+    **dict.fromkeys(("found", "yes"), "reproduced"),
+    **dict.fromkeys(("not found", "no"), "not"),
+    **dict.fromkeys(("not resolved", "undetermined"), "not resolved"),
     "no data": "no data",
-    "yes": "reproduced",
-    "no": "not",
-    "undetermined": "not resolved",
 }
-_COUNT = "smarticles [-]"
-
-RESULTS = "results"
-"""Folder of the results within that of a study which has been run."""
-
-ON_YADE = "-yade"
-"""What the folder of a study's results on YADE is called beside that of its results on links."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +45,7 @@ class Tested:
         ours: Its numbers.
         criterion: What its verdict asks for.
         basis: Smarticles, seeds and engine that it rests on.
-        needed: What it would take, where the verdict is not resolved and that is told; else empty.
+        needed: What it would take, where the verdict is not resolved and that is known; else empty.
         instead: What a test of ours says where the paper's own cannot tell; None where there is none.
     """
 
@@ -101,14 +92,10 @@ class Claim:
     def verdict(self) -> Verdict:
         """Of both together: partly where one finds it and the other does not; not where one finds the opposite."""
         tested = [one.settled for one in (self.text, self.code) if one is not None]
-        told = {verdict for verdict in tested if verdict != "no data"}
-        if not tested:
-            return "not testable"
-        if not told:
-            return "no data"
-        if len(told) == 1:
-            return told.pop()
-        return "partly" if "reproduced" in told else "not"
+        known = set(tested) - {"no data"}
+        if not known:
+            return "no data" if tested else "not testable"
+        return next(iter(known)) if len(known) == 1 else "partly" if "reproduced" in known else "not"
 
     @property
     def engines(self) -> Mapping[str, Engines]:
@@ -130,7 +117,7 @@ def _agreement(links: Verdict, yade: Verdict) -> Engines:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """All claims with what the studies found.
+    """Judge all claims by what the studies found.
 
     Args:
         results: Folder of the studies' results.
@@ -139,77 +126,73 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
     Raises:
         InputError: A study or a finding that the list names is not there.
     """
-    tables = _Tables(results)
+
+    @cache
+    def read(study: str) -> _Findings:
+        # A study that has been run has its results in a folder of its own.
+        inside = results / study / "results"
+        return _findings(inside if inside.is_dir() else results / study)
+
     found: list[Claim] = []
-    for part, entry in _entries(listed):
-        found.append(
-            Claim(
-                number=len(found) + 1,
-                part=part,
-                says=entry["says"],
-                text=tables.tested(entry.get("text"), entry.get("text_instead")),
-                code=tables.tested(entry.get("code"), entry.get("code_instead")),
-                yade=tables.on_yade(entry.get("text")),
-                code_on_yade=tables.on_yade(entry.get("code")),
-                why=entry.get("untested") or entry.get("why", ""),
+    for part in yaml.safe_load(listed.read_text(encoding="utf-8")):
+        for entry in part["claims"]:
+            text, code = entry.get("text"), entry.get("code")
+            yade, code_on_yade = (
+                _tested(read, [f"{named[0]}-yade", named[1]], optional=True)
+                if named and (results / f"{named[0]}-yade").is_dir()
+                else None
+                for named in (text, code)
             )
-        )
+            found.append(
+                Claim(
+                    number=len(found) + 1,
+                    part=part["part"],
+                    says=entry["says"],
+                    text=_tested(read, text, entry.get("text_instead")),
+                    code=_tested(read, code, entry.get("code_instead")),
+                    yade=yade,
+                    code_on_yade=code_on_yade,
+                    why=entry.get("untested") or entry.get("why", ""),
+                )
+            )
     return tuple(found)
 
 
-def _entries(listed: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
-    for part in yaml.safe_load(listed.read_text(encoding="utf-8")):
-        for entry in part["claims"]:
-            yield part["part"], entry
+_Findings = tuple[Mapping[str, Sequence[str]], str]
+"""Numbers, verdict, criterion and what is needed by id of the finding; what all of them rest on."""
 
 
-class _Tables:
-    """Findings of studies, read once."""
-
-    def __init__(self, results: Path) -> None:
-        self._results = results
-        self._found: dict[str, dict[str, Sequence[str]]] = {}
-        self._bases: dict[str, str] = {}
-
-    def tested(self, named: Sequence[str] | None, instead: Sequence[str] | None = None) -> Tested | None:
-        """What a study says, named with its finding, and what another one does instead; None of none."""
-        if named is None:
+def _tested(
+    read: Callable[[str], _Findings],
+    named: Sequence[str] | None,
+    instead: Sequence[str] | None = None,
+    *,
+    optional: bool = False,
+) -> Tested | None:
+    """What a study says, named with its finding, and what another one says instead; None of none."""
+    if named is None:
+        return None
+    study, finding = named
+    findings, basis = read(study)
+    if finding not in findings:
+        if optional:
             return None
-        study, finding = named
-        self._open(study)
-        try:
-            ours, verdict, criterion, *needed = self._found[study][finding]
-        except KeyError:
-            msg = f"{self._results / study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
-            raise InputError(msg) from None
-        return Tested(
-            study=study,
-            verdict=_FOUND[verdict],
-            ours=ours,
-            criterion=criterion,
-            basis=self._bases[study],
-            needed=needed[0] if needed else "",
-            instead=self.tested(instead),
-        )
-
-    def on_yade(self, named: Sequence[str] | None) -> Tested | None:
-        """What the same finding is in the results of the study on YADE, where there are such."""
-        if named is None or not (self._results / f"{named[0]}{ON_YADE}").is_dir():
-            return None
-        study, finding = f"{named[0]}{ON_YADE}", named[1]
-        self._open(study)
-        return self.tested((study, finding)) if finding in self._found[study] else None
-
-    def _open(self, study: str) -> None:
-        """Read a study, if it has not been; a study that has been run has its results in a folder of its own."""
-        if study not in self._found:
-            inside = self._results / study / RESULTS
-            folder = inside if inside.is_dir() else self._results / study
-            self._found[study], self._bases[study] = _read(folder), _basis(folder)
+        msg = f"{study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
+        raise InputError(msg)
+    ours, verdict, criterion, *needed = findings[finding]
+    return Tested(
+        study=study,
+        verdict=_FOUND[verdict],
+        ours=ours,
+        criterion=criterion,
+        basis=basis,
+        needed=needed[0] if needed else "",
+        instead=_tested(read, instead),
+    )
 
 
-def _read(folder: Path) -> dict[str, Sequence[str]]:
-    """Numbers, verdict and criterion by id of the finding, and by its sentence in tables without ids."""
+def _findings(folder: Path) -> _Findings:
+    """Read the findings of a study; questions of earlier studies by their sentence where they have no id."""
     for name, order in (("findings.csv", ("ours", "verdict", "criterion", "needed")), ("verdicts.csv", None)):
         path = folder / name
         if path.is_file():
@@ -218,7 +201,7 @@ def _read(folder: Path) -> dict[str, Sequence[str]]:
             key = header.index("id") if "id" in header else 0
             # Absent in tables written before the column `needed` was added.
             columns = [2, 1, 0] if order is None else [header.index(one) for one in order if one in header]
-            return {row[key]: [row[column] for column in columns] for row in rows}
+            return {row[key]: [row[column] for column in columns] for row in rows}, _basis(folder)
     msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
     raise InputError(msg)
 
@@ -228,22 +211,12 @@ def _basis(folder: Path) -> str:
     runs = pd.read_csv(folder / "runs.csv", comment="#")
     made = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["runs"]
     engines = sorted({"links" if "links" in run["versions"] else "YADE" for run in made})
-    parts = [f"{_span(runs[_COUNT])} smarticles"]
-    if ASPECT in runs:
-        parts.append(f"l/w {_span(runs[ASPECT])}")
-    seeds = _seeds(folder, runs)
-    parts += [f"{seeds} seed{'' if seeds == '1' else 's'}", " and ".join(engines)]
-    return ", ".join(parts)
-
-
-def _seeds(folder: Path, runs: pd.DataFrame) -> str:
-    """From the point with the fewest to that with the most; how many in all where no table tells of points."""
-    for name in ("points.csv", "summary.csv"):
-        if (folder / name).is_file():
-            points = pd.read_csv(folder / name, comment="#")
-            if SEEDS in points:
-                return _span(points[SEEDS])
-    return str(runs[SEED].nunique())
+    # Seeds from the point with the fewest to that with the most; how many in all where no table tells of points.
+    points = [folder / name for name in ("points.csv", "summary.csv") if (folder / name).is_file()]
+    counts = next((table[SEEDS] for path in points if SEEDS in (table := pd.read_csv(path, comment="#"))), None)
+    seeds = _span(counts) if counts is not None else str(runs[SEED].nunique())
+    parts = [f"{_span(runs['smarticles [-]'])} smarticles", *([f"l/w {_span(runs[ASPECT])}"] if ASPECT in runs else [])]
+    return ", ".join([*parts, f"{seeds} seed{'' if seeds == '1' else 's'}", " and ".join(engines)])
 
 
 def _span(values: pd.Series) -> str:

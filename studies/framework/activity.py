@@ -17,11 +17,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from dem.record.manifest import PhaseRecord, RunManifest
-from dem.record.series import Series, read_series
+from dem.record.document import Phase
+from dem.record.run import Run
+from dem.record.series import Series
 from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
-from postprocess.scene_file import read_phases
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.procedures import (
     ACTIVE,
@@ -61,7 +61,7 @@ _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_w
 _WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
 
 
-def activity(run: RunManifest) -> PhaseRecord:
+def activity(run: Run) -> Phase:
     """The one activity of a run.
 
     Raises:
@@ -72,12 +72,12 @@ def activity(run: RunManifest) -> PhaseRecord:
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
         known = ", ".join(PROCEDURES)
-        msg = f"{run.directory}: not one activity ({known}) between two rests: its phases are {types}"
+        msg = f"{run.path}: not one activity ({known}) between two rests: its phases are {types}"
         raise InputError(msg)
     return active[0]
 
 
-def procedure_row(run: RunManifest) -> dict[str, object]:
+def procedure_row(run: Run) -> dict[str, object]:
     """One run's row of the table of runs.
 
     Args:
@@ -87,24 +87,24 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
         InputError: It is not one activity between two rests, or cannot be read.
     """
     active = activity(run)
-    settings = read_phases(run.directory)[active.index]
-    if settings.type != active.type:
-        msg = f"{run.directory}: phase {active.index} is {active.type} in run.json, {settings.type} in scene.yaml"
+    settings = run.scene["phases"][active.index]
+    if settings["type"] != active.type:
+        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {settings['type']} in scene.yaml"
         raise InputError(msg)
     procedure = PROCEDURES[active.type]
     wanted = range(active.index - 1, active.index + 2)
-    table = summarise_run(run.directory, definitions=[DEFINITION], phases=set(wanted))
+    table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted))
     if len(table) != len(wanted):
-        msg = f"{run.directory}: no frame of its activity or of the rest before or after it; run it again"
+        msg = f"{run.path}: no frame of its activity or of the rest before or after it; run it again"
         raise InputError(msg)
     before, during, after = (table.set_index("phase").loc[phase] for phase in wanted)
     row: dict[str, object] = {
         PROCEDURE: procedure,
-        THETA: settings.number("theta_deg") if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.aspect_ratio, 6),
-        SEED: run.seed,
-        "smarticles [-]": run.count,
-        "fidelity": run.fidelity,
+        THETA: settings["theta_deg"] if procedure == INTERNAL else math.nan,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
         ACTIVE: duration(active),
     }
     for name, rest in ((f"{STATIC} ", before), ("", after)):
@@ -115,17 +115,17 @@ def procedure_row(run: RunManifest) -> dict[str, object]:
     row[f"phi {DEFINITION} SE in run [-]"] = after[f"phi {DEFINITION} SE [-]"]
     row["h0 [m]"] = before["com height [m]"]
     row[HEIGHT] = after["com height [m]"] / before["com height [m]"]
-    straight_until = settings.number("opening_s") + settings.number("straight_hold_s") if procedure == SHAPE else None
+    straight_until = settings["opening_s"] + settings["straight_hold_s"] if procedure == SHAPE else None
     row |= _of_series(run, active, straight_until)
-    row[SAMPLED] = during.get(SAMPLED_WORK, math.nan) / run.count
+    row[SAMPLED] = during.get(SAMPLED_WORK, math.nan) / run.manifest.count
     row["escaped at the end [-]"] = after["escaped [-]"]
     row["frames averaged [-]"] = int(table["frames averaged"].min())
-    row["scene_sha256"] = run.scene_sha256
-    row["run"] = run.directory.name
+    row["scene_sha256"] = run.manifest.scene_sha256
+    row["run"] = run.path.name
     return row
 
 
-def height_history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """h/h0 of a run's centre of mass, (n,) [-], and its times since the activity began, (n,) [s].
 
     h0 is the mean over the rest before the activity, with which the history begins.
@@ -133,20 +133,20 @@ def height_history(run: RunManifest) -> tuple[NDArray[np.float64], NDArray[np.fl
     Raises:
         InputError: There is no series of it.
     """
-    return _heights(read_series(run.directory), activity(run))
+    return _heights(run.series, activity(run))
 
 
-def _heights(series: Series, active: PhaseRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _heights(series: Series, active: Phase) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     height = np.asarray(series["com_height_m"], dtype=np.float64)
     shown = (series["phase"] >= active.index - 1) & np.isfinite(height)
     before = shown & (series["phase"] == active.index - 1)
-    if active.start is None or not before.any():
+    if active.start_s is None or not before.any():
         msg = f"{series.path}: no height of the centre of mass in the rest before the activity; run it again"
         raise InputError(msg)
-    return height[shown] / height[before].mean(), series.time[shown] - active.start
+    return height[shown] / height[before].mean(), series.time[shown] - active.start_s
 
 
-def _of_series(run: RunManifest, active: PhaseRecord, straight_until: float | None) -> dict[str, float]:
+def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
     """What the series tells; NaN where it was not recorded.
 
     Args:
@@ -155,12 +155,12 @@ def _of_series(run: RunManifest, active: PhaseRecord, straight_until: float | No
         straight_until: When barbs start to close again, after the beginning of the activity [s].
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
-    if not (run.directory / "series.h5").exists():
+    if not (run.path / "series.h5").exists():
         return found
-    series = read_series(run.directory)
+    series = run.series
     work = _WORK[PROCEDURES[active.type]]
     if work in series.data:
-        found[ENERGY] = _gained(series[work], series["phase"] < active.index) / run.count
+        found[ENERGY] = _gained(series[work], series["phase"] < active.index) / run.manifest.count
     if "com_height_m" in series.data:
         height, time = _heights(series, active)
         if straight_until is not None:
@@ -240,9 +240,3 @@ def samples(runs: pd.DataFrame) -> pd.DataFrame:
     active = runs[[PROCEDURE, THETA, ASPECT, SEED, *QUANTITIES]].assign(**{"runs [-]": 1})
     table = pd.concat([static.reindex(columns=active.columns), active], ignore_index=True)
     return table.sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)
-
-
-def static_spread(runs: pd.DataFrame) -> float:
-    """Largest difference of φ before the activity between runs of the same aspect ratio and seed [-]."""
-    groups = runs.groupby([ASPECT, SEED])[f"{STATIC} {PHI}"]
-    return float((groups.max() - groups.min()).max())

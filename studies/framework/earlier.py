@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +12,8 @@ from typing import Any
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.plan.steps import time_steps
+from dem.record.run import Run
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
 from studies.framework.runs import ENGINE, MeasuredRun, Row
@@ -95,16 +95,19 @@ def _origins(path: Path) -> dict[str, Mapping[str, Any]]:
         raise InputError(msg) from None
 
 
-def _manifest(run: Wanted, origin: Mapping[str, Any]) -> RunManifest:
+def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
     """What the run said of itself, as far as scene and provenance tell."""
     scene = load_scene(run.scene)
     versions = dict(origin["versions"])
-    planned = manifest(
+    made = manifest(
         scene,
         Path(origin["directory"]),
-        steps=[math.nan] * len(scene.phases),
+        steps=time_steps(scene),
         command=origin["command"],
         made_by=(scene.engine, versions.get(scene.engine, "unknown")),
         threads=1,
     )
-    return replace(planned, started=origin["started"], versions=MappingProxyType(versions), status="done")
+    found = Run(Path(origin["directory"]))
+    # Its directory is not here.
+    vars(found)["manifest"] = made.model_copy(update={"started": origin["started"], "versions": versions})
+    return found

@@ -115,26 +115,6 @@ def compared_engines(
     return pd.DataFrame(rows, columns=columns)
 
 
-def tables_of(
-    runs: pd.DataFrame,
-    keys: Sequence[str],
-    quantities: Mapping[str, str],
-    made: Callable[[pd.DataFrame], pd.DataFrame],
-) -> dict[str, pd.DataFrame]:
-    """The tables of a study that are made of its runs alone: `runs`, `points`, and `engines` if there are several.
-
-    Args:
-        runs: One row per run.
-        keys: Columns that name a point.
-        quantities: Columns that are compared.
-        made: Points of the runs of one engine.
-    """
-    tables = {"runs": runs, "points": by_engine(runs, made)}
-    if engines_of(runs):
-        tables["engines"] = compared_engines(runs, keys, quantities)
-    return tables
-
-
 def pairs_of_engines(runs: pd.DataFrame, keys: Sequence[str], one: str, other: str) -> pd.DataFrame:
     """Rows of runs of the same point and seed on two engines; columns get `one` or `other` behind their names."""
     names = [*keys, SEED]

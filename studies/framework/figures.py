@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.points import marked
 from studies.framework import plots
@@ -32,7 +32,7 @@ class Analysis:
     """
 
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
-    manifests: Mapping[str, RunManifest] = field(repr=False)
+    manifests: Mapping[str, Run] = field(repr=False)
     footer: Sequence[str]
 
     @property
@@ -63,6 +63,8 @@ class Series:
     shift: float = 0.0
 
 
+_MOST_COLUMNS = 3
+
 Split = Callable[[pd.DataFrame], list[Series]]
 """Makes the series of a table of points or runs."""
 
@@ -76,6 +78,23 @@ class Figure(Protocol):
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw and write the figure; gives the files, none where there is nothing to draw."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """A figure of one study alone.
+
+    Attributes:
+        name: Of the files.
+        of: Draws it below a footer and writes it to a path without suffix; gives the files.
+    """
+
+    name: str
+    of: Callable[[Path, Analysis], list[Path]]
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw and write the figure."""
+        return self.of(path, analysis)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +112,7 @@ class Means:
         marks: Values of x with a vertical line.
         ticks: Whether the axis has ticks at the values of x alone.
         share_y: Whether panels have one y axis.
+        reference: Published values by the column that they are set against: places in the unit of x, and values.
         told: Lines for the footer.
     """
 
@@ -106,11 +126,13 @@ class Means:
     marks: Sequence[float] = ()
     ticks: bool = False
     share_y: bool = False
+    reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
     told: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the judging engine filled, other engines open beside it."""
-        if analysis.points[[quantity.column for quantity in self.quantities]].isna().all().any():
+        drawn = pd.concat([series.rows for series in self.split(analysis.points)] or [analysis.points.iloc[:0]])
+        if drawn[[quantity.column for quantity in self.quantities]].isna().all().any():
             return []
         columns = min(len(self.quantities), 2)
         rows = -(-len(self.quantities) // columns)
@@ -134,6 +156,9 @@ class Means:
     def _panel(self, axes: Any, quantity: Quantity, points: pd.DataFrame) -> None:
         for x in self.marks:
             axes.axvline(x, color=style.GREY, linewidth=0.6, linestyle=(0, (2, 2)))
+        if quantity.column in self.reference:
+            look = {**plots.marker("o", style.ORANGE, style.ORANGE), "linestyle": "none"}
+            plots.draw_means(axes, *self.reference[quantity.column], None, look=look, label="experiment")
         known = points[points[quantity.column].notna()]
         positive = True
         for number, engine in enumerate(engines_of(known) or ("",)):
@@ -174,12 +199,14 @@ class Histories:
         panel: Title of a panel, with `{}` for its value.
         panel_scale: Factor of that value.
         width: Of the intervals that are averaged over; None: a hundredth of the longest activity.
+        unit: Of that width.
+        log: Whether x is logarithmic; it must be positive.
         level: Horizontal line.
         told: Lines for the footer.
     """
 
     name: str
-    history: Callable[[RunManifest], History]
+    history: Callable[[Run], History]
     split: Split
     x_label: str
     y_label: str
@@ -188,21 +215,28 @@ class Histories:
     panel: str = "{:g}"
     panel_scale: float = 1.0
     width: float | None = None
+    unit: str = "s"
+    log: bool = False
     level: float = 0.0
     told: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw a line and a band for each series that has histories."""
         runs = self.rows(analysis.runs)
+        if runs.empty:
+            return []
         values = [None] if self.panels is None else sorted(runs[self.panels].unique())
-        figure = style.blank_figure(max(len(values), 1) * style.COLUMN_WIDTH, 2.8)
-        grid = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
-        missing, unit, width = 0, "s" if self.width is None else "", 0.0
-        for axes, value in zip(grid, values, strict=True):
-            part = runs if value is None else runs[runs[self.panels] == value]
+        columns = min(len(values), _MOST_COLUMNS)
+        lines = -(-len(values) // columns)
+        figure = style.blank_figure(min(columns * style.COLUMN_WIDTH, 7.0), 2.8 if lines == 1 else 2.2 * lines)
+        grid = figure.subplots(lines, columns, sharey=True, squeeze=False)
+        missing, width = 0, 0.0
+        split = self.split(runs)
+        for axes, value in zip(grid.flat, values, strict=False):
             drawn: list[tuple[Series, list[History]]] = []
-            for series in self.split(part):
-                found = [self._read(analysis, str(run)) for run in series.rows["run"]]
+            for series in split:
+                rows = series.rows if value is None else series.rows[series.rows[self.panels] == value]
+                found = [self._read(analysis, str(run)) for run in rows["run"]]
                 missing += found.count(None)
                 drawn.append((series, [one for one in found if one is not None]))
             ends = [one.active for _, histories in drawn for one in histories if one.active > 0]
@@ -214,14 +248,19 @@ class Histories:
                 plots.draw_ends(axes, ends)
             axes.axhline(self.level, color=style.GREY, linewidth=0.6)
             axes.set_xlabel(self.x_label)
+            axes.set_xscale("log" if self.log and any(histories for _, histories in drawn) else "linear")
             if value is not None:
                 axes.set_title(self.panel.format(self.panel_scale * value))
-        grid[0].set_ylabel(self.y_label)
+        for axes in grid.flat[len(values) :]:
+            axes.set_visible(False)
+        for axes in grid[:, 0]:
+            axes.set_ylabel(self.y_label)
         if len(values) == 1:
-            plots.legend_above(grid[0])
+            plots.legend_above(grid[0, 0])
         else:
-            figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-        told = [f"Line: mean over seeds of means over {width:.2g} {unit}".rstrip() + f"; {plots.BAND}.", *self.told]
+            fullest = max(grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
+            figure.legend(*fullest.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+        told = [f"Line: mean over seeds of means over {width:.2g} {self.unit}; {plots.BAND}.", *self.told]
         if missing:
             told.append(f"Without a recorded history: {missing} runs.")
         return plots.finished(figure, path, told, analysis.footer)
@@ -232,6 +271,59 @@ class Histories:
             return None if manifest is None else self.history(manifest)
         except InputError:
             return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Times:
+    """Columns of the table `times`, a panel each: means over seeds, lowest to highest seed as a band.
+
+    Attributes:
+        name: Of the files.
+        quantities: Label of the y axis by column.
+        x: Column of the time.
+        x_label: Of the axis.
+        split: Makes the series of the runs; its look has a colour.
+        rows: Selects the runs that are drawn.
+        spans: What the y axis shows at least, by column, lest a small change look large.
+        told: Lines for the footer.
+    """
+
+    name: str
+    quantities: Mapping[str, str]
+    x: str
+    x_label: str
+    split: Split
+    rows: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    told: Sequence[str] = ()
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw a line and a band for each series."""
+        runs, times = self.rows(analysis.runs), analysis.tables.get("times")
+        if times is None or runs.empty:
+            return []
+        by_run = dict(iter(times[times["run"].isin(runs["run"])].groupby("run")))
+        width = plots.bin_width([float(one[self.x].max()) for one in by_run.values()])
+        columns = min(len(self.quantities), 3)
+        rows = -(-len(self.quantities) // columns)
+        figure = style.blank_figure(min(columns, 2) * style.COLUMN_WIDTH, 0.5 + 1.7 * rows)
+        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        for axes, (quantity, label) in zip(grid.flat, self.quantities.items(), strict=False):
+            for series in self.split(runs):
+                seeds = [
+                    History(times=one[self.x].to_numpy(), values=one[quantity].to_numpy(), active=0.0)
+                    for one in (by_run[name] for name in series.rows["run"] if name in by_run)
+                ]
+                if seeds:
+                    plots.draw_history(axes, seeds, width, colour=series.look["color"], label=series.label)
+            axes.set_ylabel(label)
+            least, most = self.spans.get(quantity, (axes.dataLim.y0, axes.dataLim.y1))
+            axes.set_ylim(min(axes.dataLim.y0, least), max(axes.dataLim.y1, most))
+        for axes in grid[-1]:
+            axes.set_xlabel(self.x_label)
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+        told = f"Line: mean over seeds of means over {width:.2g} s; {plots.BAND}."
+        return plots.finished(figure, path, [*self.told, told], analysis.footer)
 
 
 @dataclass(frozen=True, kw_only=True)

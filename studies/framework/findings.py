@@ -9,14 +9,14 @@ make findings of the usual kinds; any other function of a table that gives an `O
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
 from postprocess.statistics.pairs import pairs
 from postprocess.statistics.ranks import correlation_within
@@ -114,17 +114,20 @@ class Finding:
         found_if: What makes it true.
         outcome: Effects of a table of runs or samples.
         rows: Applied to the table before.
+        tables: Names of the study's tables that `outcome` takes instead, one argument each.
     """
 
     id: str
     says: str
     found_if: str
-    outcome: Callable[[pd.DataFrame], Outcome | Sequence[Effect]] = field(repr=False)
+    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
     rows: Rows = field(default=lambda table: table, repr=False)
+    tables: Sequence[str] = ()
 
-    def judge(self, table: pd.DataFrame) -> Judged:
-        """Judge the finding by a table of runs or samples."""
-        outcome = self.outcome(self.rows(table))
+    def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
+        """Judge the finding by a table of samples, or by the study's tables that it names."""
+        given = [(tables or {})[name] for name in self.tables] if self.tables else [self.rows(samples)]
+        outcome = self.outcome(*given)
         outcome = outcome if isinstance(outcome, Outcome) else Outcome(effects=outcome)
         verdict, more = _verdict([effect for effect in outcome.effects if effect.sign])
         if outcome.verdict is not None:
@@ -156,15 +159,26 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """One effect that is clearly wrong refutes a finding; with `Effect.more` of the one that needs most."""
-    verdicts = [effect.verdict for effect in effects]
-    for verdict in (Verdict.NOT_FOUND, Verdict.NO_DATA):
-        if verdict in verdicts:
-            return verdict, math.nan
-    if not effects:
-        return Verdict.NO_DATA, math.nan
-    needed = [effect.more for effect in effects if effect.verdict == Verdict.NOT_RESOLVED]
-    return (Verdict.NOT_RESOLVED, float(np.max(needed))) if needed else (Verdict.FOUND, math.nan)
+    """Judge by all effects, with `Effect.more` of the one that needs most."""
+    verdict = all_of(effect.verdict for effect in effects)
+    needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
+    return verdict, float(np.max(needed)) if needed else math.nan
+
+
+def all_of(verdicts: Iterable[Verdict]) -> Verdict:
+    """Judge a finding that says several things: one that is clearly wrong refutes it."""
+    found = list(verdicts)
+    order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
+    return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
+
+
+def within(value: float, half_width: float, margin: float) -> Verdict:
+    """Judge whether a number with its 95 % half-width is as near to 0 as a margin, both ways beyond its error."""
+    if math.isnan(value):
+        return Verdict.NO_DATA
+    if abs(value) + half_width <= margin:
+        return Verdict.FOUND
+    return Verdict.NOT_FOUND if abs(value) - half_width > margin else Verdict.NOT_RESOLVED
 
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
@@ -361,14 +375,11 @@ def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
 def means_by(table: pd.DataFrame, quantity: str, by: str, form: str) -> str:
     """`0.4: 1.02, 0.7: 1.05`: means at each value of a column."""
     means = table.groupby(by)[quantity].mean().dropna()
-    return ", ".join(f"{value:g}: {one:{form}}" for value, one in means.items()) or "none"
+    cells = {value if isinstance(value, str) else f"{value:g}": one for value, one in means.items()}
+    return ", ".join(f"{value}: {one:{form}}" for value, one in cells.items()) or "none"
 
 
 def ranked(means: Mapping[str, float], form: str = ".3g") -> str:
     """`shape-change 5.1 > internal 4.2`."""
     known = sorted((name for name in means if math.isfinite(means[name])), key=lambda name: -means[name])
     return " > ".join(f"{name} {means[name]:{form}}" for name in known) or "none"
-
-
-SAME_PILE = (ASPECT, SEED)
-"""Columns that runs have in common which begin with one pile."""

@@ -114,11 +114,6 @@ def draw_history(
         axes.fill_between(centres, means.min(axis=0), means.max(axis=0), color=colour, alpha=0.25, linewidth=0)
 
 
-def told_histories(width: float, what: str) -> str:
-    """What lines, bands and broken lines are, for footers; `what` begins and ends at the broken lines."""
-    return f"Line: mean over seeds of means over {width:.2g} s; {BAND}. {what} begins and ends at the broken lines."
-
-
 def draw_ends(axes: Axes, ends: Sequence[float]) -> None:
     """Broken lines where activities begin and end [s]."""
     for time in sorted({0.0, *ends}):

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report import figures
@@ -154,7 +154,7 @@ class Origin:
     """
 
     study: str
-    manifests: Sequence[RunManifest]
+    manifests: Sequence[Run]
     missing: tuple[MissingRun, ...]
     note: str
     command: str
@@ -172,8 +172,8 @@ class Origin:
     def _told_runs(self) -> str:
         lacking = f", {len(self.missing)} missing" if self.missing else ""
         used, total = len(self.manifests), len(self.manifests) + len(self.missing)
-        fidelities = ", ".join(dict.fromkeys(run.fidelity for run in self.manifests))
-        engines = _told_engines(list(dict.fromkeys(run.engine for run in self.manifests)))
+        fidelities = ", ".join(dict.fromkeys(run.manifest.fidelity for run in self.manifests))
+        engines = _told_engines(list(dict.fromkeys(run.manifest.engine for run in self.manifests)))
         return f"Study {self.study}, fidelity {fidelities}{engines}: {used} of {total} runs{lacking}"
 
     def below_figures(self, points: str, text_name: str) -> tuple[str, ...]:
@@ -185,7 +185,7 @@ class Origin:
         """
         # Of a variant the first words say that it is one; how it differs in everything is told elsewhere.
         first, *more = (f"planned: {self.note}" if self.missing else self.note).split("; ")
-        commits = sorted({run.versions.get("git", "unknown") for run in self.manifests})
+        commits = sorted({run.manifest.versions.get("git", "unknown") for run in self.manifests})
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
         return (
             f"{self._told_runs}; {points}",
@@ -200,10 +200,10 @@ class Origin:
             statements: What else is to be known, such as definitions.
         """
         versions = []
-        engines = list(dict.fromkeys(run.engine for run in self.manifests))
+        engines = list(dict.fromkeys(run.manifest.engine for run in self.manifests))
         for name in ("smarticles", "git", *engines):
-            by_it = [run for run in self.manifests if name not in engines or run.engine == name]
-            found = sorted({run.versions.get(name, "unknown") for run in by_it})
+            by_it = [run for run in self.manifests if name not in engines or run.manifest.engine == name]
+            found = sorted({run.manifest.versions.get(name, "unknown") for run in by_it})
             versions.append(f"{name} {', '.join(found)}")
         return (
             f"{self._told_runs}; {points}",
@@ -268,16 +268,16 @@ def _provenance(origin: Origin, footer: Sequence[str], columns: Collection[str])
         "reference": dict(origin.reference.facts),
         "runs": [
             {
-                "directory": str(run.directory),
-                "name": run.name,
-                "scene_sha256": run.scene_sha256,
-                "aspect_ratio": run.aspect_ratio,
-                "seed": run.seed,
-                "fidelity": run.fidelity,
-                "engine": run.engine,
-                "started": run.started,
-                "command": run.command,
-                "versions": dict(run.versions),
+                "directory": str(run.path),
+                "name": run.manifest.name,
+                "scene_sha256": run.manifest.scene_sha256,
+                "aspect_ratio": run.manifest.aspect_ratio,
+                "seed": run.manifest.seed,
+                "fidelity": run.manifest.fidelity,
+                "engine": run.manifest.engine,
+                "started": run.manifest.started,
+                "command": run.manifest.command,
+                "versions": dict(run.manifest.versions),
             }
             for run in origin.manifests
         ],

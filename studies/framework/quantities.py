@@ -23,6 +23,7 @@ class Quantity:
         scale: Factor of the numbers shown, such as 1e3 for millimetres.
         axis: Label of an axis of a figure; by default the column's name.
         axis_scale: Factor of the numbers in figures.
+        bar: Which error of the points stands behind a number: `SE` or `95 %`.
     """
 
     column: str
@@ -32,10 +33,11 @@ class Quantity:
     scale: float = 1.0
     axis: str = ""
     axis_scale: float = 1.0
+    bar: str = "SE"
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean of a point with its standard error."""
-        error = point[marked(self.column, "SE")]
+        """Format the mean of a point with its error, where it has one."""
+        error = point.get(marked(self.column, self.bar), math.nan)
         return told_number(self.scale * point[self.column], self.form, self.scale * error)
 
 

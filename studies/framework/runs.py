@@ -12,7 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dem.errors import InputError
-from dem.record.manifest import PhaseRecord, RunManifest, read_run
+from dem.record.document import Phase
+from dem.record.run import Run, open_run
 from postprocess.statistics.columns import SEED
 
 Row = Mapping[str, object]
@@ -65,7 +66,7 @@ class MeasuredRun:
         history: Quantities against time by the names of columns, (n,) each; empty where a study has none.
     """
 
-    manifest: RunManifest
+    manifest: Run
     rows: Sequence[Row] = field(repr=False)
     history: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, repr=False)
 
@@ -77,7 +78,7 @@ class MeasuredRun:
     @property
     def name(self) -> str:
         """Name of its directory, which the table of runs calls it by."""
-        return self.manifest.directory.name
+        return self.manifest.path.name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,21 +98,28 @@ class Collected:
     missing: tuple[MissingRun, ...]
 
     @property
-    def manifests(self) -> tuple[RunManifest, ...]:
+    def manifests(self) -> tuple[Run, ...]:
         """What the finished runs say of themselves."""
         return tuple(run.manifest for run in self.runs)
 
     @property
     def engines(self) -> tuple[str, ...]:
         """The engines that the finished runs were computed by, as in `ENGINES`."""
-        present = {run.manifest.engine for run in self.runs}
+        present = {run.manifest.manifest.engine for run in self.runs}
         return tuple(name for name in ENGINES if name in present) + tuple(sorted(present - set(ENGINES)))
 
     def table(self) -> pd.DataFrame:
         """The rows of all runs; with their engine where there are several."""
         if len(self.engines) > 1:
-            return pd.DataFrame([{ENGINE: run.manifest.engine, **row} for run in self.runs for row in run.rows])
+            return pd.DataFrame(
+                [{ENGINE: run.manifest.manifest.engine, **row} for run in self.runs for row in run.rows]
+            )
         return pd.DataFrame([row for run in self.runs for row in run.rows])
+
+    def times(self) -> pd.DataFrame | None:
+        """Histories of all runs, one below the other; None where no run has one."""
+        tables = [pd.DataFrame({"run": run.name, **run.history}) for run in self.runs if run.history]
+        return pd.concat(tables, ignore_index=True) if tables else None
 
     def refuse_mixture(
         self,
@@ -136,30 +144,10 @@ class Collected:
             if value(run) != value(first):
                 msg = (
                     f"study {self.study}: runs of different {quantity} must not be averaged: "
-                    f"{first.manifest.directory} is {value(first)}, "
-                    f"{run.manifest.directory} is {value(run)}; analyse them apart"
+                    f"{first.manifest.path} is {value(first)}, "
+                    f"{run.manifest.path} is {value(run)}; analyse them apart"
                 )
                 raise InputError(msg)
-
-    def refuse_other_counts(self) -> None:
-        """Refuses runs that differ in their number of smarticles.
-
-        Raises:
-            InputError: Two runs do.
-        """
-        self.refuse_mixture("count", lambda run: f"{run.manifest.count} smarticles")
-
-    def refuse_mixed_counts(self) -> None:
-        """Refuses runs of one aspect ratio that differ in their number of smarticles.
-
-        Raises:
-            InputError: Two runs do.
-        """
-        self.refuse_mixture(
-            "count",
-            lambda run: f"{run.manifest.count} smarticles at l/w {run.manifest.aspect_ratio:g}",
-            within=lambda run: round(run.manifest.aspect_ratio, 6),
-        )
 
     def refuse_repeats(self, name: str, value: Callable[[MeasuredRun], str]) -> None:
         """Refuses two runs with the same seed of the same point.
@@ -173,11 +161,11 @@ class Collected:
         """
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
-            key = (value(run), run.manifest.seed, run.manifest.engine)
+            key = (value(run), run.manifest.manifest.seed, run.manifest.manifest.engine)
             if key in seen:
                 msg = (
                     f"study {self.study}: {name} = {key[0]} with seed {key[1]} is given twice, "
-                    f"{seen[key].manifest.directory} and {run.manifest.directory}; leave one out"
+                    f"{seen[key].manifest.path} and {run.manifest.path}; leave one out"
                 )
                 raise InputError(msg)
             seen[key] = run
@@ -186,7 +174,7 @@ class Collected:
 def collect_runs(
     study: str,
     run_dirs: Sequence[Path | str],
-    measure: Callable[[RunManifest], MeasuredRun],
+    measure: Callable[[Run], MeasuredRun],
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
@@ -204,21 +192,19 @@ def collect_runs(
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []
     for directory in run_dirs:
-        status = "unusable"
         before = (earlier or {}).get(Path(directory).name)
         if before is not None and not Path(directory).exists():
             runs.append(before)
             continue
         try:
-            run = read_run(directory)
-            if run.status != "done":
-                cause = run.cause or "it has not finished"
-                missing.append(MissingRun(directory=str(directory), status=run.status, cause=cause))
+            run = open_run(directory)
+            if run.status.state != "done":
+                cause = run.status.cause or "it has not finished"
+                missing.append(MissingRun(directory=str(directory), status=run.status.state, cause=cause))
                 continue
             runs.append(measure(run))
         except InputError as error:
-            if not Path(directory, "run.json").exists():
-                status = "not started"
+            status = "unusable" if Path(directory, "run.json").exists() else "not started"
             missing.append(MissingRun(directory=str(directory), status=status, cause=str(error)))
     if not runs:
         why = f"; the first: {missing[0].directory}: {missing[0].cause}" if missing else ""
@@ -227,11 +213,11 @@ def collect_runs(
     return Collected(study=study, given=tuple(run_dirs), runs=tuple(runs), missing=tuple(missing))
 
 
-def duration(phase: PhaseRecord) -> float:
+def duration(phase: Phase) -> float:
     """How long a phase of a finished run took [s]."""
-    if phase.start is None or phase.end is None:
+    if phase.start_s is None or phase.end_s is None:
         return math.nan
-    return phase.end - phase.start
+    return phase.end_s - phase.start_s
 
 
 def runs_table(found: Collected) -> pd.DataFrame:

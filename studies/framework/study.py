@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.manifest import RunManifest
+from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
@@ -80,13 +80,18 @@ class Study:
     Attributes:
         name: For the command line, and in provenance.
         title: Of its text.
-        measure: Measures one finished run: its row of the table of runs. An InputError lists the run as missing.
+        measure: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a
+            history. An InputError lists the run as missing.
         keys: Columns that name a point: one combination of the sweep's variables.
         quantities: Columns that are averaged over seeds.
         findings: What is judged, in the paper's order.
         figures: What is drawn.
         samples: Makes the table that is averaged and judged from the table of runs of one engine.
-        order: Columns that the table of runs is sorted by.
+        extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
+        shown: Selects the points of the short table.
+        same_count: Columns within which all runs must have the same number of smarticles.
+        same_fidelity: Columns within which all runs must have the same fidelity.
+        order: Columns that the table of runs is sorted by; none: as given.
         constant: Columns that must be equal within groups, with the columns that make the groups.
         bounds: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs.
         count_values: Whether the points say how many seeds have a value of each quantity.
@@ -100,12 +105,16 @@ class Study:
 
     name: str
     title: str
-    measure: Callable[[RunManifest], Row]
+    measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]
     quantities: Sequence[Quantity]
     findings: Sequence[Finding]
     figures: Sequence[Figure] = ()
     samples: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
+    extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
+    shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points
+    same_count: Sequence[str] = (ASPECT,)
+    same_fidelity: Sequence[str] = ()
     order: Sequence[str]
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
     bounds: tuple[str, str] | None = None
@@ -140,8 +149,8 @@ class Study:
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
         self.reject_unlike(found)
-        tables = self.tabulate(runs_table(found))
-        judged = self.judge(tables["runs"])
+        tables = self.tabulate(runs_table(found), found.times())
+        judged = self.judge(tables)
         tables["findings"] = findings_table(judged)
         manifests, missing = found.manifests, found.missing
         origin = Origin(
@@ -152,7 +161,7 @@ class Study:
         lines = self.text(tables, judged, table_lines(header, rows))
         files = dict(origin.write(output, footer, tables=tables, text=(TEXT, lines)))
         below = origin.below_figures(f"{self._seeds(tables)}.", TEXT)
-        analysis = Analysis(tables=tables, manifests={run.directory.name: run for run in manifests}, footer=below)
+        analysis = Analysis(tables=tables, manifests={run.path.name: run for run in manifests}, footer=below)
         files |= {path.name: path for path in self.draw(output, analysis)}
         return Report(
             header=header,
@@ -170,9 +179,12 @@ class Study:
             output=output,
         )
 
-    def measured(self, run: RunManifest) -> MeasuredRun:
+    def measured(self, run: Run) -> MeasuredRun:
         """Measure one finished run."""
-        return MeasuredRun(manifest=run, rows=[self.measure(run)])
+        measured = self.measure(run)
+        if isinstance(measured, MeasuredRun):
+            return measured
+        return MeasuredRun(manifest=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
         """Reject runs that must not be averaged or compared.
@@ -180,28 +192,39 @@ class Study:
         Raises:
             InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
         """
-        found.refuse_mixture("fidelity", lambda run: run.manifest.fidelity)
+        found.refuse_mixture(
+            "fidelity", lambda run: run.manifest.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
+        )
         if self.one_engine:
-            found.refuse_mixture("engine", lambda run: run.manifest.engine)
-        found.refuse_mixed_counts()
+            found.refuse_mixture("engine", lambda run: run.manifest.manifest.engine)
+        found.refuse_mixture(
+            "count",
+            lambda run: f"{run.manifest.manifest.count} smarticles",
+            within=partial(_values, columns=self.same_count),
+        )
         for column, within in self.constant.items():
             found.refuse_mixture(column, partial(_value, column=column), within=partial(_values, columns=within))
         found.refuse_repeats("point", self.point_of)
 
     def point_of(self, run: MeasuredRun) -> str:
         """Name the point of a run, such as `procedure internal, θ 10°, l/w 0.7`."""
-        cells = ((key.label, key.text(run.row[key.column])) for key in self.keys)
+        cells = ((key.label, key.text(run.row[key.column])) for key in self.keys if key.column in run.row)
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
-    def tabulate(self, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-        """Make all tables of the table of runs: `runs`, `points`, and `engines` if there are several."""
-        runs = sort_rows(runs, self.order, self.keys)
-        tables = {"runs": runs, "points": by_engine(runs, lambda part: self.points(self.samples(part)))}
-        if engines_of(runs):
-            columns = [quantity.column for quantity in self.quantities]
-            samples = by_engine(runs, self.samples)
-            tables["engines"] = compared_engines(samples, [key.column for key in self.keys], columns)
-        return tables
+    def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
+        """Make all tables of the table of runs: `runs`, `points`, `engines` if there are several, and extra ones."""
+        runs = sort_rows(runs, self.order, self.keys) if self.order else runs
+        extra = self.extra(runs)
+        tables = {"runs": runs}
+        if "points" not in extra:
+            tables["points"] = by_engine(runs, lambda part: self.points(self.samples(part)))
+            if engines_of(runs):
+                columns = [quantity.column for quantity in self.quantities]
+                samples = by_engine(runs, self.samples)
+                tables["engines"] = compared_engines(samples, [key.column for key in self.keys], columns)
+        if times is not None:
+            tables["times"] = times
+        return tables | dict(extra)
 
     def points(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Average over seeds: `… SE` is the standard error, `… 95 %` the half-width of the confidence interval."""
@@ -221,15 +244,18 @@ class Study:
             rows.append(row)
         return sort_rows(pd.DataFrame(rows), columns, self.keys)
 
-    def judge(self, runs: pd.DataFrame) -> tuple[Judged, ...]:
-        """Judge all findings by the table of runs: by the runs of the engine that judges."""
-        samples = self.samples(judging(runs))
-        return tuple(finding.judge(samples) for finding in self.findings)
+    def judge(self, tables: Mapping[str, pd.DataFrame]) -> tuple[Judged, ...]:
+        """Judge all findings, by the samples of the engine that judges or by the tables."""
+        samples = self.samples(judging(tables["runs"]))
+        return tuple(finding.judge(samples, tables) for finding in self.findings)
 
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
         """Header and rows of the short table of points."""
-        points = tables["points"]
-        named = {**cells_of(self.keys), "seeds": lambda point: str(point[SEEDS])}
+        points = self.shown(tables["points"])
+        named = {
+            **cells_of([key for key in self.keys if key.column in points]),
+            "seeds": lambda point: str(point[SEEDS]),
+        }
         return short_table(points, told_by_engine(points, named), self.quantities)
 
     def draw(self, output: Path, analysis: Analysis) -> list[Path]:
@@ -268,16 +294,18 @@ class Study:
         every = tables["runs"]
         runs, counts = judging(every), judging(tables["points"])[SEEDS]
         parts = []
-        for key in self.keys:
+        for key in (key for key in self.keys if key.column in runs):
             values = [key.text(value) for value in runs[key.column].drop_duplicates().sort_values()]
             parts.append(f"{key.label} {' '.join(filter(None, values))}")
-        parts += [f"{told_range(runs.groupby(ASPECT)[COUNT].first())} smarticles", self._seeds(tables)]
+        counts_by = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
+        parts += [f"{told_range(counts_by)} smarticles", self._seeds(tables)]
         statement = ", ".join(parts)
         if {PROCEDURE, ACTIVE} <= set(runs):
             times = runs[runs[PROCEDURE] != STATIC].groupby(PROCEDURE)[ACTIVE].first()
             statement += "; active for: " + ", ".join(f"{name} {time:.3g} s" for name, time in times.items())
         bars = told_bars(counts, "point")
-        return [f"{statement}.", *filter(None, [told_engines(every)]), *self.remarks, f"{bars}.", f"{CRITERION}."]
+        compared = [told_engines(every)] if "engines" in tables else []
+        return [f"{statement}.", *filter(None, compared), *self.remarks, f"{bars}.", f"{CRITERION}."]
 
     def _seeds(self, tables: Mapping[str, pd.DataFrame]) -> str:
         runs, counts = judging(tables["runs"]), judging(tables["points"])[SEEDS]
@@ -289,7 +317,8 @@ class Study:
 
 
 def _value(run: MeasuredRun, *, column: str) -> str:
-    return f"{run.row[column]:.3g}"
+    value = run.row[column]
+    return value if isinstance(value, str) else f"{value:.3g}"
 
 
 def _values(run: MeasuredRun, *, columns: Sequence[str]) -> tuple[object, ...]:

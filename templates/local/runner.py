@@ -7,22 +7,22 @@ others. Ctrl-C stops all of them in an orderly way.
 from __future__ import annotations
 
 import contextlib
+import heapq
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Literal, Protocol
 
 from dem.engine.cores import usable_cores
-from templates.local.estimate import PhaseClock, time_left
-from templates.sweep.files import read_json
+from dem.record.run import Run
+from templates.local.display import Display, Outcome, Snapshot
 from templates.sweep.folder import Entry, Folder
-
-Ending = Literal["done", "kept", "failed", "interrupted"]
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
 """(scene file, run directory, whether to resume) -> the command of one run, started in the sweep's directory."""
@@ -32,89 +32,16 @@ ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """How a run ended.
+class Timing:
+    """Intervals of the runner [s].
 
     Args:
-        name: its name.
-        status: `kept` was finished before.
-        cause: why it failed, or None.
-        wall_s: wall time [s].
+        poll_s: between updates of the display.
+        grace_s: between asking a process to stop and making it.
     """
 
-    name: str
-    status: Ending
-    cause: str | None = None
-    wall_s: float = 0.0
-
-    @property
-    def missing(self) -> bool:
-        """Whether the run still has no result."""
-        return self.status not in ("done", "kept")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Standing:
-    """Where a run that is being computed stands; None is unknown.
-
-    Args:
-        name: its name.
-        wall_s: wall time so far [s].
-        expected_s: expected wall time [s].
-        phase: type of the phase it is in.
-        time_s: simulated time [s].
-        end_s: simulated time at which the phase ends [s].
-        left_in_phase_s: wall time until then, at the present pace [s]; 0 if unknown.
-        phi: packing fraction so far.
-    """
-
-    name: str
-    wall_s: float
-    expected_s: float
-    phase: str | None = None
-    time_s: float | None = None
-    end_s: float | None = None
-    left_in_phase_s: float = 0.0
-    phi: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Snapshot:
-    """All runs at one moment.
-
-    Args:
-        total: how many runs there are, kept ones included.
-        ended: how many of them ended, however.
-        failed: how many failed.
-        running: those being computed.
-        left_s: wall time left [s], as far as can be told.
-    """
-
-    total: int
-    ended: int
-    failed: int
-    running: tuple[Standing, ...]
-    left_s: float
-
-
-class Display(Protocol):
-    """Shows a person how the runs go."""
-
-    def __enter__(self) -> Display: ...
-
-    def __exit__(self, *exception: object) -> None: ...
-
-    def started(self, entry: Entry) -> None:
-        """A run was started."""
-
-    def ended(self, outcome: Outcome) -> None:
-        """A run ended, or was found finished."""
-
-    def update(self, snapshot: Snapshot) -> None:
-        """Some time has passed."""
-
-    def stopping(self, count: int) -> None:
-        """So many runs were asked to stop."""
+    poll_s: float = 0.25
+    grace_s: float = 60.0
 
 
 def slots_here() -> int:
@@ -159,180 +86,137 @@ def run_folder(
         KeyboardInterrupt: Ctrl-C; all runs were stopped.
     """
     with folder.lock() as lock, display:
-        runner = _Runner(
-            folder=folder,
-            display=display,
-            command=command,
-            slots=slots or slots_here(),
-            timing=timing or Timing(),
-            inherited=(lock,),
-        )
-        outcomes = {outcome.name: outcome for outcome in runner.run()}
-    return [outcomes[entry.name] for entry in folder.entries]
+        runner = _Runner(folder, display, command, slots or slots_here(), timing or Timing(), lock)
+        runner.run()
+    return [runner.outcomes[entry.name] for entry in folder.entries]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Timing:
-    """Intervals of the runner [s].
-
-    Args:
-        poll_s: between looks at the processes.
-        grace_s: between asking a process to stop and making it.
-    """
-
-    poll_s: float = 0.25
-    grace_s: float = 60.0
-
-
-@dataclass(kw_only=True)
-class _Active:
-    entry: Entry
-    process: subprocess.Popen[bytes]
-    output: IO[bytes]
-    started: float
-    clock: PhaseClock = field(default_factory=PhaseClock)
-
-    @property
-    def wall_s(self) -> float:
-        return time.monotonic() - self.started
-
-
-@dataclass(kw_only=True)
+@dataclass
 class _Runner:
     folder: Folder
     display: Display
     command: RunCommand
     slots: int
     timing: Timing
-    inherited: tuple[int, ...]
-    pending: list[Entry] = field(default_factory=list)
-    active: list[_Active] = field(default_factory=list)
-    outcomes: list[Outcome] = field(default_factory=list)
-    # (expected, measured) wall time [s] of the runs that finished here.
-    finished: list[tuple[float, float]] = field(default_factory=list)
+    lock: int
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+    active: dict[str, tuple[subprocess.Popen[bytes], float]] = field(default_factory=dict)
+    stopping: bool = False
+    guard: threading.Lock = field(default_factory=threading.Lock)
 
-    def run(self) -> list[Outcome]:
+    def run(self) -> None:
+        missing = []
         for entry in self.folder.entries:
             if self.folder.is_done(entry):
                 self._ended(Outcome(name=entry.name, status="kept"))
             else:
-                self.pending.append(entry)
-        self.pending = self.folder.in_order_of_start(self.pending)
-        try:
-            while self.pending or self.active:
-                while self.pending and len(self.active) < self.slots:
-                    self._start(self.pending.pop(0))
-                time.sleep(self.timing.poll_s)
-                self._collect()
-                self.display.update(self._snapshot())
-        finally:
-            # Ctrl-C, or a display that failed: no process outlives its runner.
-            self._stop()
-        return self.outcomes
+                missing.append(entry)
+        with ThreadPoolExecutor(self.slots) as pool:
+            waiting = {pool.submit(self._compute, entry) for entry in self.folder.in_order_of_start(missing)}
+            try:
+                while waiting:
+                    waiting = self._collect(waiting, self.timing.poll_s)
+                    self.display.update(self._snapshot())
+            finally:
+                # Ctrl-C, or a display that failed: no process outlives its runner.
+                self._stop(waiting)
 
-    def _start(self, entry: Entry) -> None:
-        resume = self.folder.can_resume(entry)
-        if not resume:
-            self.folder.set_aside(entry)
-        home, directory, log = self.folder.path, self.folder.run(entry), self.folder.log(entry)
-        for parent in (directory.parent, log.parent):
-            parent.mkdir(parents=True, exist_ok=True)
-        output = log.open("wb")
-        try:
-            process = subprocess.Popen(
-                # Seen from the sweep's directory, so that a run's record does not name this machine's folders.
-                self.command(self.folder.scene(entry).relative_to(home), directory.relative_to(home), resume),
-                cwd=home,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env=environment(),
-                pass_fds=self.inherited,
-                # Ctrl-C at the terminal reaches this process only, which then asks each run once.
-                start_new_session=True,
-            )
-        except BaseException:
-            output.close()
-            raise
-        started = time.monotonic()
-        self.active.append(_Active(entry=entry, process=process, output=output, started=started))
-        self.display.started(entry)
+    def _collect(self, waiting: set[Future[Outcome | None]], timeout: float) -> set[Future[Outcome | None]]:
+        ended, waiting = wait(waiting, timeout, FIRST_COMPLETED)
+        for future in ended:
+            if not future.cancelled() and (outcome := future.result()) is not None:
+                self._ended(outcome)
+        return waiting
 
     def _ended(self, outcome: Outcome) -> None:
-        self.outcomes.append(outcome)
+        self.outcomes[outcome.name] = outcome
         self.display.ended(outcome)
 
-    def _collect(self) -> None:
-        for run in [run for run in self.active if run.process.poll() is not None]:
-            self.active.remove(run)
-            run.output.close()
-            outcome = self._outcome(run)
-            if outcome.status == "done":
-                self.finished.append((run.entry.expected_s, outcome.wall_s))
-            self._ended(outcome)
+    def _compute(self, entry: Entry) -> Outcome | None:
+        """Run one run to its end; None where it was not started any more."""
+        resume = self.folder.can_resume(entry)
+        home, directory, log = self.folder.path, self.folder.run(entry), self.folder.log(entry)
+        with self.guard:
+            if self.stopping:
+                return None
+            if not resume:
+                self.folder.set_aside(entry)
+            for parent in (directory.parent, log.parent):
+                parent.mkdir(parents=True, exist_ok=True)
+            began = time.monotonic()
+            with log.open("wb") as output:
+                process = subprocess.Popen(
+                    # Seen from the sweep's directory, so that a run's record does not name this machine's folders.
+                    self.command(self.folder.scene(entry).relative_to(home), directory.relative_to(home), resume),
+                    cwd=home,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    env=environment(),
+                    # A run that outlives its runner keeps the sweep locked.
+                    pass_fds=(self.lock,),
+                    # Ctrl-C at the terminal reaches this process only, which then asks each run once.
+                    start_new_session=True,
+                )
+            self.active[entry.name] = (process, began)
+        self.display.started(entry.name)
+        returncode = process.wait()
+        del self.active[entry.name]
+        return self._outcome(entry, returncode, time.monotonic() - began)
 
-    def _outcome(self, run: _Active) -> Outcome:
-        name, directory = run.entry.name, self.folder.run(run.entry)
-        returncode, wall_s = run.process.returncode, run.wall_s
-        if returncode == 0 and (directory / "done.json").is_file():
-            return Outcome(name=name, status="done", wall_s=wall_s)
-        failed = read_json(directory / "failed.json") or {}
-        if failed.get("status") == "interrupted" or returncode in (130, -signal.SIGINT):
-            return Outcome(name=name, status="interrupted", cause="interrupted", wall_s=wall_s)
-        cause = str(failed.get("cause") or _last_words(self.folder.log(run.entry), returncode))
-        return Outcome(name=name, status="failed", cause=cause, wall_s=wall_s)
+    def _outcome(self, entry: Entry, returncode: int, wall_s: float) -> Outcome:
+        status = Run(self.folder.run(entry)).status
+        if returncode == 0 and status.state == "done":
+            return Outcome(name=entry.name, status="done", wall_s=wall_s)
+        if status.state == "interrupted" or returncode in (130, -signal.SIGINT):
+            return Outcome(name=entry.name, status="interrupted", cause="interrupted", wall_s=wall_s)
+        cause = status.cause or _last_words(self.folder.log(entry), returncode)
+        return Outcome(name=entry.name, status="failed", cause=cause, wall_s=wall_s)
 
-    def _stop(self) -> None:
+    def _stop(self, waiting: set[Future[Outcome | None]]) -> None:
         """Ask every run to stop, wait, insist; a second Ctrl-C does not wait."""
+        with self.guard:
+            self.stopping = True
+        for future in waiting:
+            future.cancel()
         if self.active:
             self.display.stopping(len(self.active))
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-            for run in self.active:
+            for process, _ in list(self.active.values()):
                 with contextlib.suppress(ProcessLookupError):
-                    run.process.send_signal(number)
+                    process.send_signal(number)
             deadline = time.monotonic() + self.timing.grace_s
-            # A second Ctrl-C means: do not wait.
             with contextlib.suppress(KeyboardInterrupt):
-                while self.active and time.monotonic() < deadline:
-                    self._collect()
-                    time.sleep(min(0.05, self.timing.poll_s))
+                while waiting and time.monotonic() < deadline:
+                    waiting = self._collect(waiting, self.timing.poll_s)
             if not self.active:
-                return
-
-    def _progress(self, run: _Active) -> Standing:
-        said = read_json(self.folder.run(run.entry) / "progress.json") or {}
-
-        def number(key: str) -> float | None:
-            value = said.get(key)
-            return float(value) if isinstance(value, int | float) else None
-
-        phase, wall_s = said.get("phase"), run.wall_s
-        time_s, end_s = number("time_s"), number("end_s")
-        return Standing(
-            name=run.entry.name,
-            wall_s=wall_s,
-            expected_s=run.entry.expected_s,
-            phase=phase if isinstance(phase, str) else None,
-            time_s=time_s,
-            end_s=end_s,
-            left_in_phase_s=run.clock.left(phase=said.get("phase_index"), wall_s=wall_s, time_s=time_s, end_s=end_s),
-            phi=number("phi"),
-        )
+                break
+        self._collect(waiting, 0.0)
 
     def _snapshot(self) -> Snapshot:
-        running = tuple(self._progress(run) for run in self.active)
+        now = time.monotonic()
+        running = [(name, now - began) for name, (_, began) in list(self.active.items())]
         return Snapshot(
             total=len(self.folder.entries),
             ended=len(self.outcomes),
-            failed=sum(outcome.missing for outcome in self.outcomes),
-            running=running,
-            left_s=time_left(
-                self.finished,
-                [(run.expected_s, run.wall_s, run.left_in_phase_s) for run in running],
-                [entry.expected_s for entry in self.pending],
-                self.slots,
-            ),
+            failed=sum(outcome.missing for outcome in self.outcomes.values()),
+            running=tuple((name, wall, Run(self.folder.path / "runs" / name).progress) for name, wall in running),
+            left_s=self._left(dict(running)),
         )
+
+    def _left(self, running: dict[str, float]) -> float:
+        """Expected wall time left [s], by the pace of those that finished."""
+        expected = {entry.name: entry.expected_s for entry in self.folder.entries}
+        done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
+        planned = sum(expected[outcome.name] for outcome in done)
+        pace = sum(outcome.wall_s for outcome in done) / planned if planned > 0 else 1.0
+        free = [max(pace * expected[name] - wall, 0.0) for name, wall in running.items()]
+        free += [0.0] * max(self.slots - len(free), 0)
+        heapq.heapify(free)
+        for name, wall in expected.items():
+            if name not in running and name not in self.outcomes:
+                heapq.heapreplace(free, free[0] + pace * wall)
+        return max(free)
 
 
 def environment() -> dict[str, str]:

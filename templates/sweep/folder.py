@@ -16,144 +16,111 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from dem.errors import InputError
-from dem.record.files import write_json, write_text
+from dem.record.document import Document
+from dem.record.files import write_text
+from dem.record.names import MANIFEST as RUN
+from dem.record.names import OF_SWEEP
+from dem.record.run import Run, Status
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from templates.sweep.expand import Point
-from templates.sweep.files import read_json
-from templates.sweep.render import Value
 from templates.sweep.sweep_file import SEED, Sweep
 
-FORMAT = 1
-MANIFEST = "sweep.json"
-RUN = "run.json"  # of each run directory
-CHECKPOINT = "checkpoint.zip"
-
-State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
-"""`interrupted` closed its files when told to stop; `stopped` was killed and says nothing; `queued` waits for a job."""
+MANIFEST = OF_SWEEP
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunStatus:
-    """How far one run is.
+class RunStatus(Status):
+    """How far one run of a sweep is.
 
     Args:
         name: name of the run.
         directory: its run directory.
-        state: where it stands.
-        cause: why it failed, or None.
-        phase: type of the phase it is in, or None.
-        time_s: simulated time [s], or None.
-        wall_s: wall time so far [s], or None.
         job: number of the queue's task that computes it, or did last, or None.
-        checkpoint_s: simulated time of its newest checkpoint [s], from which it can go on, or None.
     """
 
     name: str
     directory: Path
-    state: State
-    cause: str | None = None
-    phase: str | None = None
-    time_s: float | None = None
-    wall_s: float | None = None
     job: str | None = None
-    checkpoint_s: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {**self.__dict__, "directory": str(self.directory)}
+        keys = ("name", "directory", "state", "cause", "phase", "time_s", "wall_s", "job", "checkpoint_s")
+        return {key: getattr(self, key) for key in keys} | {"directory": str(self.directory)}
 
 
-def run_status(directory: Path, *, name: str | None = None, active: bool = False) -> RunStatus:
-    """State of one run directory, from its files alone.
-
-    Args:
-        directory: the run directory; it may be absent.
-        name: what to call the run; by default the directory's name.
-        active: whether a process may be working in it.
-    """
-    label = name or directory.name
-    done = read_json(directory / "done.json")
-    if done is not None:
-        return RunStatus(
-            name=label,
-            directory=directory,
-            state="done",
-            time_s=done.get("time_s"),
-            wall_s=done.get("wall_s"),
-        )
-    progress = read_json(directory / "progress.json") or {}
-    failed = read_json(directory / "failed.json")
-    state: State
-    if failed is not None:
-        state = "interrupted" if failed.get("status") == "interrupted" else "failed"
-    elif not _started(directory):
-        state = "missing"
-    else:
-        state = "running" if active else "stopped"
-    return RunStatus(
-        name=label,
-        directory=directory,
-        state=state,
-        cause=(failed or {}).get("cause"),
-        phase=progress.get("phase"),
-        time_s=(failed or progress).get("time_s"),
-        wall_s=progress.get("wall_s"),
-        checkpoint_s=(failed or progress).get("checkpoint_s"),
-    )
+def run_status(directory: Path) -> RunStatus:
+    """State of one run directory, from its files alone; it may be absent."""
+    return RunStatus(name=directory.name, directory=directory, **vars(Run(directory).status))
 
 
-def _started(directory: Path) -> bool:
-    return directory.is_dir() and any(directory.iterdir())
+class Entry(Document):
+    """One run of a sweep.
 
-
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """One run of a sweep, as its manifest lists it.
-
-    Args:
-        name: name of the run, its scene and its directory.
-        scene_sha256: hash of its scene.
-        expected_s: expected wall time [s]; only its proportion to the others' matters.
-        values: the sweep's variables.
-        again: whether it is another run once more, with other constants.
+    Attributes:
+        name: Name of the run, its scene and its directory.
+        expected_s: Expected wall time; only its proportion to the others' matters.
+        values: The sweep's variables.
+        again: Whether it is another run once more, with other constants.
     """
 
     name: str
     scene_sha256: str
     expected_s: float
-    values: Mapping[str, Value]
+    values: Mapping[str, Any]
     again: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
+class SweepManifest(Document):
+    """What made a sweep, `sweep.json`; `files` are the texts of the files that it was made of, by name."""
+
+    remedy: ClassVar[str] = "write the sweep to a new directory"
+    format: Literal[1] = 1
+    name: str
+    command: str
+    created: str = ""
+    versions: Mapping[str, str] = {}
+    files: Mapping[str, str] = {}
+    seed_by_seed: bool = False
+    points: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
 class Folder:
     """A sweep's directory.
 
     Args:
         path: the directory.
-        name: the sweep's name.
-        command: the command that made it.
-        entries: its runs.
-        seed_by_seed: whether the runs with the first seed start before all others.
+        manifest: its `sweep.json`.
     """
 
     path: Path
-    name: str
-    command: str
-    entries: tuple[Entry, ...]
-    seed_by_seed: bool = False
+    manifest: SweepManifest
+
+    @property
+    def name(self) -> str:
+        """The sweep's name."""
+        return self.manifest.name
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Its runs."""
+        return self.manifest.points
+
+    def only(self, entries: Sequence[Entry]) -> Folder:
+        """This directory with some of its runs alone."""
+        return Folder(self.path, self.manifest.model_copy(update={"points": tuple(entries)}))
 
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
         """Runs in the order in which to start them: the longest first, seed by seed where the sweep says so.
 
         Those that come once more, such as on a slower engine, come after all others.
         """
-        seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries)) if self.seed_by_seed else []
-        ranks = {seed: rank for rank, seed in enumerate(seeds)}
+        seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries))
+        ranks = {seed: rank for rank, seed in enumerate(seeds) if self.manifest.seed_by_seed}
         return sorted(entries, key=lambda entry: (entry.again, ranks.get(entry.values.get(SEED), 0), -entry.expected_s))
 
     def scene(self, entry: Entry) -> Path:
@@ -170,22 +137,21 @@ class Folder:
 
     def is_done(self, entry: Entry) -> bool:
         """Whether the run finished, and with the scene that the manifest lists."""
-        return read_json(self.run(entry) / "done.json") is not None and self._is_of_scene(entry)
+        return Run(self.run(entry)).status.state == "done" and self._is_of_scene(entry)
 
     def can_resume(self, entry: Entry) -> bool:
         """Whether the run was stopped, did not fail, and left a checkpoint to go on from."""
-        directory = self.run(entry)
-        stopped = run_status(directory).state in ("interrupted", "stopped")
-        return stopped and (directory / CHECKPOINT).is_file() and self._is_of_scene(entry)
+        return Run(self.run(entry)).can_resume and self._is_of_scene(entry)
 
     def _is_of_scene(self, entry: Entry) -> bool:
-        manifest = read_json(self.run(entry) / RUN) or {}
-        return manifest.get("scene_sha256") == entry.scene_sha256
+        try:
+            return Run(self.run(entry)).manifest.scene_sha256 == entry.scene_sha256
+        except InputError:
+            return False
 
     def status(self) -> list[RunStatus]:
         """State of every run."""
-        active = self.is_active()
-        return [run_status(self.run(entry), name=entry.name, active=active) for entry in self.entries]
+        return [run_status(self.run(entry)) for entry in self.entries]
 
     def set_aside(self, entry: Entry) -> Path | None:
         """Rename what an unfinished run left, so that the run can start anew; nothing is deleted.
@@ -194,20 +160,12 @@ class Folder:
             Where it went, or None if there was nothing.
         """
         directory = self.run(entry)
-        if not _started(directory):
+        if not directory.is_dir() or not any(directory.iterdir()):
             return None
         number = 1
         while (aside := directory.with_name(f"{entry.name}.stopped-{number}")).exists():
             number += 1
         return directory.rename(aside)
-
-    def is_active(self) -> bool:
-        """Whether runs of this sweep are being computed on this machine."""
-        try:
-            with self.lock():
-                return False
-        except InputError:
-            return True
 
     @contextmanager
     def lock(self) -> Iterator[int]:
@@ -258,12 +216,33 @@ def create_folder(
     if path.exists() and not path.is_dir():
         msg = f"{path}: is a file; give a directory that is new or holds this sweep"
         raise InputError(msg)
-    manifest = _manifest(sweep, points, command, versions, expected_s)
+    # By the names that they have seen from the sweep file, wherever that lies on this machine.
+    files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}
+    if sweep.content.points.table is not None and sweep.table_text is not None:
+        files[sweep.content.points.table.file] = sweep.table_text
+    manifest = SweepManifest(
+        name=sweep.content.name,
+        command=command,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=versions,
+        files=files,
+        seed_by_seed=sweep.content.repeats is not None and sweep.content.repeats.seed_by_seed,
+        points=tuple(
+            Entry(
+                name=point.name,
+                scene_sha256=point.scene_sha256,
+                expected_s=round(expected_s(point.scene), 1),
+                values=dict(point.values),
+                again=point.again,
+            )
+            for point in points
+        ),
+    )
     if (path / MANIFEST).exists():
         folder = open_folder(path)
         if extend and _is_part(folder, points):
             with folder.lock():
-                write_json(path / MANIFEST, manifest)
+                manifest.write(path / MANIFEST)
             folder = open_folder(path)
         _refuse_other_sweep(folder, sweep, points)
     else:
@@ -275,7 +254,7 @@ def create_folder(
         except OSError as error:
             msg = f"--out {path}: cannot be made ({error.strerror}); choose another directory"
             raise InputError(msg) from error
-        write_json(path / MANIFEST, manifest)
+        manifest.write(path / MANIFEST)
         folder = open_folder(path)
     (path / "scenes").mkdir(exist_ok=True)
     for point in points:
@@ -283,38 +262,6 @@ def create_folder(
         if not file.exists():
             write_text(file, dump_scene(point.scene, file.parent))
     return folder
-
-
-def _manifest(
-    sweep: Sweep,
-    points: Sequence[Point],
-    command: str,
-    versions: Mapping[str, str],
-    expected_s: Callable[[Scene], float],
-) -> dict[str, Any]:
-    # By the names that they have seen from the sweep file, wherever that lies on this machine.
-    files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}
-    if sweep.content.points.table is not None and sweep.table_text is not None:
-        files[sweep.content.points.table.file] = sweep.table_text
-    return {
-        "format": FORMAT,
-        "name": sweep.content.name,
-        "command": command,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": dict(versions),
-        "files": files,
-        "seed_by_seed": sweep.content.repeats is not None and sweep.content.repeats.seed_by_seed,
-        "points": [
-            {
-                "name": point.name,
-                "scene_sha256": point.scene_sha256,
-                "expected_s": round(expected_s(point.scene), 1),
-                "values": dict(point.values),
-                **({"again": True} if point.again else {}),
-            }
-            for point in points
-        ],
-    }
 
 
 def _is_part(folder: Folder, points: Sequence[Point]) -> bool:
@@ -352,34 +299,10 @@ def open_folder(path: Path) -> Folder:
     Raises:
         InputError: it is not the directory of a sweep, or its manifest is damaged.
     """
-    file = path / MANIFEST
-    if not file.is_file():
+    if not (path / MANIFEST).is_file():
         msg = f"{path}: {_instead(path)}"
         raise InputError(msg)
-    content = read_json(file)
-    try:
-        if content is None or content["format"] != FORMAT:
-            raise ValueError
-        return Folder(
-            path=path,
-            name=str(content["name"]),
-            command=str(content["command"]),
-            # Manifests of before this was known lack it.
-            seed_by_seed=bool(content.get("seed_by_seed", False)),
-            entries=tuple(
-                Entry(
-                    name=str(point["name"]),
-                    scene_sha256=str(point["scene_sha256"]),
-                    expected_s=float(point["expected_s"]),
-                    values=dict(point["values"]),
-                    again=point.get("again") is True,
-                )
-                for point in content["points"]
-            ),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        msg = f"{file}: not a sweep manifest of format {FORMAT}; write the sweep to a new directory"
-        raise InputError(msg) from error
+    return Folder(path, SweepManifest.read(path / MANIFEST))
 
 
 def _instead(path: Path) -> str:

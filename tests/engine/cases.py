@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
+from dem.engine.demand import contact_law_of
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import contact_law_of
 from dem.engine.yade.library import yade_version
 from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
@@ -25,7 +25,6 @@ from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from validation.bench import add, advance_watched, body_rotations, scene_of
-from validation.known.floor import resting
 from validation.yade_access import YadeAccess
 
 
@@ -84,63 +83,6 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
         "masses": np.array([clump.mass for clump in clumps]),
         "spheres": np.array([members[k] for k in range(count)]),
         "expected_spheres": state.spheres(scene.particle),
-    }
-
-
-class Stuck:
-    """YADE as it is when it has stopped: asked for a step it makes none."""
-
-    def __init__(self, omega: Any) -> None:
-        self.iter, self.time, self.dt = omega.iter, omega.time, omega.dt
-
-    def step(self) -> None:
-        pass
-
-
-def stopping(data: dict[str, Any]) -> dict[str, Any]:
-    """What is said when YADE stops, and steps after advances by none."""
-    engine = build(scene_of(data))
-    engine.advance(7)
-    for none in (0, -3):
-        engine.advance(none)
-    steps = engine.steps
-    engine._omega = Stuck(engine._omega)
-    try:
-        engine.advance(5)
-    except RunError as error:
-        return {"steps": steps, "text": str(error)}
-    return {"steps": steps, "text": ""}
-
-
-def glide(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """A smarticle lying flat on a floor without friction is pushed along it."""
-    scene = scene_of(data)
-    engine = resting(YadeAccess(), scene.particle, contact_law_of(scene), dt=time_step(scene), speed=speed)
-    engine.advance(round(duration / engine.time_step))
-    return {"v": engine.state().velocities[0, 1]}
-
-
-def thrown(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """Two smarticles thrown down from high above the floor."""
-    scene = scene_of(data)
-    engine = build(scene)
-    poses = place_layer(
-        scene.particle, count=2, radius=0.02, bottom=1.0, height=0.02, obstacles=np.empty((0, 3)),
-        rng=np.random.default_rng(1),
-    )  # fmt: skip
-    engine.add(poses, speed=speed)
-    before, added = engine.state(), engine.account.added
-    engine.advance(round(duration / engine.time_step))
-    after = engine.state()
-    return {
-        "fallen": before.positions[:, 2] - after.positions[:, 2],
-        "speeds": -after.velocities[:, 2],
-        "momentum": after.momentum,
-        "impulse": engine.impulse,
-        "added": added,
-        "energy": before.kinetic_energy + before.potential_energy(engine.gravity, 0.0),
-        "time": engine.time,
-        "step": engine.time_step,
     }
 
 
@@ -275,30 +217,3 @@ def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
-
-
-def still(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
-    """Smarticles that lie flat on the floor, each by itself, turned by random angles; forces summed by hand."""
-    scene = scene_of(data)
-    engine = build(scene, radius=0.2)
-    rng = np.random.default_rng(6)
-    lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
-    for k in range(count):
-        turn = Rotation.from_euler("z", rng.random() * 2 * np.pi)
-        add(engine, (0.03 * (k % 8) - 0.1, 0.03 * (k // 8) - 0.1, -lowest + 1e-5), turn)
-    engine.advance(round(settle / engine.time_step))
-    weight = scene.smarticle.boxes.mass * scene.gravity_m_per_s2
-    net, touching = np.tile([0.0, 0.0, -weight], (count, 1)), 0
-    for interaction in engine._omega.interactions:
-        if interaction.isReal:
-            force = np.array(interaction.phys.normalForce + interaction.phys.shearForce)
-            touching += 1
-            for body, sign in ((interaction.id1, -1), (interaction.id2, 1)):
-                k = engine._assembly.smarticle_of.get(body)
-                if k is not None:
-                    net[k] += sign * force
-    return {
-        "said": engine.unbalanced_force(),
-        "summed": float(np.linalg.norm(net, axis=1).mean() / weight),
-        "touching": touching,
-    }

@@ -8,9 +8,8 @@ import numpy as np
 from cases import add
 from scipy.spatial.transform import Rotation
 
-from dem.body.chain import Tie, extent
+from dem.body.chain import Tie
 from dem.engine.yade.engine import YadeEngine
-from dem.phases.arrange import chain_of
 from dem.physics.strings import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
@@ -65,89 +64,4 @@ def pulled_apart(data: dict[str, Any], *, speed: float, moments: list[float]) ->
                 "asymmetry": float(np.ptp(state.angles)),
             }
         )
-    return found
-
-
-def swing(data: dict[str, Any], *, turn: float, seconds: float) -> dict[str, Any]:
-    """A free smarticle whose motors are suddenly off their barbs: energies step by step."""
-    scene, engine = single(data, TURNED)
-    engine.motors.deciding.commands = engine.motors.deciding.commands + np.array([turn, 0.6 * turn])
-    stiffness, hinges = scene.motor.stiffness_N_m_per_rad, engine._assembly.hinges
-    energies, interval = [], scene.fidelity.control_interval_s
-    for _ in range(round(seconds / interval)):
-        engine.motors.actuate(engine.motors.readings.commands[None], interval)
-        engine.advance(1)
-        # Velocities are half a step behind the angles: with those at the step's beginning the springs are as much late.
-        twisted = engine.motors.readings.commands - hinges.angles()
-        energies.append(engine.state().kinetic_energy + 0.5 * stiffness * (twisted**2).sum() + hinges.elastic_energy())
-    state = engine.state()
-    return {
-        "begun": 0.5 * stiffness * turn**2 * (1 + 0.36),
-        "energies": np.array(energies),
-        "momentum": state.momentum,
-        "angular_momentum": state.angular_momentum,
-        "gap": float(engine.motors.gaps().max()),
-    }
-
-
-def strained(data: dict[str, Any], *, strain: float) -> dict[str, Any]:
-    """A chain strained by the phase itself: how far it has left the plane, and its angles."""
-    scene = scene_of(data)
-    engine = build(scene)
-    scene.phases[0].begin(scene, 0).proceed(engine)
-    stage = scene.phases[1].begin(scene, 1)
-    first = chain_of(scene).length
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-        if np.ptp(engine.strings.ties[:, 0]) > (1 + strain) * first:
-            break
-    state = engine.state()
-    return {
-        "heights": np.abs(state.link_positions[..., 2]).max(),
-        "tilts": np.abs(state.link_rotations[..., 2, :2]).max(),
-        "turns": np.abs(state.link_spins[..., :2]).max(),
-        "angles": state.angles,
-        "steps": engine.steps,
-    }
-
-
-def bodies(data: dict[str, Any]) -> dict[str, int]:
-    """What exists of plane and strings in a scene."""
-    engine = build(scene_of(data))
-    return {
-        "felt": len(engine.fixtures.felt),
-        "container": len(engine.fixtures.container),
-        "strings": int(engine.strings.tied),
-    }
-
-
-def leaning(data: dict[str, Any], *, depth: float) -> dict[str, Any]:
-    """One smarticle, the face of its middle link deeper in the lower wall than touching it [m]; of the first step."""
-    scene = scene_of(data)
-    engine, boxes = build(scene), scene.particle.boxes
-    face = boxes.vertices[1, 1] - boxes.thicknesses_in_plane[1] / 2
-    add(engine, (0, -scene.plane.width_m / 2 - face - depth, 0), Rotation.identity())
-    engine.motors.articulate()
-    engine.advance(1)
-    force = -float(engine.fixtures.channel_sums[0, 1])
-    return {"force": force, "touches": int(engine.touches()[0]), "energy": engine.state().kinetic_energy}
-
-
-def between_walls(data: dict[str, Any], *, strain: float) -> list[tuple[float, float, float]]:
-    """A chain strained by the phase itself: its width [m], outward force on walls [N] and deepest contact [m]."""
-    scene = scene_of(data)
-    engine = build(scene)
-    scene.phases[0].begin(scene, 0).proceed(engine)
-    stage, first, found = scene.phases[1].begin(scene, 1), chain_of(scene).length, []
-    before, looks = engine.fixtures.channel_sums, 0
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-        now, looks = engine.fixtures.channel_sums, looks + 1
-        if looks % 20 == 0:
-            outwards = float((now - before)[1, 1] - (now - before)[0, 1])
-            width = extent(engine.state(), 2 * scene.particle.radius)
-            found.append((width, outwards, engine.overlaps(1.0).deepest))
-        before = now
-        if np.ptp(engine.strings.ties[:, 0]) > (1 + strain) * first:
-            break
     return found

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import cases
@@ -13,7 +14,15 @@ import pytest
 
 from dem.errors import RunError
 
+HERE = Path(__file__).parent
 TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark all tests of this folder."""
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.engine)
 
 
 @pytest.fixture(scope="session")
@@ -28,6 +37,11 @@ def worker() -> Iterator[ProcessPoolExecutor]:
         pytest.skip(f"engine tests need YADE: {error}")
     yield pool
     pool.shutdown(wait=True, cancel_futures=True)
+
+
+@pytest.fixture(autouse=True)
+def _needs_yade(worker: ProcessPoolExecutor) -> None:
+    """Skip where there is no YADE."""
 
 
 @pytest.fixture

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from pathlib import Path
-from types import FrameType
 from typing import Any
 from unittest.mock import patch
 
 import cases
 import h5py
 import meshio
-import numpy as np
 
 from dem.engine.effect import Adds
 from dem.engine.yade.engine import YadeEngine
@@ -54,8 +51,6 @@ def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
         "engines": found["engines"],
         "contacts": found["contacts"],
         "caps": found["caps"],
-        "coefficients": found["coefficients"],
-        "most_shear": max(found["shear"], default=0.0),
     }
 
 
@@ -78,59 +73,6 @@ def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
             found["contacts"].add((type(contact.geom).__name__, type(phys).__name__))
             if type(phys).__name__ == "CohFrictPhys":
                 found["caps"].add(phys.maxTwistPl)
-            else:
-                found["coefficients"].add((phys.tangensOfFrictionAngle, phys.cn))
-                found["shear"].add(phys.shearForce.norm())
-
-
-def calls_per_step(data: dict[str, Any], *, steps: int, moving: bool = False) -> dict[str, float]:
-    """Functions of Python that are entered while time advances, by name, per step; with smarticles present."""
-    scene = cases.scene_of(data)
-    engine = build_engine(scene, time_step(scene))
-    cases.add(engine, (0, 0, 0.05))
-    if moving:
-        engine.fixtures.shake(amplitude=1e-4, frequency=30)
-    engine.advance(3)
-    counted: Counter[str] = Counter()
-
-    def enter(frame: FrameType, event: str, _: Any) -> None:
-        if event == "call":
-            counted[frame.f_code.co_qualname] += 1
-
-    sys.setprofile(enter)
-    try:
-        engine.advance(steps)
-    finally:
-        sys.setprofile(None)
-    # What is called once, or now and then, is not called per step.
-    return {name: number / steps for name, number in counted.items() if number >= steps / 2}
-
-
-def removal(data: dict[str, Any], *, steps: int, lift: float | None) -> dict[str, Any]:
-    """Smarticles that roll about on the floor, clear of the wall, with the wall and without it."""
-    states = []
-    for remove in (False, True):
-        scene = cases.scene_of(data)
-        engine = build_engine(scene, time_step(scene))
-        cases.pour(engine, scene, scene.count, radius=0.7 * scene.container.radius_m)
-        engine.advance(200)
-        if remove and lift is None:
-            engine.fixtures.remove_wall()
-        elif remove:
-            engine.fixtures.lift_wall(lift)
-        engine.advance(steps)
-        state = engine.state()
-        states.append(np.concatenate([state.link_positions, state.link_velocities, state.link_spins]))
-        walls = set(engine.fixtures.container[:-1])
-        contacts = sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & walls and i.isReal)
-    speeds = np.linalg.norm(state.velocities, axis=1)
-    return {
-        "same": states[0].tobytes() == states[1].tobytes(),
-        "fastest": float(speeds.max()),
-        "contacts": contacts,
-        "touching": int(engine.touches().sum()),
-        "walled": engine.fixtures.walled,
-    }
 
 
 def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:

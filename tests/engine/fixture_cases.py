@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from pathlib import Path
 from typing import Any
 
 import cases
@@ -11,14 +9,9 @@ import numpy as np
 from cases import pour
 from scipy.spatial.transform import Rotation
 
-from dem.engine.effect import EffectName
 from dem.engine.yade.engine import YadeEngine
-from dem.errors import RunError
-from dem.record.progress import ProgressWriter
-from dem.run.build import build_recorder
-from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
-from validation.bench import FLAT, add, advance_watched, scene_of
+from validation.bench import add, scene_of
 
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
@@ -95,88 +88,6 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     }
 
 
-def hang_low(data: dict[str, Any], *, settle: float) -> dict[str, Any]:
-    """A U hung over the outermost bar along y of the lower hook's grid, clear of the others and of the floor."""
-    scene = scene_of(data)
-    engine = build(scene)
-    grid, particle = scene.hooks.crosses[0], scene.particle
-    middle = HANGING.apply(particle.centres[particle.links == 1])
-    top = grid.height + grid.side / 2 + particle.radius
-    far = grid.bars[-1].middle[0]
-    add(engine, (far, far / 2, top - middle[:, 2].max() + 1e-5), HANGING)
-    damped(engine, 0.3)
-    engine.advance(round(settle / engine.time_step))
-    return {
-        "rest": mean_hook_forces(engine, 200),
-        "far": far,
-        "weight": particle.boxes.mass * scene.gravity_m_per_s2,
-    }
-
-
-def bracket(data: dict[str, Any], *, limit: float) -> dict[str, Any]:
-    """A U round both hooks, one barb below the lower and one above the upper, which is raised until a contact is deep.
-
-    Args:
-        limit: overlap at which to stop [m].
-    """
-    scene = scene_of(data)
-    engine = build(scene)
-    lower, upper = scene.hooks.crosses
-    # The middle link stands at the end of two bars, which the barbs lie along.
-    standing = Rotation.from_euler("yz", [-90, 90], degrees=True)
-    middle = standing.apply(engine.particle.centres[engine.particle.links == 1])[:, 0].mean()
-    beside = upper.length / 2 + engine.particle.radius + 1e-4
-    add(engine, (beside - middle, 0, (lower.height + upper.height) / 2), standing)
-    before = engine.overlaps(limit)
-    engine.fixtures.raise_upper(0.05)
-    strain, watchdog = before, build_recorder(scene, Path(), ProgressWriter(Path(), 1, show=False)).watchdog
-    while not strain.deep.any() and engine.time < 1:
-        engine.advance(20)
-        strain = engine.overlaps(limit)
-    try:
-        watchdog.check_depths(strain, time=engine.time)
-        said = ""
-    except RunError as error:
-        said = str(error)
-    return {
-        "before": before.held,
-        "held": [(held.smarticle, held.between, held.apart) for held in strain.held],
-        "raised": engine.fixtures.upper_height - upper.height,
-        "said": said,
-    }
-
-
-def drag(data: dict[str, Any], *, speed: float, distance: float) -> dict[str, Any]:
-    """A bar's end inside the mouth of a U that lies on the floor draws it along by its middle link."""
-    scene = scene_of(data)
-    engine = build(scene, radius=0.2)
-    particle = scene.particle
-    cross = scene.hooks.crosses[0]
-    lowest = particle.centres[:, 2].min() - particle.radius
-    middle = particle.centres[particle.links == 1][:, 1].mean()
-    # y runs from the middle link to the mouth: the link is ahead of the bar's end, which moves in -y.
-    end = -cross.length / 2
-    add(engine, (0, end - particle.radius - middle - 1e-5, -lowest), FLAT)
-    engine.advance(round(0.05 / engine.time_step))
-    for bar in engine.fixtures.hooks[0]:
-        engine._omega.bodies[bar].state.vel = engine._yade.vector(0, -speed, 0)
-    engine.advance(round(0.5 * distance / speed / engine.time_step))
-    forces: list[np.ndarray] = []
-    steps = round(0.5 * distance / speed / engine.time_step)
-    before = engine.fixtures.hook_sums
-    start = engine.state().positions[0]
-    advance_watched(engine, steps, lambda: forces.append(engine.container_force()))
-    state = engine.state()
-    return {
-        "hook": (engine.fixtures.hook_sums - before)[0] / steps,
-        "floor": np.mean(forces, axis=0),
-        "moved": state.positions[0] - start,
-        "expected": speed * steps * engine.time_step,
-        "spin": state.link_spins[0, 1],
-        "weight": particle.boxes.mass * scene.gravity_m_per_s2,
-    }
-
-
 def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
     """A small pile, damped to rest."""
     hooks = [cross.obstacles(2 * scene.particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
@@ -184,31 +95,6 @@ def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
     damped(engine, 0.3)
     engine.advance(round(settle / engine.time_step))
     damped(engine, 0.0)
-
-
-def rest(data: dict[str, Any], *, count: int, settle: float) -> dict[str, Any]:
-    """Forces on everything that is fixed, under a pile at rest in a container with hooks."""
-    scene = scene_of(data)
-    engine = build(scene)
-    _pour(engine, scene, count, settle)
-    damped(engine, 0.3)
-    floor, wall = [], []
-    body = engine._omega.forces.f
-
-    def look() -> None:
-        *sides, bottom = engine.fixtures.container
-        floor.append(np.array(body(bottom)))
-        wall.append(np.sum([np.array(body(side)) for side in sides], axis=0))
-
-    before, steps = engine.fixtures.hook_sums, 50
-    advance_watched(engine, steps, look)
-    return {
-        "floor": np.mean(floor, axis=0),
-        "wall": np.mean(wall, axis=0),
-        "hooks": (engine.fixtures.hook_sums - before) / steps,
-        "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
-        "speed": float(np.linalg.norm(engine.state().velocities, axis=1).max()),
-    }
 
 
 def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
@@ -246,80 +132,4 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
         "outside": max(outside),
         "lowest": float(engine.state().positions[:, 2].min()),
         "bodies": sum(1 for body in wall if engine._omega.bodies[body] is not None),
-    }
-
-
-def rub(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """A smarticle that lies against a flat of a wall, held by a gravity that is turned, while the wall is lifted."""
-    scene = scene_of(data)
-    engine = build(scene, radius=0.5)
-    particle, half = scene.particle, math.pi / engine.cylinder.facets
-    outwards = np.array([math.cos(half), math.sin(half), 0.0])
-    engine._omega.engines[-1].gravity = engine._yade.vector(*(engine.gravity * outwards))
-    # The plane of the smarticle along the flat, its mouth upwards.
-    axes = np.stack([np.cross([0, 0, 1.0], outwards), [0, 0, 1.0], outwards], axis=1)
-    flat = engine.cylinder.inner_radius - particle.radius
-    add(engine, flat * outwards + [0, 0, 0.1], Rotation.from_matrix(axes))
-    damped(engine, 0.3)
-    engine._assembly._states[0].blockedDOFs = "z"
-    engine.advance(round(0.1 / engine.time_step))
-    engine._assembly._states[0].blockedDOFs = ""
-    damped(engine, 0.0)
-    engine.fixtures.lift_wall(speed)
-    bottom = engine.fixtures.wall_bottom
-    rows = []
-    for _ in range(40):
-        engine.advance(max(1, round(duration / 40 / engine.time_step)))
-        rows.append((engine.time, engine.state().velocities[0, 2], engine.container_force()[2]))
-    times, speeds, forces = np.array(rows).T
-    return {
-        "time": times,
-        "speed": speeds,
-        "force": forces,
-        "lifted": engine.fixtures.wall_bottom - bottom,
-        "expected_lift": speed * 40 * max(1, round(duration / 40 / engine.time_step)) * engine.time_step,
-        "weight": particle.boxes.mass * engine.gravity,
-    }
-
-
-def inventory(data: dict[str, Any]) -> dict[str, Any]:
-    """What an engine is made of before anything is poured."""
-    scene = scene_of(data)
-    engine = build(scene)
-    names = [type(one).__name__ for one in engine._omega.engines]
-    collider, loop = engine._omega.engines[1], engine._omega.engines[2]
-    functors = [
-        *collider.boundDispatcher.functors,
-        *loop.geomDispatcher.functors,
-        *loop.physDispatcher.functors,
-        *loop.lawDispatcher.functors,
-    ]
-    return {
-        "engines": names,
-        "functors": sorted(type(functor).__name__ for functor in functors),
-        "shapes": [type(body.shape).__name__ for body in engine._omega.bodies],
-        "hooks": len(engine.fixtures.hooks),
-        "sums": engine.fixtures.hook_sums.size,
-        "columns": set(Sampler(1.0, {EffectName.HOOKS} if scene.hooks is not None else set()).described),
-    }
-
-
-def lift_a_little(data: dict[str, Any], *, speed: float, duration: float) -> dict[str, Any]:
-    """The phase itself, on one smarticle that lies on the floor."""
-    phase = {"type": "remove-container", "speed_m_per_s": speed, "duration_s": duration}
-    scene = scene_of(data | {"count": 1, "phases": [{"type": "deposit"}, phase]})
-    engine = build(scene)
-    lowest = scene.particle.centres[:, 2].min() - scene.particle.radius
-    add(engine, (0, 0, -lowest))
-    bottom = engine.fixtures.wall_bottom
-    stage = scene.phases[1].begin(scene, 1)
-    while wait := stage.proceed(engine):
-        engine.advance(max(1, round(wait / engine.time_step)))
-    end = engine.fixtures.wall_bottom
-    engine.advance(20)
-    return {
-        "walled": engine.fixtures.walled,
-        "rise": end - bottom,
-        "crept": engine.fixtures.wall_bottom - end if engine.fixtures.walled else 0.0,
-        "enclosed": engine.fixtures.enclosed,
     }

@@ -16,13 +16,11 @@ from articulated_cases import (
     own_contacts,
     vec,
 )
-from scipy.spatial.transform import Rotation
 
-from dem.engine.yade.kind import contact_law_of, hinge_law
+from dem.engine.demand import contact_law_of
+from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
 from validation.bench import Targets, drive
-from validation.known.hinge import upright
-from validation.yade_access import YadeAccess
 from validation.yade_access import bodies_of as bodies
 
 
@@ -100,62 +98,6 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
     }
 
 
-def jump(data: dict[str, Any], *, to: float, duration: float) -> dict[str, Any]:
-    """The command jumps to an angle [rad]; the motor follows at its speed limit."""
-    scene, engine = floating(data)
-    engine.motors.articulate()
-    rows = [
-        (
-            kinetic_energy(engine),
-            engine.motors.gaps().max(),
-            *engine.state().angles[0],
-            *engine.motors.readings.commands[0],
-        )
-        for _ in drive(engine, scene, duration, lambda _: [to, to])
-    ]
-    table = np.array(rows)
-    boxes = scene.smarticle.boxes
-    inertia = boxes.link_inertias[0, 2] + boxes.link_masses[0] * (boxes.barb_length / 2) ** 2
-    return {
-        "energy": table[:, 0],
-        "gap": table[:, 1] / scene.sphere_diameter,
-        "angles": table[:, 2:4],
-        "commands": table[:, 4:],
-        "both_barbs": inertia * scene.motor.speed_limit_rad_per_s**2,
-        "halted": engine.motors.readings.halted,
-        "interval": scene.fidelity.control_interval_s,
-    }
-
-
-def thrown(data: dict[str, Any], *, speed: float, turn: Any, duration: float) -> dict[str, Any]:
-    """An articulated smarticle hits the floor; its energy from the impact on."""
-    scene = cases.scene_of(data)
-    engine = build(scene)
-    cases.add(engine, (0, 0, scene.particle.reach + 1e-4), Rotation.from_rotvec(turn))
-    cases.push(engine, 0, velocity=(0, 0, -speed), spin=(20, -10, 5))
-    engine.advance(1)
-    engine.motors.articulate()
-    begun = engine.state().angles
-    mass, energies, gaps = scene.smarticle.boxes.mass, [], []
-    for _ in drive(engine, scene, duration, lambda _: begun):
-        gaps.append(engine.motors.gaps().max())
-        if not gaps[-1] < scene.sphere_diameter:  # burst, NaN included
-            energies.append(math.inf)
-            break
-        height, twist = (
-            float(engine.state().positions[0, 2]),
-            engine.motors.readings.commands - engine.motors._hinges.angles(),
-        )
-        springs = engine.motors._hinges.elastic_energy() + scene.motor.stiffness_N_m_per_rad * (twist**2).sum() / 2
-        energies.append(kinetic_energy(engine) + mass * 9.81 * height + springs)
-    return {
-        "energy": np.array(energies),
-        "gap": np.array(gaps) / scene.sphere_diameter,
-        "thrown": mass * speed**2 / 2,
-        "interval": scene.fidelity.control_interval_s,
-    }
-
-
 def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
     """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
     scene = cases.scene_of(data)
@@ -228,63 +170,4 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
         "advance": scene.motor.stiffness_N_m_per_rad
         * scene.motor.speed_limit_rad_per_s
         * scene.fidelity.control_interval_s,
-    }
-
-
-def forced(data: dict[str, Any], *, speed: float, angle: float) -> dict[str, Any]:
-    """Barb 1 is turned about its hinge by hand while the motor holds; torque on it at every step."""
-    scene, engine = floating(data)
-    engine.motors.articulate()
-    hold_all(engine)
-    begun = engine.state().angles
-    state = engine.state()
-    normal, hinge = state.link_rotations[0, 1, :, 2], state.vertices[0, 1]
-    barb, torques = bodies(engine)[0], []
-    spin = -normal * speed  # inwards for barb 1 is about the negative normal
-    barb.angVel = engine._yade.vector(*spin)
-    interval = scene.fidelity.control_interval_s
-    for step in range(round(angle / speed / engine.time_step)):
-        if step % round(interval / engine.time_step) == 0:
-            engine.motors.actuate(begun[None], interval)
-        barb.vel = engine._yade.vector(*np.cross(spin, vec(barb.pos) - hinge))
-        engine.advance(1)
-        torques.append(engine.motors._hinges.torques()[0, 0])
-    return {
-        "torques": np.array(torques),
-        "angles": engine.state().angles[0] - begun[0],
-        "command": engine.motors.readings.commands[0] - begun[0],
-        "gap": engine.motors.gaps().max(),
-        "limit": scene.torque_limit,
-    }
-
-
-def against_floor(data: dict[str, Any], *, meets_deg: float, press: float, rest: float) -> dict[str, Any]:
-    """Barbs close onto the floor, which they meet at an angle; then they are told to open again."""
-    scene = cases.scene_of(data)
-    reach = scene.smarticle.boxes.barb_length - scene.sphere_diameter / 2  # to the last sphere
-    height = reach * math.sin(math.radians(meets_deg)) + scene.sphere_diameter / 2
-    engine = upright(YadeAccess(), scene, gravity=0.0, height=height)
-    begun = engine.state().angles[0]
-    rows = []
-    for time in drive(engine, scene, press + rest, lambda t: begun + min(2 * t, 1.2) if t < press else begun):
-        told = engine.motors.readings
-        rows.append(
-            (
-                time,
-                *told.commands[0],
-                *engine.motors._hinges.torques()[0],
-                *told.halted[0],
-                engine.motors.gaps().max(),
-            )
-        )
-    table = np.array(rows)
-    return {
-        "time": table[:, 0],
-        "commands": table[:, 1:3],
-        "torques": table[:, 3:5],
-        "halted": table[:, 5:7],
-        "gap": table[:, 7] / scene.sphere_diameter,
-        "begun": begun,
-        "angles": engine.state().angles[0],
-        "limit": scene.torque_limit,
     }

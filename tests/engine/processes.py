@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -51,10 +50,3 @@ def results(out: Path) -> dict[str, bytes]:
 
 def differing(one: dict[str, bytes], other: dict[str, bytes]) -> list[str]:
     return sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
-
-
-def frame_times(out: Path) -> list[float]:
-    try:
-        return [float(value) for value in re.findall(r'timestep="([^"]+)"', (out / "frames.pvd").read_text())]
-    except FileNotFoundError:
-        return []

@@ -13,8 +13,6 @@ import pytest
 from run_files import series
 from scenes import CHAIN, changed
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 STIFFNESS, LIMIT = 0.1, 0.05  # N m/rad, N m
 
@@ -63,34 +61,6 @@ def test_a_servo_yields_like_a_damped_spring_and_then_holds_at_its_limit(simulat
     assert max(found["asymmetry"] for found in (low, high, beyond)) < 1e-6
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-3])
-def test_a_servo_gives_no_energy(simulate: Simulate, damping: float) -> None:
-    data = chain(motor={"damping_N_m_s_per_rad": damping}, plane={"width_m": None})
-    free = simulate(chain_cases.swing, data, turn=-0.3, seconds=0.3)
-    energies, begun = free["energies"], free["begun"]
-    # Energies are read with velocities half a step late, at an angular frequency of some 200 /s.
-    assert energies[0] == pytest.approx(begun, rel=0.02)
-    assert energies.max() < 1.02 * begun
-    late = energies[-1000:]
-    if damping:
-        assert late.max() < 1e-3 * begun
-    else:
-        assert late.mean() == pytest.approx(begun, rel=0.02)
-    assert np.abs(free["momentum"]).max() < 1e-12
-    assert np.abs(free["angular_momentum"]).max() < 1e-9
-    assert free["gap"] < 1e-4
-
-
-def test_nothing_leaves_the_plane_and_a_chain_is_its_own_image_turned_by_half(simulate: Simulate) -> None:
-    pulled = simulate(chain_cases.strained, chain(), strain=0.15)
-    assert pulled["heights"] < 1e-12
-    assert pulled["tilts"] < 1e-12
-    assert pulled["turns"] == 0
-    # Barbs have opened by some degrees, and those of the one smarticle as those of the other.
-    assert (np.pi / 2 - pulled["angles"]).min() > 0.05
-    assert pulled["angles"][0] == pytest.approx(pulled["angles"][1], abs=2e-3)
-
-
 def test_strings_and_walls_account_for_all_momentum(simulate: Simulate, tmp_path: Path) -> None:
     # Walls that the chain soon leans on, since it turns and widens a little.
     data = chain(plane={"width_m": 0.0624})
@@ -123,9 +93,3 @@ def test_strings_and_servos_go_on_from_a_checkpoint(simulate: Simulate, tmp_path
     # Contacts are added up in another order after a checkpoint, and no more than that.
     assert forces[0].max() > 0.1
     assert forces[1] == pytest.approx(forces[0], abs=1e-6)
-
-
-def test_nothing_of_a_plane_exists_elsewhere(simulate: Simulate, scene_data: Callable[..., dict[str, Any]]) -> None:
-    assert simulate(chain_cases.bodies, scene_data()) == {"felt": 0, "container": 129, "strings": 0}
-    assert simulate(chain_cases.bodies, chain()) == {"felt": 2, "container": 3, "strings": 0}
-    assert simulate(chain_cases.bodies, chain(plane={"width_m": None})) == {"felt": 0, "container": 1, "strings": 0}

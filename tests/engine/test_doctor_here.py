@@ -4,8 +4,6 @@ import pytest
 
 from smarticles import installation
 
-pytestmark = pytest.mark.engine
-
 
 def test_yade_computes() -> None:
     check = installation.check_yade()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +9,8 @@ import handover_cases
 import numpy as np
 import pytest
 
-from dem.record.columns import EVERY
-from postprocess import measure_run, read_frames, read_run, read_series, summarise_run
-from postprocess.scene_file import read_phases
-
-pytestmark = pytest.mark.engine
+from dem.record.run import Run
+from postprocess import measure_run, read_frames, summarise_run
 
 PHASES = ["deposit", "relax", "shake", "internal-oscillation"]
 SCENE: dict[str, Any] = {
@@ -69,48 +65,10 @@ def test_frames_hold_the_engine_s_numbers_to_the_bit(handed: tuple[Path, list[di
     assert any(frame.contacts.any() for frame in frames)
 
 
-def test_series_hold_the_engine_s_numbers_and_the_units_of_their_columns(
-    handed: tuple[Path, list[dict[str, Any]]],
-) -> None:
-    out, notes = handed
-    series = read_series(out)
-    assert series.time.tolist() == [note["time"] for note in notes]
-    for name, key in (
-        ("phase", "phase"),
-        ("count", "count"),
-        ("container_z_m", "floor"),
-        ("kinetic_energy_J", "kinetic_energy"),
-    ):
-        assert series[name].tolist() == [note[key] for note in notes]
-    poured = [k for k, note in enumerate(notes) if note["count"]]
-    assert series["com_height_m"][poured] == pytest.approx([notes[k]["heights"].mean() for k in poured], rel=1e-12)
-    last = notes[-1]
-    second = np.sort(last["heights"])[-2]
-    assert series["packing_fraction"][-1] == pytest.approx(
-        6 * last["volume"] / (math.pi * last["radius"] ** 2 * second), rel=1e-12
-    )
-    assert series.units == {name: EVERY[name].unit for name in series.data}
-    assert "motor_work_J" in series.data
-
-
-def test_manifest_and_scene_tell_of_the_same_run(handed: tuple[Path, list[dict[str, Any]]]) -> None:
-    out, notes = handed
-    run = read_run(out)
-    assert (run.status, run.name, run.count, run.seed) == ("done", "handover", 6, 5)
-    assert [phase.type for phase in run.phases] == PHASES == [phase.type for phase in read_phases(out)]
-    assert (run.smarticle_mass, run.solid_volume) == (notes[-1]["mass"], notes[-1]["volume"])
-    assert run.container_radius == notes[-1]["radius"]
-    assert run.end_time is not None
-    # The last sample is nearer to the end than two samples are to each other.
-    assert 0 <= run.end_time - notes[-1]["time"] < notes[-1]["time"] - notes[-2]["time"]
-    for before, after in zip(run.phases, run.phases[1:], strict=False):
-        assert before.end == after.start
-    assert all(phase.time_step is not None and phase.time_step >= run.time_step > 0 for phase in run.phases)
-
-
 def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]]) -> None:
     out, notes = handed
-    said, table, series = {note["time"]: note for note in notes}, measure_run(out, costly="never"), read_series(out)
+    run, said = Run(out), {note["time"]: note for note in notes}
+    table, series = measure_run(run, costly="never"), run.series
     for _, row in table.iterrows():
         note = said[row["time [s]"]]
         # Hinges give way by a little, and vertices stand for both links that meet there.
@@ -120,6 +78,6 @@ def test_measures_agree_with_the_engine(handed: tuple[Path, list[dict[str, Any]]
         assert row["kinetic energy [J]"] == note["kinetic_energy"]
         phi = series["packing_fraction"][series.nearest(row["time [s]"])]
         assert row["phi second-highest-com [-]"] == pytest.approx(phi, rel=near)
-    summary = summarise_run(out, costly="never")
+    summary = summarise_run(Run(out), costly="never")
     assert summary["phase type"].tolist() == PHASES
     assert summary["phi second-highest-com [-]"].gt(0).all()

@@ -12,8 +12,6 @@ import hinge_cases
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 VELOCITY, SPIN = (0.1, -0.2, 0.3), (20.0, 35.0, -15.0)
@@ -42,11 +40,7 @@ def shape(aspect_ratio: float, fidelity: str = "draft", angles: Any = (90, 90), 
 @pytest.mark.parametrize(
     ("changes", "spin", "straight_in"),
     [
-        (shape(0.4), (0, 0, 0), 0.3),
-        (shape(0.7, "standard"), (0, 0, 0), 0.3),
-        (shape(0.7, angles=(90, 20)), (0, 0, 0), 0.3),
         (shape(1.0), (0, 0, 0), 0.6),  # faster, the vibration on the shafts halts the motors
-        (shape(0.4), SPIN, 0.3),
         (shape(0.7, "standard", angles=(90, 20)), SPIN, 0.4),
     ],
 )
@@ -65,30 +59,7 @@ def test_free_gait_keeps_momentum_and_its_hinges_together(
     assert np.abs(gait["angles"]).max() < 0.01
 
 
-@pytest.mark.parametrize(
-    ("changes", "share"), [(shape(0.7), 0.03), (shape(0.7, angles=(90, 20)), 0.03), (shape(1.0, "standard"), 0.03)]
-)
-def test_motors_of_a_closed_cycle_do_no_net_work(
-    simulate: Simulate, data: SceneData, changes: dict[str, Any], share: float
-) -> None:
-    gait = simulate(hinge_cases.gait, data(changes), straight_in=0.4, every_step=True)
-    work = gait["work"]
-    moved = np.clip(np.diff(work), 0, None).sum()
-    # Back and forth went the energy of the barbs' vibration on their shafts, again and again: each start and stop of
-    # the ramp sets it going, and a shaft has no damping. What the cycle costs in the end is what is left in motion
-    # and what the hinges' dampers took, from a start that jerks: some hundredths.
-    left = gait["energy"][-1] - gait["energy_before"] + gait["elastic"]
-    assert moved > 20 * np.ptp(gait["energy"])
-    assert left < work[-1] + share * moved  # no energy from nowhere
-    assert abs(work[-1]) < share * moved
-    # What the motors tell is what YADE's torques did, step by step. They look once in five steps and more, at a
-    # vibration of ninety: the trapezium of the two misses (2π 5/90)²/12 of what goes back and forth.
-    assert gait["told"] == pytest.approx(work[-1], abs=0.02 * moved)
-    assert moved > 1e-6
-
-
-@pytest.mark.parametrize("fidelity", ["draft", "standard", "reference"])
-@pytest.mark.parametrize("aspect_ratio", [0.4, 0.7, 1.0])
+@pytest.mark.parametrize(("fidelity", "aspect_ratio"), [("draft", 1.0), ("standard", 0.4), ("reference", 0.7)])
 def test_links_of_one_smarticle_never_touch(
     simulate: Simulate, data: SceneData, fidelity: str, aspect_ratio: float
 ) -> None:
@@ -102,46 +73,9 @@ def test_links_of_one_smarticle_never_touch(
     assert sweep["gap"] < 0.01
 
 
-# -- violence ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), [(0.4, "draft"), (0.7, "standard"), (1.0, "draft")])
-@pytest.mark.parametrize("limit", [None, STRONG])
-def test_jump_of_a_command_at_sixty_radians_per_second(
-    simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str, limit: float | None
-) -> None:
-    changes = shape(aspect_ratio, fidelity, speed_limit_rad_per_s=60.0, torque_limit_N_m=limit)
-    jump = simulate(hinge_cases.jump, data(changes), to=0.0, duration=0.3)
-    assert jump["commands"][-1] == pytest.approx(np.zeros(2), abs=1e-12)
-    # A shaft that is turned from rest at ω swings by ω/ω0 about the command, up to twice as fast as it.
-    assert jump["angles"][-500:].mean(axis=0) == pytest.approx(np.zeros(2), abs=0.01)
-    assert jump["gap"].max() < 0.05
-    assert jump["energy"].max() < 1.3 * 4 * jump["both_barbs"]
-    assert jump["energy"][-500:].max() <= jump["energy"].max()
-    # It took the time that the speed limit sets, and more only where the torque halted it.
-    arrived = np.argmax(np.abs(jump["commands"]).max(axis=1) < 1e-12) * jump["interval"]
-    least = np.pi / 2 / 60
-    assert least - jump["interval"] * 1.01 < arrived < (1.05 if limit else 1.3) * least
-
-
-@pytest.mark.parametrize("turn", [(0.4, 0.2, -0.7), (1.5, 0.3, 0.1)])
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), [(0.4, "draft"), (0.7, "draft"), (0.7, "standard")])
-def test_smarticle_thrown_at_the_floor_gains_no_energy(
-    simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str, turn: Any
-) -> None:
-    thrown = simulate(hinge_cases.thrown, data(shape(aspect_ratio, fidelity)), speed=3.0, turn=turn, duration=0.5)
-    assert np.isfinite(thrown["energy"]).all()
-    assert thrown["gap"].max() < 0.1
-    # Highest energy of each tenth of the time since the impact: contacts store some for a moment, and give it back.
-    after = thrown["energy"][round(0.01 / thrown["interval"]) :]
-    highest = np.array([part.max() for part in np.array_split(after, 10)])
-    assert highest[0] < thrown["thrown"]
-    assert (np.diff(highest) < 1e-3 * thrown["thrown"]).all()
-
-
 # -- the stable time step ----------------------------------------------------------------------------------------------
 
-STACKS = [(0.4, "draft"), (0.7, "draft"), (1.0, "draft"), (0.4, "standard"), (0.7, "standard"), (1.0, "standard")]
+STACKS = [(1.0, "draft"), (0.4, "standard")]
 
 
 @pytest.mark.parametrize(("aspect_ratio", "fidelity"), STACKS)
@@ -155,15 +89,6 @@ def test_stack_is_quiet_below_the_stable_step(
     # As for welded smarticles (test_contact.py): they chatter at some mm/s where the step is too large.
     assert stack["fastest"] < 1e-4
     assert stack["gap"] < 0.01
-
-
-@pytest.mark.parametrize(("aspect_ratio", "fidelity"), STACKS[::2])
-def test_stack_bursts_above_the_stable_step(
-    simulate: Simulate, data: SceneData, aspect_ratio: float, fidelity: str
-) -> None:
-    case = hinge_cases.stack
-    stack = simulate(case, data(shape(aspect_ratio, fidelity)), layers=6, times_stable=2.0, settle=0.1, watch=0.02)
-    assert stack["fastest"] == math.inf
 
 
 # -- checkpoints -------------------------------------------------------------------------------------------------------

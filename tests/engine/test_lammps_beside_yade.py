@@ -12,8 +12,6 @@ import pytest
 from dem.engine.lammps.child import lammps_version
 from dem.errors import RunError
 
-pytestmark = pytest.mark.engine
-
 
 @pytest.fixture(autouse=True)
 def _lammps() -> None:

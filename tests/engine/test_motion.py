@@ -9,8 +9,6 @@ import cases
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 
@@ -32,14 +30,3 @@ def test_mass_and_inertia_are_the_boxes_in_every_pose(
     expected = np.einsum("nij,j,nkj->nik", turned, boxes.inertia, turned)
     assert found["tensors"] == pytest.approx(expected, abs=1e-12 * boxes.inertia.max())
     assert found["spheres"] == pytest.approx(found["expected_spheres"], abs=1e-12)
-
-
-def test_what_is_thrown_falls_from_that_speed_on(simulate: Simulate, scene_data: SceneData) -> None:
-    found = simulate(cases.thrown, scene_data(), speed=2.0, duration=0.02)
-    time, g = found["time"], 9.81
-    assert found["speeds"] == pytest.approx(np.full(2, 2.0 + g * time), rel=1e-9)
-    # Of first order: velocities belong to the middles of steps.
-    assert found["fallen"] == pytest.approx(np.full(2, 2.0 * time + g * time**2 / 2), abs=g * time * found["step"])
-    # Forces on the container are taken from this balance: nothing has been felt.
-    assert -found["momentum"][2] == pytest.approx(found["impulse"], rel=1e-9)
-    assert found["added"] == pytest.approx(found["energy"], rel=1e-12)

@@ -9,8 +9,6 @@ import hinge_cases
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 
@@ -49,50 +47,3 @@ def test_blocked_motor_halts_holds_and_comes_free(simulate: Simulate, data: Scen
         assert (later[0] > commands[-1]).all()
         assert later[-1] == pytest.approx(blocked["goal"], abs=1e-12)
         assert not blocked["halted"][mark:].any()
-
-
-@pytest.mark.parametrize("law", ["halt", "slip"])
-def test_barb_that_meets_the_floor(simulate: Simulate, data: SceneData, law: str) -> None:
-    # Both barbs close at 2 rad/s onto the floor, which they meet at 50°; they were told to go to 89°.
-    changes = {"smarticle.angles_deg": [20, 20], "motor.law": law}
-    floor = simulate(hinge_cases.against_floor, data(changes), meets_deg=50, press=0.6, rest=0.3)
-    limit, commands = floor["limit"], floor["commands"]
-    advance = 3e-3 * 2 * 2e-4  # k ω Δt
-    pressing = (floor["time"] > 0.4) & (floor["time"] < 0.59)
-    torques = floor["torques"][pressing]
-    assert floor["halted"][pressing].all()
-    # Positive torques close; nothing chatters.
-    assert np.ptp(torques, axis=0).max() < 1e-3 * limit
-    if law == "halt":
-        assert limit <= torques.min()
-        assert torques.max() < limit + advance
-        assert (np.ptp(commands[pressing], axis=0) == 0).all()
-        # The floor gives way a little, and the shaft twists by τ/k.
-        assert np.degrees(commands[pressing][-1]) == pytest.approx([50, 50], abs=1)
-    else:
-        assert torques == pytest.approx(np.full_like(torques, limit), rel=0.01)
-    # Told to open again it lets go, whatever its torque was.
-    assert commands[-1] == pytest.approx(floor["begun"], abs=1e-12)
-    assert floor["angles"] == pytest.approx(floor["begun"], abs=0.02)
-    assert np.abs(floor["torques"][-500:].mean(axis=0)).max() < 0.02 * limit
-    assert floor["gap"].max() < 0.01
-
-
-@pytest.mark.parametrize("speed", [3.0, -3.0])
-def test_slipping_motor_holds_its_limit_while_it_is_turned(simulate: Simulate, data: SceneData, speed: float) -> None:
-    turned = simulate(hinge_cases.forced, data({"motor.law": "slip"}), speed=speed, angle=0.3 * np.sign(speed))
-    assert turned["angles"][0] == pytest.approx(0.3 * np.sign(speed), rel=0.01)
-    # At every step, from when the shaft is wound up: τ_max/k = 5 mrad. Between two looks it would rise by 11 %.
-    slipping = turned["torques"][len(turned["torques"]) // 20 :]
-    expected = -np.sign(speed) * turned["limit"]
-    assert slipping == pytest.approx(np.full_like(slipping, expected), rel=0.01)
-    assert turned["command"] == pytest.approx(np.zeros(2), abs=1e-12)
-
-
-def test_halting_motor_holds_with_whatever_torque_it_takes(simulate: Simulate, data: SceneData) -> None:
-    turned = simulate(hinge_cases.forced, data(), speed=3.0, angle=0.03)
-    stiffness = 3e-3  # N m/rad
-    assert turned["command"] == pytest.approx(np.zeros(2), abs=1e-12)
-    # YADE's torque is that of the angle one step ago: 3 rad/s for 40 µs.
-    assert turned["torques"][-1] == pytest.approx(-stiffness * turned["angles"][0], abs=stiffness * 2e-4)
-    assert abs(turned["torques"][-1]) > 5 * turned["limit"]

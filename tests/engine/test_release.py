@@ -8,16 +8,12 @@ from typing import Any
 
 import cases
 import fixture_cases
-import meshio
 import numpy as np
 import pytest
 from run_files import series
 
-pytestmark = pytest.mark.engine
-
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
-MU, G = 0.4, 9.81
 
 
 def test_removing_the_wall_leaves_no_contact_and_adds_no_energy(simulate: Simulate, scene_data: SceneData) -> None:
@@ -36,77 +32,6 @@ def test_removing_the_wall_leaves_no_contact_and_adds_no_energy(simulate: Simula
     assert totals[-1] < 0.95 * totals[0]
     assert gone["outside"] > 1.2 * 0.0135
     assert gone["lowest"] > 0
-
-
-def test_a_lifted_wall_drags_by_friction(simulate: Simulate, scene_data: SceneData) -> None:
-    rubbed = simulate(fixture_cases.rub, scene_data(), speed=0.3, duration=0.06)
-    assert rubbed["lifted"] == pytest.approx(rubbed["expected_lift"], rel=1e-9)
-    # Under a gravity that presses it onto the wall it is accelerated by μ g, and the wall feels μ m g, downwards.
-    acceleration = np.polyfit(rubbed["time"], rubbed["speed"], 1)[0]
-    assert rubbed["speed"].max() < 0.3
-    assert acceleration == pytest.approx(MU * G, rel=5e-3)
-    assert rubbed["force"] == pytest.approx(-MU * rubbed["weight"], rel=5e-3)
-
-
-@pytest.mark.parametrize("speed", [None, 0.2])
-def test_a_pile_melts_and_the_run_goes_on(
-    simulate: Simulate, scene_data: SceneData, tmp_path: Path, speed: float | None
-) -> None:
-    data = scene_data({"count": 30, "container.radius_m": 0.0135})
-    data["phases"] = [
-        {"type": "deposit"},
-        {"type": "remove-container", "duration_s": 0.3, "speed_m_per_s": speed},
-        {"type": "relax", "duration_s": 0.1},
-    ]
-    answer = simulate(cases.run, data, str(tmp_path / "run"))
-    assert answer["error"] is None, answer
-    found = series(tmp_path / "run")
-    poured, melting, last = (found["phase"] == k for k in range(3))
-    assert found["outside_count"][poured].max() == 0
-    assert found["outside_count"][last].min() > 0  # measured, not refused
-    assert found["com_height_m"][last][-1] < 0.95 * found["com_height_m"][poured][-1]
-    assert np.isfinite(found["packing_fraction"][poured][-1])
-    assert np.isnan(found["packing_fraction"][melting][2:]).all()
-    assert np.isnan(found["packing_fraction"][last]).all()
-    weight = 30 * 7850 * 1.27e-3 * 0.5e-3 * 0.0117 * 2.4 * G
-    assert found["container_force_N"][last][-5:].mean(axis=0)[2] == pytest.approx(-weight, rel=0.02)
-
-
-def test_a_wall_that_is_not_clear_stays_where_it_is(simulate: Simulate, scene_data: SceneData) -> None:
-    lifted = simulate(fixture_cases.lift_a_little, scene_data(), speed=0.05, duration=0.06)
-    assert lifted["walled"]
-    assert lifted["rise"] == pytest.approx(0.05 * 0.06, rel=0.02)
-    assert lifted["crept"] == 0
-    assert not lifted["enclosed"]
-    cleared = simulate(fixture_cases.lift_a_little, scene_data(), speed=0.6, duration=0.1)
-    assert not cleared["walled"]
-
-
-def test_a_mould_of_tiers_shapes_the_pile(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:
-    tiers = [{"radius_m": 0.018, "height_m": 0.006}, {"radius_m": 0.0125, "height_m": 0.15}]
-    data = scene_data({"count": 50, "container": {"tiers": tiers}})
-    data["phases"] = [
-        {"type": "deposit"},
-        {"type": "shake", "duration_s": 0.1},
-        {"type": "remove-container", "duration_s": 0.2},
-    ]
-    answer = simulate(cases.run, data, str(tmp_path / "run"))
-    assert answer["error"] is None, answer
-    found = series(tmp_path / "run")
-    assert np.isnan(found["packing_fraction"]).all()  # no one radius gives the volume
-    seen = {0: 0.0, 1: 0.0}
-    for path in sorted((tmp_path / "run" / "frames").glob("*.vtu")):
-        mesh = meshio.read(path)
-        phase, floor = (mesh.cell_data[name][0][0] for name in ("phase", "floor_z_m"))
-        if phase == 2:
-            continue
-        heights, off_axis = mesh.points[:, 2] - floor, np.hypot(*mesh.points[:, :2].T)
-        for k, inside in enumerate((heights <= 0.006, heights > 0.006)):
-            seen[k] = max(seen[k], off_axis[inside].max(initial=0.0))
-    # Up to its wall in the lower tier, and nowhere beyond that of the upper one above the step.
-    assert 0.0125 < seen[0] < 0.018
-    assert 0.009 < seen[1] < 0.0125
-    assert found["com_height_m"][-1] < found["com_height_m"][found["phase"] == 1][-1]
 
 
 @pytest.mark.parametrize("speed", [None, 0.3])

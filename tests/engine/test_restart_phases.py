@@ -38,23 +38,6 @@ phases:
   - {type: shape-change, opening_s: 0.1, closing_s: 0.1}
   - {type: relax, duration_s: 0.06}
 """,
-    "a slipping gait of half of them": """\
-motor: {law: slip, torque_limit_N_m: 4.0e-6}
-phases:
-  - {type: deposit, per_layer: 4}
-  - type: actuate
-    barbs: {type: sine, centre_deg: 80, amplitude_deg: 15, frequency_hz: 3}
-    duration_s: 0.16
-    active_fraction: 0.5
-    offsets: random
-  - {type: relax, duration_s: 0.06}
-""",
-    "removed at once": """\
-phases:
-  - {type: deposit, per_layer: 4}
-  - {type: remove-container, duration_s: 0.4}
-  - {type: relax, duration_s: 0.1}
-""",
     "shaken with and without the wall": """\
 phases:
   - {type: deposit, per_layer: 4}
@@ -65,7 +48,6 @@ phases:
 """,
 }
 PASSIVE = ("deposit", "relax")
-pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("worker")]  # skipped where there is no YADE
 
 
 def kill_in(scene: Path, out: Path, phase: int) -> None:

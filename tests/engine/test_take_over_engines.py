@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 import taking
 
-pytestmark = pytest.mark.engine
-
 TIMEOUT = 900  # s of wall time, for a busy machine on which links compiles first
 
 

@@ -82,16 +82,6 @@ def test_a_saved_simulation_goes_on_to_the_same_bits(build: Build, ranks: int, t
         other.load(replace(saved, memory={"format": "links-3"}), tmp_path)
 
 
-def test_a_command_that_lammps_refuses_is_told_in_its_own_words(build: Build) -> None:
-    engine = build(small(), ranks=1)
-    poured(engine, 1, 1e-4)
-    with pytest.raises(
-        RunError, match=r"^LAMMPS ended: Unrecognized fix style 'nonsense' \(command: fix bogus all nonsense"
-    ):
-        engine.child.tell("fix bogus all nonsense")
-    assert not engine.child.scratch.exists()
-
-
 ORPHAN = """
 from dem.engine.lammps.kind import LammpsKind
 from dem.plan.steps import time_step

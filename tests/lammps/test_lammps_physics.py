@@ -9,7 +9,6 @@ import pytest
 from lammps_builds import Build
 from numpy.typing import NDArray
 from scenes import small
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
@@ -17,10 +16,8 @@ from dem.engine.lammps.engine import LammpsEngine
 from dem.engine.lammps.kind import contact_law_of
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
-from dem.setting.container import Cylinder
 from validation.known.theory import dashpot_impact
 
-G = 9.81
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)
 
 
@@ -30,41 +27,6 @@ def put(
     """Smarticles at places, not turned or turned as told."""
     given = turns or (Rotation.identity(),) * len(places)
     engine.add(Poses(np.array(places), given), speed=speed)
-
-
-def test_what_flies_falls_as_thrown_and_does_not_turn(build: Build) -> None:
-    engine = build(small())
-    askew = Rotation.from_rotvec([0.5, 1.0, 0.3])
-    put(engine, (0.005, 0, 0.09), (-0.01, 0, 0.05), turns=(askew, askew.inv()), speed=0.2)
-    before = engine.state()
-    np.testing.assert_allclose(before.velocities, [[0, 0, -0.2]] * 2, atol=1e-15)
-    engine.advance(200)
-    after, t = engine.state(), 200 * engine.time_step
-    assert engine.time == pytest.approx(t, rel=1e-12)
-    fallen = before.positions - after.positions
-    # The scheme is exact for a constant force.
-    np.testing.assert_allclose(fallen[:, 2], 0.2 * t + G * t**2 / 2, rtol=1e-9)
-    assert np.abs(fallen[:, :2]).max() < 1e-15
-    np.testing.assert_allclose(after.velocities[:, 2], -(0.2 + G * t), rtol=1e-9)
-    assert np.abs(after.link_rotations - before.link_rotations).max() < 1e-9
-    assert engine.impulse == pytest.approx(-after.momentum[2], rel=1e-9)
-    assert engine.unbalanced_force() == pytest.approx(1, rel=1e-9)
-    assert engine.touches().tolist() == [0, 0]
-
-
-def test_at_rest_springs_of_the_floor_bear_the_weight(build: Build) -> None:
-    engine = build(small())
-    radius, mass = engine.particle.radius, engine.particle.boxes.mass
-    put(engine, (0.008, 0.002, radius), (-0.008, 0, radius))
-    put(engine, (0.0, 0.013, radius))
-    engine.advance(500)
-    weight = 3 * mass * G
-    springs = 250 * engine.contacts.fixed_depths.sum()
-    assert springs == pytest.approx(weight, rel=1e-3)
-    assert engine.touches().tolist() == [len(engine.particle.centres)] * 3
-    assert engine.neighbours().tolist() == [0, 0, 0]
-    assert engine.unbalanced_force() < 1e-3
-    assert engine.state().kinetic_energy < 1e-6 * weight * radius
 
 
 def test_one_rank_and_two_move_the_same_smarticles_alike(build: Build) -> None:
@@ -129,19 +91,6 @@ def test_the_wall_holds_until_it_is_taken_away(build: Build) -> None:
     assert third.state().velocities[0, 0] < -1e-3
 
 
-def test_adding_leaves_contacts_as_they_were(build: Build) -> None:
-    """Springs of friction of those that lie on each other stay, whoever is added."""
-    engine, rng = build(small({"container": {"radius_m": 0.0105}}), ranks=1), np.random.default_rng(5)
-    put(engine, *((0, 0, 0.012 * (k + 1)) for k in range(4)), turns=tuple(Rotation.random(4, random_state=rng)))
-    engine.advance(3500)
-    assert engine.neighbours().min() > 0
-    before = engine._moving.forces
-    put(engine, (0, 0, 0.09))
-    engine.advance(1)
-    changed = np.linalg.norm(engine._moving.forces[:4] - before, axis=1) / (engine.particle.boxes.mass * G)
-    assert changed.max() < 0.02
-
-
 def bar(restitution: float) -> tuple[Scene, float]:
     """A scene of straight smarticles, and a time step [s] that resolves a contact in some hundred."""
     scene = small({"smarticle": {"aspect_ratio": 0}, "contact": {"restitution": restitution}})
@@ -186,28 +135,3 @@ def test_two_that_meet_part_as_their_law_says_and_never_pull(build: Build, resti
     assert forces[:, 1].min() > -1e-9 * forces.max()
     assert (after[1] - after[0]) / speed == pytest.approx(exact, rel=0.02)
     assert after.sum() == pytest.approx(-speed, rel=1e-9)
-
-
-def test_the_wall_lets_go_of_what_it_has_pushed_away(build: Build) -> None:
-    """Let go at rest where its end is in the wall, a bar leaves as a spring and a dashpot that never pull throw it."""
-    scene, dt = bar(0.3)
-    radius, depth = 0.0105, 5e-5
-    engine, law = build(scene, ranks=1, gravity=0.0, time_step=dt, **round_wall(radius)), contact_law_of(scene)
-    put(engine, (radius + depth - scene.smarticle.middle_length_m / 2, 0, 0.02))
-    assert engine.overlaps(1.0).deepest == pytest.approx(depth, rel=1e-6)
-    forces = -stepped(engine, 800)[:, 0, 0]
-    mass, stiffness, damping = scene.particle.boxes.mass, law.normal_stiffness, law.wall_damping
-
-    def push(_: float, y: NDArray[np.float64]) -> float:
-        return float(-stiffness * y[0] - damping * y[1])
-
-    push.terminal, push.direction = True, -1  # type: ignore[attr-defined]
-    pushed = solve_ivp(lambda t, y: [y[1], push(t, y) / mass], (0, 1), [-depth, 0.0], events=push, rtol=1e-10)
-    assert forces.max() > 0 == forces[-1]
-    assert forces.min() > -1e-9 * forces.max()
-    assert -engine.state().velocities[0, 0] == pytest.approx(float(pushed.y_events[0][0][1]), rel=0.02)
-
-
-def round_wall(radius: float) -> dict[str, Cylinder]:
-    """Of a container [m] that is high enough for all of this."""
-    return {"cylinder": Cylinder(radius=radius, height=0.1, facets=64)}

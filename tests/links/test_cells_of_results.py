@@ -2,7 +2,8 @@
 
 Of the scene of one run, the very one by its hash, everything that is measured must lie where a further seed of its cell
 would: within the scatter of the cell's other seeds. On a processor of the kind that the table was made on, it is the
-number itself; on another one the last bits differ, and a pile with them.
+number itself; on another one the last bits differ, and a pile with them. The cheapest cells run by default, all of them
+with `pytest -m "long or not long" tests/links/test_cells_of_results.py`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from studies.framework.runs import DEFINITION
@@ -40,42 +41,37 @@ MACHINE = ("processor", "wall time")
 """What columns of the machine's time begin with: they say nothing of the pile."""
 
 CELLS = [
-    ("procedures", "shape-change_lw1.10_links_seed1"),
-    ("procedures-code", "shape-change_lw1.10_links_seed1"),
-    ("factors", "text_halt_mu0.4_lw1.00_seed1"),
     ("engines", "hook_links_seed2"),
-    ("melting", "static_lw0.70_links_seed1"),
-    ("melting-code", "static_lw0.70_links_seed1"),
-    ("casting", "static_links_seed1"),
-    ("casting-code", "static_links_seed1"),
-    ("fracture", "static_lw0.70_links_seed1"),
-    ("fracture-code", "static_lw0.70_links_seed1"),
-    ("strength", "static_h13_lw0.70_links_seed1"),
-    ("strength-code", "static_h13_lw0.70_links_seed1"),
     ("chain", "baseline_n2_hH0.520_seed1"),
-    pytest.param("chain-bodies", "baseline_n2_hH0.520_seed1", marks=pytest.mark.engine),
-    ("friction", "lw1.00_mu0.20_seed1"),
     ("finite-size", "lw0.09_n100_seed1"),
-    ("landscape", "internal20_0.25s_lw1.10_seed1"),
-    ("gravish", "lw1.10_links_seed1"),
-    ("collapse", "lw1.17_gamma4.0_seed1"),
-    ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1"),
+    pytest.param("chain-bodies", "baseline_n2_hH0.520_seed1", marks=pytest.mark.engine),
+    *(
+        pytest.param(*cell, marks=pytest.mark.long)
+        for cell in (
+            ("procedures", "shape-change_lw1.10_links_seed1"),
+            ("procedures-code", "shape-change_lw1.10_links_seed1"),
+            ("factors", "text_halt_mu0.4_lw1.00_seed1"),
+            ("melting", "static_lw0.70_links_seed1"),
+            ("melting-code", "static_lw0.70_links_seed1"),
+            ("casting", "static_links_seed1"),
+            ("casting-code", "static_links_seed1"),
+            ("fracture", "static_lw0.70_links_seed1"),
+            ("fracture-code", "static_lw0.70_links_seed1"),
+            ("strength", "static_h13_lw0.70_links_seed1"),
+            ("strength-code", "static_h13_lw0.70_links_seed1"),
+            ("friction", "lw1.00_mu0.20_seed1"),
+            ("landscape", "internal20_0.25s_lw1.10_seed1"),
+            ("gravish", "lw1.10_links_seed1"),
+            ("collapse", "lw1.17_gamma4.0_seed1"),
+            ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1"),
+        )
+    ),
 ]
 OTHERS = [
     ("procedures", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
-    ("procedures-code", "shape-change_lw1.10_links_seed1", "internal10_lw1.10_links_seed1"),
-    ("factors", "text_halt_mu0.4_lw1.00_seed1", "text_halt_mu0.2_lw1.00_seed1"),
-    ("engines", "internal_links_seed7", "shape-change_links_seed5"),
-    ("melting-code", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
-    ("fracture", "static_lw0.70_links_seed1", "shape-change_lw0.70_links_seed1"),
     ("strength-code", "static_h13_lw0.70_links_seed1", "shape-change_h13_lw0.70_links_seed2"),
-    ("chain", "baseline_n2_hH0.520_seed1", "friction-0.4_n2_hH0.750_seed1"),
-    ("friction", "lw1.00_mu0.20_seed1", "lw1.00_mu0.65_seed1"),
     ("finite-size", "lw0.09_n100_seed1", "lw0.13_n100_seed1"),
-    ("landscape", "internal20_0.25s_lw1.10_seed1", "static_0s_lw1.10_seed1"),
-    ("gravish", "lw1.10_links_seed1", "lw1.00_links_seed1"),
     ("collapse", "lw1.17_gamma4.0_seed1", "lw0.66_gamma4.0_seed1"),
-    ("contacts", "lw1.00_mu0.40_wall0.80_e0.7_seed1", "lw1.00_mu0.80_wall0.80_e0.7_seed1"),
 ]
 FEWEST = {"compaction": 4, "finite-size": 6, "landscape": 3}
 """Seeds of a cell where there are fewer than eight: the fewer, the wider is where a further one would lie."""
@@ -143,7 +139,7 @@ def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, obje
     assert done.returncode == 0, done.stderr
     study = shipped(table).load(quick=False)
     measured = study.measured if isinstance(study, Study) else study.measure
-    return measured(read_run(out)).rows[0]
+    return measured(open_run(out)).rows[0]
 
 
 @pytest.mark.parametrize(("table", "run"), CELLS)
@@ -158,6 +154,7 @@ def test_a_cell_comes_out_again(table: str, run: str, tmp_path: Path) -> None:
     assert known.outside(measured) == {}
 
 
+@pytest.mark.long
 def test_a_long_run_begins_as_the_table_has_it(tmp_path: Path) -> None:
     """Two hundred seconds of shaking are minutes; their first five are not."""
     table, run, begin = "compaction", "lw0.70_mu0.65_seed1", 5.0

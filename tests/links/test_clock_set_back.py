@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 import subprocess
@@ -13,11 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-import dem
-import postprocess
 import smarticles
-import studies
-import templates
 
 SCENE = """\
 schema_version: 1
@@ -82,19 +77,3 @@ def test_results_are_the_same_bits(runs: dict[str, Path]) -> None:
     frames = [sorted(path.name for path in (run / "frames").iterdir()) for run in runs.values()]
     assert frames[0] == frames[1]
     assert len(frames[0]) > 2
-
-
-def test_the_clock_of_the_wall_is_only_written_down() -> None:
-    """Nothing waits for it, measures by it or compares it: it stands in manifests as the time of beginning."""
-    read = set()
-    for package in (dem, postprocess, smarticles, studies, templates):
-        root = Path(str(package.__file__)).parent
-        for path in root.rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.Attribute) and ast.unparse(node) in {
-                    *("time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today"),
-                    *("date.today", "time.localtime", "time.gmtime"),
-                }:
-                    read.add(path.relative_to(root.parent).as_posix())
-                assert not (isinstance(node, ast.Attribute) and node.attr.startswith("st_mtime")), path
-    assert read == {"dem/run/run.py", "templates/slurm/submission.py", "templates/sweep/folder.py"}

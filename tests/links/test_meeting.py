@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine.links.contact.bars import nearest_to_box
+from dem.engine.links.contact.boundaries import nearest_to_circle
 from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS, meet, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest_on_segments
-from dem.engine.links.contact.rims import nearest_to_circle
 
 D, KN = 1.127e-3, 500.0
 
@@ -41,17 +40,12 @@ def test_nearest_points_against_brute_force() -> None:
         assert found == pytest.approx(brute, abs=2e-4)
 
 
-def test_nearest_point_to_a_box_and_to_a_circle_against_brute_force() -> None:
+def test_nearest_point_to_a_circle_against_brute_force() -> None:
     rng = np.random.default_rng(1)
     grid = np.linspace(0, 1, 20001)
-    half = np.array([6e-3, 2.5e-4, 2.5e-4])
     for _ in range(200):
         p = segment(rng)
         points = p[:3] + grid[:, None] * p[3:]
-        away = np.linalg.norm(np.maximum(np.abs(points) - half, 0.0), axis=1)
-        s = nearest_to_box(*p[:3], p, half)
-        here = np.linalg.norm(np.maximum(np.abs(p[:3] + s * p[3:]) - half, 0.0))
-        assert here <= away.min() + 1e-9
         away = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 5e-3, points[:, 2] - 1e-3)
         s = nearest_to_circle(p, 5e-3, 1e-3)
         x = p[:3] + s * p[3:]

@@ -58,14 +58,14 @@ def test_its_means_are_those_of_its_runs(worked: Path) -> None:
     means = many.table(by="amplitude_deg")
     active = means[means["phase type"] == "actuate"]
     assert active["amplitude_deg"].tolist() == [2.0, 8.0, 14.0]
-    heights = [run.table().set_index("phase type").loc["actuate", "com height [m]"] for run in many[2:4]]
+    heights = [smarticles.measure(run).set_index("phase type").loc["actuate", "com height [m]"] for run in many[2:4]]
     assert active["com height [m]"].iloc[1] == pytest.approx(np.mean(heights), rel=1e-12)
     assert active["com height SE [m]"].iloc[1] == pytest.approx(abs(heights[0] - heights[1]) / 2, rel=1e-9)
 
 
 def test_python_of_readme(tmp_path: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert done(f"{code}\nprint(len(many), *done.table()['phase type'])", tmp_path) == "4 deposit shake\n"
+    assert done(f"{code}\nprint(len(many), *smarticles.measure(done)['phase type'])", tmp_path) == "4 deposit shake\n"
 
 
 def test_its_outputs_name_no_place_on_a_machine() -> None:

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine.interface import Saved
 from dem.engine.links.engine import LinksEngine
+from dem.engine.links.stepping import MOST
 from dem.errors import InputError
 from dem.physics.motor import Motors
 
@@ -50,7 +51,7 @@ def test_the_same_twice_and_however_steps_are_grouped() -> None:
 @pytest.mark.parametrize("law", ["halt", "slip"])
 def test_looks_told_one_by_one_or_at_once(law: str) -> None:
     one, other, again = (
-        builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law)), 8, settle=200)
+        builds.pile(builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law)), 8)
         for _ in range(3)
     )
     for made in (one, other):
@@ -67,18 +68,6 @@ def test_looks_told_one_by_one_or_at_once(law: str) -> None:
         made.advance(40)
         assert bits(made) == bits(one)
         assert made.motors.work == one.motors.work
-
-
-def test_the_last_target_holds_until_another_is_told() -> None:
-    one, other = (poured(6) for _ in range(2))
-    for made in (one, other):
-        made.motors.articulate()
-    angles = np.full((1, 6, 2), 1.4)
-    one.motors.actuate(angles, 2e-4)
-    one.advance(40)
-    other.motors.actuate(np.repeat(angles, 10, axis=0), 2e-4)
-    other.advance(40)
-    assert bits(one) == bits(other)
 
 
 def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
@@ -219,17 +208,6 @@ def test_speed_and_acceleration_of_a_prescribed_angle_are_limited() -> None:
     assert np.abs(np.diff(rates)).max() <= most * (1 + 1e-12)
 
 
-def test_an_angle_arrives_and_stays() -> None:
-    made = builds.engine(motor_law=builds.motor_law("halt"), dt=5e-5)
-    made.add(builds.at([0, 0, 5.0]))
-    made.motors.articulate()
-    for _ in range(1500):
-        made.motors.actuate(np.full((1, 1, 2), 0.5), 2e-4)
-        made.advance(4)
-    assert np.allclose(made.state().angles, 0.5, atol=1e-12)
-    assert np.abs(made._world.bodies.rate).max() < 1e-9
-
-
 @pytest.mark.parametrize("speed", [3.0, 10.0])
 def test_nothing_passes_through_unseen(speed: float) -> None:
     made = builds.engine(made_of=builds.particle(aspect=0.0), dt=1e-4)
@@ -245,16 +223,16 @@ def test_nothing_passes_through_unseen(speed: float) -> None:
     assert passed <= seen
 
 
-def test_a_fast_spin_is_seen() -> None:
+def test_a_fast_spin_is_taken_in_short_steps() -> None:
     made = builds.engine(dt=1e-4)
     made.add(builds.at([0, 0, 1.0]))
     made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 60
     made.advance(10)
     # 60 rad/s moves a tip by less than a tenth of a diameter in a step.
-    assert not made.overlaps(0.5 * builds.DIAMETER).deep.any()
+    assert made._world.totals[MOST] == 1.0
     made._world.bodies.momentum[0, 2] = made.particle.boxes.inertia[2] * 6000
     made.advance(10)
-    assert made.overlaps(0.5 * builds.DIAMETER).deep.any()
+    assert made._world.totals[MOST] > 10.0
 
 
 def test_an_easing_motor_is_that_of_the_other_engine() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dem.engine.links.arrays import PLANE
-from dem.engine.links.motion.planar import lagrange_force, lay_out, mobility, momenta, rates, spin_of
+from dem.engine.links.motion.planar import lagrange_force, lay_out, momenta, rates, spin_of
 from dem.engine.links.shape import shape_of
 
 ANGLES = [(math.pi / 2, math.pi / 2), (0.3, 1.2), (-0.2, 0.1), (1.7, 0.0)]
@@ -73,10 +73,3 @@ def test_momenta_of_the_angles_are_derivatives_of_the_energy(angles: tuple[float
         slope = (kinetic(alpha + shift, rate, spin)[0] - kinetic(alpha - shift, rate, spin)[0]) / 2e-5
         assert lagrange_force.py_func(SHAPE, row, k, *spin, *rate) == pytest.approx(slope, rel=1e-5)
     assert np.allclose(rates.py_func(row, normal, *p), rate, rtol=1e-12)
-
-
-def test_mobility_is_the_inverse_of_what_a_free_smarticle_resists_with() -> None:
-    row = row_of(0.4, 1.0)
-    m1, m2, m12 = mobility.py_func(row)
-    p = momenta.py_func(row, 0.0, 2.0, -1.0)
-    assert np.allclose(np.array([[m1, m12], [m12, m2]]) @ p, [2.0, -1.0])

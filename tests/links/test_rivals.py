@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +13,8 @@ from numpy.typing import NDArray
 from synthetic import SyntheticRun, mesh_of, write_ending, write_manifest
 
 from benchmarks.rivals import __main__ as bench
-from benchmarks.rivals import running, settings
 from benchmarks.rivals.given import Given, Outcome
-from benchmarks.rivals.settings import ENGINES, OSCILLATE, SETTINGS, SHAKE, Setting
+from benchmarks.rivals.settings import ENGINES, SETTINGS, SHAKE, Setting
 from dem.body.state import State
 from dem.record.frames import FrameWriter
 from dem.scene.reading import parse_scene
@@ -26,7 +23,6 @@ Array = NDArray[np.float64]
 
 LOOK = 1e-3  # s
 GAMMA, FREQUENCY = 2.0, 30.0
-FLOOR_FRICTION = 0.4
 CHOSEN = {  # settings that are tried: stiff ones of others, which do not sink in
     "links": "standard",
     "lammps": "standard",
@@ -34,7 +30,6 @@ CHOSEN = {  # settings that are tried: stiff ones of others, which do not sink i
     "bullet": "2e-4 s",
     "rapier": "2e-4 s, stiff",
 }
-BOXED = ("mujoco", "bullet", "rapier")
 
 
 def setting_of(engine: str) -> Setting:
@@ -62,7 +57,7 @@ def given_of(
     setting: Setting, pile: Path, folder: Path, *, activity: str, seconds: float, gamma: float = GAMMA
 ) -> Given:
     """What the engine is told: contacts that hardly spring back, as those of the others do not."""
-    scene = running.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, look=LOOK, account=False)
+    scene = bench.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, look=LOOK, account=False)
     scene["contact"] = {"restitution": 0.01}
     scene["container"] = {"radius_m": 0.0234}
     if activity == SHAKE:
@@ -130,56 +125,6 @@ def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path
     assert np.abs(heights[2:] - heights[1] - expected)[flying].max() < 0.05 * expected.max()
 
 
-def push_bullet(world: Any) -> None:
-    world._bullet.resetBaseVelocity(world._bodies[0], [100 * SPEED, 0, 0], [0, 0, 0])
-
-
-def push_rapier(world: Any) -> None:
-    world._world.rigid_bodies[world._handles[0]].linvel = (100 * SPEED, 0.0, 0.0)
-
-
-def push_mujoco(world: Any) -> None:
-    world._data.qvel[0] = SPEED
-
-
-SPEED = 0.1  # m/s
-WORLDS: dict[str, tuple[str, Callable[[Any], None]]] = {
-    "bullet": ("InBullet", push_bullet),
-    "rapier": ("InRapier", push_rapier),
-    "mujoco": ("InMujoco", push_mujoco),
-}
-
-
-@pytest.mark.parametrize("engine", BOXED)
-def test_friction_stops_what_slides_where_coulomb_says(engine: str, tmp_path: Path) -> None:
-    setting = setting_of(engine)
-    given = given_of(setting, flat(tmp_path / "pile", 0.635e-3), tmp_path, activity=SHAKE, seconds=0.1)
-    name, push = WORLDS[engine]
-    world = getattr(importlib.import_module(f"benchmarks.rivals.{ENGINES[engine].module}"), name)(
-        given, **setting.knobs
-    )
-    world.advance(0.05)
-    before = world.links()[0]
-    push(world)
-    world.advance(0.1)
-    slid = (world.links()[0] - before).mean(axis=(0, 1))
-    assert slid[0] == pytest.approx(SPEED**2 / (2 * FLOOR_FRICTION * 9.81), rel=0.05)
-    assert abs(slid[1]) < 1e-4
-
-
-@pytest.mark.parametrize("engine", ["links", "mujoco"])
-def test_barbs_follow_their_schedule(engine: str, tmp_path: Path) -> None:
-    given, found = simulated(engine, tmp_path, activity=OSCILLATE, seconds=0.05)
-    still = np.zeros_like(found.positions[0])
-    states = [State(given.boxes, *pose, still, still) for pose in zip(found.positions, found.frames, strict=True)]
-    angles = np.array([state.angles[0] for state in states[2:]])
-    told = np.array([given.gait.targets(LOOK * k)[0] for k in range(1, len(angles) + 1)])
-    assert np.ptp(told) > math.radians(9)
-    assert np.abs(angles - told).max() < 0.03
-    # Hinges hold, and links keep their lengths: vertices are where both links of a hinge have them.
-    assert all(np.ptp(state.link_positions[0, :, 2]) < 1e-4 for state in states)
-
-
 def test_what_is_missing_is_told_in_one_line_and_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -190,4 +135,3 @@ def test_what_is_missing_is_told_in_one_line_and_left_out(
     told = capsys.readouterr()
     assert told.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
     assert told.err == "nothing was run\n"
-    assert settings.ENGINES["bullet"].needs == "pybullet"

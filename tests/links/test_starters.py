@@ -29,7 +29,7 @@ def test_a_starter_runs(kind: str, tmp_path: Path) -> None:
     file.write_text(starter(kind), encoding="utf-8")
     scene = smarticles.load_scene(file, [f"count={FEW.get(kind, 8)}", *SHORT[kind]])
     done = smarticles.run(scene, tmp_path / "run")
-    assert done.manifest.status == "done"
+    assert done.status.state == "done"
     assert done.frames[-1].count == scene.count
-    assert [phase.type for phase in done.manifest.phases] == [phase.kind for phase in scene.phases]
+    assert [phase.type for phase in done.phases] == [phase.kind for phase in scene.phases]
     assert "WARNING" not in (done.path / "log.txt").read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-from dem.record.manifest import read_run
-from studies.engines.study import Engines
+from dem.record.run import open_run
+from studies.engines import STUDY
 from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep
@@ -27,9 +27,13 @@ def test_a_scene_for_yade_is_run_on_links_and_measured(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "smarticles", "run", str(scene), "--out", str(run), "--engine", "links"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    manifest = read_run(run)
-    assert (manifest.engine, "links" in manifest.versions, "yade" in manifest.versions) == ("links", True, False)
-    report = Engines().analyse([run], tmp_path / "out", note="a test", command="test")
+    manifest = open_run(run).manifest
+    assert (manifest.engine, "links" in manifest.versions, "yade" in manifest.versions) == (
+        "links",
+        True,
+        False,
+    )
+    report = STUDY.analyse([run], tmp_path / "out", note="a test", command="test")
     runs = pd.read_csv(report.files["runs.csv"], comment="#")
     assert runs["engine"].tolist() == ["links"]
     assert 0.0 < runs["static phi second-highest-com [-]"].iloc[0] < 0.5

@@ -13,7 +13,7 @@ from synthetic import SyntheticRun, write_frame
 from synthetic.hooked import HELD, UPPER, weight, write_hooked_run
 from synthetic.shapes import W
 
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.columns import SEED
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
@@ -44,16 +44,16 @@ def write(directory: Path, procedure: str, *, seed: int = 1, top: float = 0.5, *
 
 
 def test_measures_are_those_put_in(tmp_path: Path) -> None:
-    run = read_run(write(tmp_path / "one", STATIC))
+    run = open_run(write(tmp_path / "one", STATIC))
     row: dict[str, Any] = STUDY.measure(run)
     blunt = 1 - WINDOW / BASE / 4
     assert row[PEAK] == pytest.approx(0.5 * blunt, rel=1e-3)
     assert row[RAISED] == pytest.approx(APEX * W, abs=0.005 * W)
     assert row[WORK] == pytest.approx(0.5 * BASE, rel=1e-3)
     # Before the pull one smarticle rests on the hook, and nothing goes through.
-    assert row[BEFORE] == pytest.approx(1 / run.count, rel=1e-5)
+    assert row[BEFORE] == pytest.approx(1 / run.manifest.count, rel=1e-5)
     assert row[THROUGH] == pytest.approx(HELD * 0.5 * blunt, rel=1e-3)
-    assert row[CARRIED] == RISEN / run.count
+    assert row[CARRIED] == RISEN / run.manifest.count
     made = SyntheticRun(seed=1)
     before = made.vertices(DEPTH * (1 - 0.002))
     assert row[BREAK] == pytest.approx(before[:RISEN, :, 2].min(axis=1).mean())

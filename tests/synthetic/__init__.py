@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,9 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from dem.record import manifest as record
+from dem.record.document import Done, Failed, Manifest, Phase
 from dem.record.frame import centreline_mesh
 from dem.record.frames import FrameWriter
-from dem.record.manifest import PhaseRecord, RunManifest, mark_done, mark_failed
 from synthetic.series import write_series
 from synthetic.shapes import RADIUS, T1, T2, W, u_shape
 
@@ -173,7 +172,7 @@ def write_ending(
         directory: the run directory.
         phases: their types.
         spans: start and end of each [s].
-        status: as in `RunManifest`.
+        status: as in `Status`, or unfinished.
         wall: wall and processor time of each phase [s].
     """
     timed = [
@@ -182,15 +181,15 @@ def write_ending(
     ]
     end, total = timed[-1]["end_s"], wall * len(timed)
     if status == "done":
-        mark_done(directory, time=end, steps=1000, wall=total, cpu=total, phases=timed)
+        phases = tuple(Phase(**one) for one in timed)
+        Done(time_s=end, steps=1000, wall_s=total, cpu_s=total, phases=phases).mark(directory)
     elif status != "unfinished":
-        mark_failed(directory, status=status, cause="a smarticle escaped", time=end, checkpoint=None)
+        Failed(status=status, cause="a smarticle escaped", time_s=end).mark(directory)
 
 
 def write_manifest(directory: Path, run: SyntheticRun, **more: Any) -> None:
-    """`run.json`; `more` are further fields of `RunManifest`."""
-    manifest = RunManifest(
-        directory=directory,
+    """`run.json`; `more` are further fields of `Manifest`."""
+    manifest = Manifest(
         name=run.name,
         scene_sha256=f"{round(1000 * run.aspect_ratio):032x}{run.seed:032x}",
         seed=run.seed,
@@ -201,20 +200,20 @@ def write_manifest(directory: Path, run: SyntheticRun, **more: Any) -> None:
         fidelity=run.fidelity,
         count=run.count,
         aspect_ratio=run.aspect_ratio,
-        middle_length=W,
-        barb_length=run.aspect_ratio * W,
-        thickness_normal=T1,
-        thickness_in_plane=T2,
-        smarticle_mass=7850 * run.solid_volume,
-        solid_volume=run.solid_volume,
-        container_radius=RADIUS,
-        sphere_diameter=T1,
+        middle_length_m=W,
+        barb_length_m=run.aspect_ratio * W,
+        thickness_normal_m=T1,
+        thickness_in_plane_m=T2,
+        smarticle_mass_kg=7850 * run.solid_volume,
+        solid_volume_m3=run.solid_volume,
+        container_radius_m=RADIUS,
+        sphere_diameter_m=T1,
         spheres_per_smarticle=22,
-        time_step=1e-5,
-        phases=tuple(PhaseRecord(index=k, type=kind, time_step=1e-5) for k, kind in enumerate(run.phases)),
-        status="unfinished",
+        time_step_s=1e-5,
+        engine="yade",
+        phases=tuple(Phase(index=k, type=kind, time_step_s=1e-5) for k, kind in enumerate(run.phases)),
     )
-    record.write_manifest(replace(manifest, **more))
+    Manifest(**{**dict(manifest), **more}).write(directory / "run.json")
 
 
 def _write_scene(directory: Path, run: SyntheticRun) -> None:
@@ -244,3 +243,10 @@ def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64])
         columns["motor_work_J" if moved else "container_work_J"] = run.work * rows[:, 4]
     columns |= {name: np.full(len(rows), value) for name, value in run.more}
     write_series(directory, columns, seed=run.seed)
+
+
+def write_ended(directory: Path, scene_sha256: str, *, status: str = "done") -> None:
+    """A run of a scene that has ended, as far as sweeps look at it: its manifest and its end."""
+    directory.mkdir(parents=True)
+    write_manifest(directory, SyntheticRun(phases=("deposit",)), scene_sha256=scene_sha256)
+    write_ending(directory, ("deposit",), [(0.0, 1.0)], status=status, wall=2.0)

@@ -32,7 +32,7 @@ def write_strained_run(
     """
     run = SyntheticRun(phases=("strain",), **{"count": 2, **changes})
     write_run(directory, run)
-    write_manifest(directory, run, planar=True, channel_width=channel)
+    write_manifest(directory, run, planar=True, channel_width_m=channel)
     path = directory / "scene.yaml"
     scene = yaml.safe_load(path.read_text())
     scene["phases"][0]["speed_m_per_s"] = SPEED

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from scenes import SMALL
 from scipy.spatial.transform import Rotation
 
-from benchmarks.rivals.overlap import Bars, Swept, deepest, distances
-from benchmarks.rivals.solids import SHAPES, solid_of
-from dem.body.state import State
-from dem.scene.reading import parse_scene
+from benchmarks.rivals.overlap import Bars, distances
 
 Array = NDArray[np.float64]
 PAIR = np.array([[0, 1]])
@@ -48,11 +43,6 @@ def test_bars_that_cross_on_their_edges_are_as_deep_as_their_diagonals(depth: fl
     assert bars([first, second], [0.0, 0.0, high - depth]).depths(PAIR) == pytest.approx([depth], abs=1e-15)
 
 
-def test_parallel_bars_side_by_side_part_by_the_shortest_way() -> None:
-    apart = [1e-3, 2 * HALF[1] - 1e-4, 0.3e-3]
-    assert bars([Rotation.identity()] * 2, apart).depths(PAIR) == pytest.approx([1e-4], abs=1e-15)
-
-
 @given(points=POINTS)
 def test_segments_are_as_far_apart_as_their_nearest_points(points: Array) -> None:
     shares = np.linspace(0, 1, 401)[:, None]
@@ -63,54 +53,3 @@ def test_segments_are_as_far_apart_as_their_nearest_points(points: Array) -> Non
     # A point is at most half a piece of each segment from the nearest one that was tried.
     pieces = (np.linalg.norm(points[1] - points[0]) + np.linalg.norm(points[3] - points[2])) / 800
     assert nearest - pieces - 1e-12 <= found <= nearest + 1e-12
-
-
-def test_segments_that_cross_meet() -> None:
-    ends = [np.array([point]) for point in ([-1.0, 0, 0], [1.0, 0, 0], [0.3, -1, 0.25], [0.3, 1, 0.25])]
-    assert distances(*ends) == pytest.approx([0.25])
-    swept = Swept(np.array([ends[0][0], ends[2][0]]), np.array([ends[1][0], ends[3][0]]), 0.2, np.arange(2))
-    assert deepest(swept) == pytest.approx(0.15)
-
-
-def pair(shape: str, turn: Rotation, place: list[float]) -> float:
-    """How deep two smarticles are in each other, the first in its body frame, the second turned and at a place [m]."""
-    scene = parse_scene({**SMALL, "engine": "links", "fidelity": "standard"}, source="x")
-    places, turns = np.array([[0.0, 0.0, 0.0], place]), np.array([np.eye(3), turn.as_matrix()])
-    still = np.zeros((2, 3))
-    state = State.rigid(scene.particle.boxes, places, turns, still, still)
-    return deepest(solid_of(shape, scene.particle, state.link_positions, state.link_rotations))
-
-
-def nested(apart: float, shape: str) -> float:
-    """The same, the second above the first by a distance along their normal [m]."""
-    return pair(shape, Rotation.identity(), [0.0, 0.0, apart])
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("depth", [-1e-5, 3e-5])
-def test_barbs_end_at_their_tips_whatever_they_are_made_of(shape: str, depth: float) -> None:
-    # Mouth to mouth, so that tips meet tips.
-    boxes = parse_scene(SMALL, source="x").particle.boxes
-    mouth = boxes.vertices[0, 1]
-    found = pair(shape, Rotation.from_euler("z", 180, degrees=True), [0.0, 2 * mouth - depth, 0.0])
-    assert found == pytest.approx(max(0.0, depth), abs=1e-12)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_stack_of_two_is_as_deep_as_it_lacks_in_height(shape: str) -> None:
-    particle = parse_scene({**SMALL, "engine": "links", "fidelity": "standard"}, source="x").particle
-    thick = particle.boxes.thickness_normal if shape == "boxes" else 2 * particle.radius
-    # Links of one smarticle reach into each other at the hinges, by much more.
-    assert nested(thick - 3e-5, shape) == pytest.approx(3e-5, abs=1e-12)
-    assert nested(1.001 * thick, shape) == 0
-
-
-def test_a_smarticle_is_not_in_itself() -> None:
-    scene: Any = parse_scene({**SMALL, "engine": "links"}, source="x")
-    still = np.zeros((1, 3))
-    state = State.rigid(scene.particle.boxes, still, np.eye(3)[None], still, still)
-    for shape in SHAPES:
-        solid = solid_of(shape, scene.particle, state.link_positions, state.link_rotations)
-        pairs = solid.candidates()
-        assert solid.depths(pairs).max() > 1e-4
-        assert deepest(solid) == 0

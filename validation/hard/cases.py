@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
+import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
-from validation.case import Case, Size
 from validation.check import Check
+from validation.engines import engine_access
 from validation.hard import activity, broken, extremes, violence
+
+Size = Literal["short", "long"]
 
 LIGHT_ON_HEAVY = (
     "all smarticles share one mass: a load as heavy that has no inertia of its own shakes off what lies on it; above "
@@ -18,24 +20,35 @@ LIGHT_ON_HEAVY = (
 )
 
 
-def _case(
-    name: str,
-    run: Callable[..., list[Check]],
-    short: Mapping[str, Any] | None = MappingProxyType({}),
-    long: Mapping[str, Any] | None = None,
-    absent: Mapping[str, str] = MappingProxyType({}),
-) -> Case:
-    return Case(name=name, about=inspect.getdoc(run) or "", run=run, short=short, long=long, absent=absent)
+@dataclass(frozen=True)
+class Hard:
+    """A hard case.
+
+    Args:
+        name: unique.
+        run: simulates with the access and in the folder that it is given, and returns checks.
+        short: its size in continuous integration; None: the long form only.
+        long: what differs from that in the long form.
+        absent: why it has no meaning, by engine.
+    """
+
+    name: str
+    run: Callable[..., list[Check]]
+    short: Mapping[str, Any] | None = field(default_factory=dict)
+    long: Mapping[str, Any] = field(default_factory=dict)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
 
 def checked(name: str, engine: str, size: Size, out: Path) -> tuple[list[Check], float]:
-    """The checks of a case, and the wall time [s] that they took; to be called in a worker process by its name."""
-    return CASES[name].checks(engine, size, out)
+    """Return the checks of a case and the wall time [s] that they took; for a worker process."""
+    begun, one = time.monotonic(), CASES[name]
+    options = {**(one.short or {}), **(one.long if size == "long" else {})}
+    return one.run(engine_access(engine), out, **options), time.monotonic() - begun
 
 
-def _cases() -> list[Case]:
+def _cases() -> list[Hard]:
     cases = [
-        _case(
+        Hard(
             f"drop at 10 m/s, {'articulated' if hinged else 'welded'}",
             violence.drop,
             {"articulated": hinged, "time": 0.1},
@@ -44,20 +57,20 @@ def _cases() -> list[Case]:
         for hinged in (False, True)
     ]
     cases += [
-        _case("articulated smarticles land", violence.landing, {"time": 0.2}),
-        _case("tip through the floor", violence.tip, {"speed": 2.0}),
-        _case("deep overlap", violence.overlap, {"time": 0.1}, {"time": 0.5}),
-        _case("deep overlap, thrown out", violence.thrown_by_overlap, {"time": 0.1}),
-        _case("same place", violence.same_place, {"time": 0.02}),
-        _case(
+        Hard("articulated smarticles land", violence.landing, {"time": 0.2}),
+        Hard("tip through the floor", violence.tip, {"speed": 2.0}),
+        Hard("deep overlap", violence.overlap, {"time": 0.1}, {"time": 0.5}),
+        Hard("deep overlap, thrown out", violence.thrown_by_overlap, {"time": 0.1}),
+        Hard("same place", violence.same_place, {"time": 0.02}),
+        Hard(
             "shaken at Γ = 10",
             violence.shaken,
             {"count": 6, "seconds": 0.2, "rest": 0.8},
             {"count": 100, "seconds": 2.0, "rest": 1.0},
         ),
-        _case("thrown out of the container", violence.thrown_out, {"count": 6, "seconds": 0.5}, {"count": 60}),
+        Hard("thrown out of the container", violence.thrown_out, {"count": 6, "seconds": 0.5}, {"count": 60}),
         *(
-            _case(
+            Hard(
                 f"mass ratio 1e4, {'heavy on light' if above else 'light on heavy'}, contacts of {stiffness:g} N/m",
                 violence.mass_ratio,
                 {"heavy_above": above, "stiffness": stiffness, "time": 0.1},
@@ -68,20 +81,20 @@ def _cases() -> list[Case]:
         ),
     ]
     cases += [
-        _case(f"l/w = {ratio:g}", extremes.barbs, {"ratio": ratio, "count": 6}, {"count": 100})
+        Hard(f"l/w = {ratio:g}", extremes.barbs, {"ratio": ratio, "count": 6}, {"count": 100})
         for ratio in (0.0, 0.05, 2.0)
     ]
     cases += [
-        _case("rods that may roll", extremes.rods, {"count": 40, "radius": 0.0117}),
-        _case("N = 1", extremes.one),
-        _case("checkpoint at the last step", extremes.checkpoint_last),
-        _case("N = 2000", extremes.many, None, {"count": 2000, "per_layer": 500, "radius": 0.15}),
+        Hard("rods that may roll", extremes.rods, {"count": 40, "radius": 0.0117}),
+        Hard("N = 1", extremes.one),
+        Hard("checkpoint at the last step", extremes.checkpoint_last),
+        Hard("N = 2000", extremes.many, None, {"count": 2000, "per_layer": 500, "radius": 0.15}),
         *(
-            _case(f"friction {value:g}", extremes.friction, {"value": value, "count": 6}, {"count": 100})
+            Hard(f"friction {value:g}", extremes.friction, {"value": value, "count": 6}, {"count": 100})
             for value in (0.0, 5.0)
         ),
         *(
-            _case(
+            Hard(
                 f"time step {share:g} of the stable one",
                 extremes.step_below,
                 {"share": share, "count": 4},
@@ -90,28 +103,26 @@ def _cases() -> list[Case]:
             for share in (0.5, 0.9)
         ),
         *(
-            _case(f"time step {share:g} of the stable one", extremes.step_above, {"share": share})
+            Hard(f"time step {share:g} of the stable one", extremes.step_above, {"share": share})
             for share in (1.1, 2.0)
         ),
     ]
     cases += [
-        _case("τ_max = 0", activity.no_torque),
+        Hard("τ_max = 0", activity.no_torque),
         *(
-            _case(f"τ_max / 1000, {law}", activity.weak_motors, {"law": law, "count": 6}, {"count": 40})
+            Hard(f"τ_max / 1000, {law}", activity.weak_motors, {"law": law, "count": 6}, {"count": 40})
             for law in ("halt", "stall", "slip")
         ),
-        _case("τ_max · 100", activity.strong_motors, {"count": 6}, {"count": 40}),
-        _case("no room to straighten", activity.no_room, {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5}),
-        _case(
-            "container of radius 0.7 w", activity.jammed, {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5}
-        ),
-        _case(
+        Hard("τ_max · 100", activity.strong_motors, {"count": 6}, {"count": 40}),
+        Hard("no room to straighten", activity.no_room, {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5}),
+        Hard("container of radius 0.7 w", activity.jammed, {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5}),
+        Hard(
             "hook pulled out of a pile",
             activity.hook,
             {"count": 12, "distance": 0.02, "speed": 0.1, "change": 0.3, "rest": 0.1},
             {"count": 60, "distance": 0.05, "speed": 0.05, "change": 1.0, "rest": 0.5},
         ),
-        _case("internal oscillation", activity.oscillation, {"seconds": 3.0}, {"seconds": 60.0}),
+        Hard("internal oscillation", activity.oscillation, {"seconds": 3.0}, {"seconds": 60.0}),
     ]
     for what in broken.SPOILT:
         for hinged in (False, True):
@@ -123,30 +134,30 @@ def _cases() -> list[Case]:
             steps = 2 if hinged and place else 3 if what == "overlap" else 0
             size = {"what": what, "articulated": hinged, "steps": steps}
             absent = {"links": "hinges cannot part, there is none to tear"} if what == "hinge" else {}
-            cases.append(_case(f"spoilt: {what}, {kind}", broken.spoil, size, absent=absent))
+            cases.append(Hard(f"spoilt: {what}, {kind}", broken.spoil, size, absent=absent))
             if what in ("velocity", "spin"):
-                cases.append(_case(f"spoilt: {what}, {kind}, some steps before", broken.spoil, {**size, "steps": 5}))
+                cases.append(Hard(f"spoilt: {what}, {kind}, some steps before", broken.spoil, {**size, "steps": 5}))
     return [
         *cases,
-        _case("spoilt: pile that is heated", broken.heated, {"count": 4, "share": 0.3}),
-        _case("spoilt: pile that is kicked", broken.kicked, {"count": 4, "speed": 0.3}),
-        _case("spoilt: contacts too soft", broken.soft, {"stiffness": 0.5}),
-        _case(
+        Hard("spoilt: pile that is heated", broken.heated, {"count": 4, "share": 0.3}),
+        Hard("spoilt: pile that is kicked", broken.kicked, {"count": 4, "speed": 0.3}),
+        Hard("spoilt: contacts too soft", broken.soft, {"stiffness": 0.5}),
+        Hard(
             "spoilt: time step 2 of the stable one",
             broken.wrong_step,
             {"factor": 2.0, "count": 6, "seconds": 0.3},
             {"count": 40},
         ),
         # Welded smarticles chatter and never settle, which takes as long as the pour may wait.
-        _case(
+        Hard(
             "spoilt: time step 4 of the stable one",
             broken.wrong_step,
             None,
             {"factor": 4.0, "count": 6, "seconds": 0.3},
         ),
-        _case("spoilt: late in a run", broken.late),
+        Hard("spoilt: late in a run", broken.late),
         *(
-            _case(
+            Hard(
                 f"cost of the watchdog, {activity}, {fidelity}",
                 broken.cost,
                 None,
@@ -163,4 +174,4 @@ def _cases() -> list[Case]:
     ]
 
 
-CASES: Mapping[str, Case] = {case.name: case for case in _cases()}
+CASES: Mapping[str, Hard] = {case.name: case for case in _cases()}

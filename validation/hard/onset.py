@@ -9,12 +9,9 @@ how high smarticles begin. A scene and seed that is in the table already is skip
 from __future__ import annotations
 
 import math
-import multiprocessing
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +22,6 @@ from dem.body.placement import Poses, place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
-from dem.run.run import _git_revision
 from dem.scene.scene import Scene
 from validation.bench import lying, scene_of, watched
 from validation.engines import EngineAccess, engine_access
@@ -207,26 +203,3 @@ def onsets(runs: pd.DataFrame) -> pd.DataFrame:
             row[f"{what} from, most [1]"] = max(first) if told else math.nan
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def run_onset(out: Path, engine: str, seeds: Sequence[int]) -> None:
-    """Run what is not in the table of runs yet, and add it there.
-
-    Args:
-        out: folder of the table.
-        engine: its name.
-        seeds: of every scene.
-    """
-    path, commit = out / "onset_runs.csv", _git_revision()
-    runs = pd.read_csv(path) if path.exists() else pd.DataFrame()
-    for seed in seeds:
-        for name in SETTINGS:
-            if len(runs) and ((runs["scene"] == name) & (runs["seed"] == seed)).any():
-                continue
-            with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-                rows = pd.DataFrame(pool.submit(climb, engine, name, seed).result()).assign(commit=commit)
-            runs = pd.concat([runs, rows], ignore_index=True)
-            runs.to_csv(path, index=False, float_format="%.4g")
-            table = onsets(runs)
-            chatter, blow_up = table.loc[table["scene"] == name, [f"{w} from, least [1]" for w in WHAT]].iloc[0]
-            print(f"seed {seed}: {name}: chatters from {chatter:g}, blows up from {blow_up:g}", flush=True)

@@ -126,12 +126,7 @@ class Watched:
         return during
 
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
-        """What holds of every run that ended right.
-
-        Args:
-            rest: speed [m/s] below which it ends; None: it does not come to rest.
-            depth: largest overlap of a contact at all looks [d].
-        """
+        """What holds of every run that ended right."""
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
             return checks
@@ -167,15 +162,7 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene into a run directory.
-
-    Args:
-        data: the scene.
-        out: the run directory.
-        note: whether to note how near smarticles come to the watchdog's limits, which costs as much as the watchdog.
-        steps: time step of each phase [s]; by hand it is not refused.
-        spoil: done to the engine before each record.
-    """
+    """Run a scene into a run directory."""
     built: list[tuple[Timing, Noting | None]] = []
 
     def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:

@@ -13,16 +13,7 @@ REST = {"type": "relax", "duration_s": 0.3}  # for what was moved just before to
 def scene(
     access: EngineAccess, *phases: dict[str, Any], count: int = 6, per_layer: int = 6, seed: int = 1, **keys: Any
 ) -> dict[str, Any]:
-    """Plain data of a scene, draft unless said otherwise.
-
-    Args:
-        access: on the engine.
-        phases: after the pour.
-        count: smarticles.
-        per_layer: of the pour.
-        seed: of everything random.
-        keys: further keys of the scene.
-    """
+    """Plain data of a scene, draft unless said otherwise."""
     return {
         "schema_version": 1,
         "engine": access.name,

@@ -9,9 +9,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from validation.case import Size
 from validation.conftest import Tables
-from validation.hard.cases import CASES, checked
+from validation.hard.cases import CASES, Size, checked
 from validation.hard.kills import SAME, kills
 from validation.hard.onset import SETTINGS, climb, onsets
 
@@ -60,7 +59,7 @@ def test_hard_case(
 @pytest.mark.parametrize(("seed", "number"), [(1, 17), (2, 17), (3, 16)])
 def test_kills_keep_every_bit(tables: Tables, tmp_path: Path, seed: int, number: int, engine: str) -> None:
     tables.skip_recorded(engine, "kills", seed=seed)
-    rows = kills(engine, 1, number, tmp_path, seed=seed)
+    rows = kills(engine, number, tmp_path, seed=seed)
     tables.write(engine, "kills", rows, ["seed"])
     assert [row for row in rows if row[SAME] != "yes"] == []
 

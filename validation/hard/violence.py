@@ -52,16 +52,22 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
 
 
 def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
-    """A barb's tip hits the floor so fast that a sphere's centre passes it, from where on YADE's floor pushes less."""
-    _, engine, recorder = watched(scene(access, count=1), out)
+    """A barb's tip hits the floor so fast that a sphere's centre passes it, from where on YADE's floor pushes less.
+
+    On links the barrier holds it.
+    """
+    described, engine, recorder = watched(scene(access, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
     access.push(engine, 0, velocity=(0, 0, -speed))
-    said, first = None, energy(engine)
+    said, first, lowest = None, energy(engine), math.inf
     while not said and engine.time < 0.05:
         engine.advance(2)
+        lowest = min(lowest, float(engine.state().spheres(described.particle)[..., 2].min()))
         said = look(engine, recorder)
+    solid = [above("lowest point of an axis [m]", lowest, 0.0)]
+    left = [says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m")]
     return [
-        says(said, "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"),
+        *(solid if access.name == "links" else left),
         below("energy before over that of the start [1]", energy(engine) / first, 1.001),
     ]
 
@@ -103,8 +109,10 @@ def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
         energies.append(energy(engine))
     spheres = engine.state().spheres(described.particle)
     apart = np.linalg.norm(spheres[0][:, None] - spheres[1][None], axis=-1).min()
+    # The barrier of links bears an overlap that chains of spheres may slip through.
+    seen = [] if access.name == "links" else [says(said, "2 smarticle(s) (0, 1): contacts more", "through each other")]
     return [
-        says(said, "2 smarticle(s) (0, 1): contacts more than", "pass through each other"),
+        *seen,
         below("highest energy over that of the start [1]", max(energies) / energies[0], 1.01),
         below("energy at the end over that of the start [1]", energies[-1] / energies[0], 0.9),
         above("distance of the spheres at the end [d]", apart / d, 0.9),
@@ -121,9 +129,7 @@ def thrown_by_overlap(access: EngineAccess, out: Path, *, time: float) -> list[C
     while not said and engine.time < time:
         engine.advance(round(1e-3 / engine.time_step))
         said = look(engine, recorder)
-    # What flies down first meets a floor that gives way, where links have fewer and larger contacts than chains.
-    expected = {"yade": "(1): thrown out over the wall of", "links": "(0): left through the wall or the floor"}
-    return [says(said, "1 smarticle(s) " + expected[access.name])]
+    return [says(said, "1 smarticle(s) (1): thrown out over the wall of")]
 
 
 def same_place(access: EngineAccess, out: Path, *, time: float) -> list[Check]:

@@ -10,8 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from dem.physics.contact import ContactLaw
 from validation.bench import Array, G, add, ball_law, law_of, scene
+from validation.case import COARSE, LEAPFROG, MIDDLE, ladder, on_both
 from validation.engines import BALL_MASS, BALL_RADIUS, EngineAccess
 from validation.known.theory import bounced
+
+LATE = "YADE's dashpot takes the velocity of half a step before, and begins with a jump: first order"
+LAGS = "the dashpot takes the velocity of half a step before, and begins with a jump: first order"
+BALL, WAY = "a ball bounces once under gravity", 5.12e-3 * 0.2  # m
 
 # The error varies with where in a step a contact begins and where it ends. Starts are spread over some steps, and
 # stiffness by a tenth so that the one does not fix the other, both evenly (a plastic-number sequence).
@@ -38,14 +43,7 @@ def _roots(squares: Array) -> list[float]:
 
 
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Error of the height of a ball after one bounce, root mean square over places of the onset in a step [m].
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        restitution: [1].
-        phases: how many such places.
-    """
+    """Error of the height of a ball after one bounce, root mean square over places of the onset in a step [m]."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _stiffer(ball_law(restitution=restitution), number), _gap(number)
@@ -91,14 +89,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Error of where two smarticles are after they collided once [m].
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        smooth: in one plane, elastic and without friction; otherwise tilted, with the law of the scene.
-        phases: places of the onset in a step.
-    """
+    """Error of where two smarticles are after they collided once [m]."""
     law = law_of(scene(access))
     if access.name == "links":
         # The tangential dashpot has no limit until its spring has reached Coulomb's, which takes as long here as one of
@@ -115,3 +106,49 @@ def collision_errors(
             away = _collided(access, one, dt, gap, tilted=not smooth) - reference
             squares[k] += float((away**2).sum(axis=1).mean())
     return _roots(squares / phases)
+
+
+ladder(
+    "bounce, e = 0.5",
+    BALL,
+    "height after 5 ms",
+    "m",
+    WAY,
+    COARSE,
+    {"yade": (1, LATE), "links": (1, LAGS)},
+    phases=16,
+    restitution=0.5,
+)(bounce_errors)
+ladder(
+    "bounce, elastic",
+    BALL,
+    "height after 5 ms",
+    "m",
+    WAY,
+    COARSE,
+    on_both(2, f"{LEAPFROG}, and the force begins from zero"),
+    phases=16,
+    restitution=1.0,
+)(bounce_errors)
+ladder(
+    "collision, law of the scene",
+    "two tilted smarticles collide once",
+    "places of all spheres after 5 ms",
+    "m",
+    WAY,
+    COARSE,
+    {"yade": (1, f"{LATE}; so are rotations"), "links": (1, LAGS)},
+    phases=8,
+    smooth=False,
+)(collision_errors)
+ladder(
+    "collision, elastic and smooth",
+    "two smarticles in one plane collide once",
+    "places of all spheres after 5 ms",
+    "m",
+    WAY,
+    MIDDLE,
+    on_both(2, f"{LEAPFROG}, also of turns about the normal, and the force begins from zero"),
+    phases=8,
+    smooth=True,
+)(collision_errors)

@@ -14,10 +14,14 @@ from dem.physics.contact import restitution_of, typical_effective_mass
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from validation.bench import Array, G, add, law_of, scene
+from validation.case import case
 from validation.check import Answer
 from validation.engines import EngineAccess
 from validation.known.floor import lowest
 from validation.known.theory import falling_on_springs
+
+ROW = "a smarticle meets the floor with a whole row of spheres"
+SPRINGS = "n springs and dashpots side by side, that never pull; integrated with the tilt"
 
 SPEED = 0.1  # m/s
 
@@ -131,34 +135,18 @@ def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: f
     )
 
 
+@case("flat impact, spheres of draft", ROW, SPRINGS, rows=1, pitch=1.3)
+@case("flat impact, spheres of reference", ROW, SPRINGS, rows=2, pitch=1.0)
 def flat_checks(access: EngineAccess, *, rows: int, pitch: float) -> list[Answer]:
-    """A flat impact against springs and dashpots side by side."""
     found = flat_impact(access, rows=rows, pitch=pitch)
     reason = "contact begins within a step, 1/400 of an undamped one; the sum over n contacts is that of one"
     return [
-        Answer(
-            quantity="restitution, root of the energies",
-            unit="1",
-            theory=found.theory,
-            measured=found.measured,
-            tolerance=0.02,
-            reason=reason,
+        Answer("restitution, root of the energies [1]", found.theory, found.measured, 0.02, reason=reason),
+        Answer("time in contact [s]", found.theory_contact, found.measured_contact, 0.05).because(
+            "the last of the contacts ends slowly, as its force comes down to zero"
         ),
-        Answer(
-            quantity="time in contact",
-            unit="s",
-            theory=found.theory_contact,
-            measured=found.measured_contact,
-            tolerance=0.05,
-            reason="the last of the contacts ends slowly, as its force comes down to zero",
-        ),
-        Answer(
-            quantity="depth under its own weight",
-            unit="m",
-            theory=found.theory_sunk,
-            measured=found.measured_sunk,
-            tolerance=1e-3,
-            reason="what is left of the vibration after 40 periods",
+        Answer("depth under its own weight [m]", found.theory_sunk, found.measured_sunk, 1e-3).because(
+            "what is left of the vibration after 40 periods"
         ),
     ]
 

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
 
+from dem.body.forces import FLOOR, ContactForces
 from dem.body.particle import Particle
 from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
-from validation.bench import Array, G, add, ball_law, law_of, scene
+from validation.bench import FLAT, Array, G, add, ball_law, law_of, scene
+from validation.case import COARSE, LEAPFROG, case, ladder, on_both
 from validation.check import Answer
 from validation.engines import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
 
@@ -39,15 +42,7 @@ def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: fl
 
 
 def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
-    """A round body thrown along the floor: friction slows it and makes it spin until it rolls.
-
-    Args:
-        access: on the engine.
-        particle: a ball, or a bar that lies across its way.
-        law: with friction.
-        speed: at t = 0, without spin [m/s].
-        dt: time step [s].
-    """
+    """A round body thrown along the floor: friction slows it and makes it spin until it rolls."""
     friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
     lever = particle.radius - access.arm_share * mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
     share = inertia / (mass * lever**2)
@@ -68,55 +63,47 @@ def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: fl
     late = time > 1.3 * begins
     return [
         Answer(
-            quantity="deceleration while it slides",
-            unit="m/s²",
-            theory=friction * G,
-            measured=-float(np.polyfit(time[sliding], speeds_[sliding], 1)[0]),
-            tolerance=1e-4,
-            reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
+            "deceleration while it slides [m/s²]",
+            friction * G,
+            -float(np.polyfit(time[sliding], speeds_[sliding], 1)[0]),
+            1e-4,
+        ).because("Coulomb's force from the first step on: rounding, and what the winding of the spring takes"),
+        Answer("time when rolling begins [s]", begins, -float(line[1] / line[0]), 1e-4).because(
+            "Coulomb's force from the first step on: rounding, and what the winding of the spring takes"
         ),
-        Answer(
-            quantity="time when rolling begins",
-            unit="s",
-            theory=begins,
-            measured=-float(line[1] / line[0]),
-            tolerance=1e-4,
-            reason="Coulomb's force from the first step on: rounding, and what the winding of the spring takes",
+        Answer("speed when it rolls [m/s]", rolling, float(speeds_[late].mean()), 1e-4).because(
+            "the tangential spring unwinds where sliding ends, and dies away"
         ),
-        Answer(
-            quantity="speed when it rolls",
-            unit="m/s",
-            theory=rolling,
-            measured=float(speeds_[late].mean()),
-            tolerance=1e-4,
-            reason="the tangential spring unwinds where sliding ends, and dies away",
-        ),
-        Answer(
-            quantity="slip when it rolls",
-            unit="m/s",
-            theory=0.0,
-            measured=float(np.abs(slip[late]).max()),
-            tolerance=1e-4,
-            reason="the tangential spring unwinds where sliding ends, and dies away",
-            scale=speed,
+        Answer("slip when it rolls [m/s]", 0.0, float(np.abs(slip[late]).max()), 1e-4, scale=speed).because(
+            "the tangential spring unwinds where sliding ends, and dies away"
         ),
     ]
 
 
+@case(
+    "sliding to rolling, ball",
+    "a ball thrown along the floor",
+    "v₀/(1 + I/mr²), 5/7 v₀ for a solid one, after that much slip over μg; MFiX DEM-04",
+)
 def ball_rolls(access: EngineAccess) -> list[Answer]:
-    """A solid ball: 5/7 of its speed."""
     law = ball_law(restitution=0.5, friction=FRICTION)
     return roll(access, access.roller(), law, speed=0.3, dt=math.pi * math.sqrt(BALL_MASS / STIFFNESS) / 100)
 
 
+@case("sliding to rolling, bar", "a bar of spheres thrown across itself, with its box's inertia", "v₀/(1 + I/mr²)")
 def bar_rolls(access: EngineAccess) -> list[Answer]:
-    """A bar of many spheres, with the inertia of its box."""
     one = scene(access, fidelity="standard", smarticle={"aspect_ratio": 0})
     return roll(access, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
+@case(
+    "sliding to a stop",
+    "a U lying flat is pushed along its axis of symmetry",
+    "Coulomb: μg, v²/2μg",
+    aspect_ratio=0.7,
+    friction=0.4,
+)
 def slide(access: EngineAccess, *, aspect_ratio: float, friction: float) -> list[Answer]:
-    """A smarticle lying flat is pushed along the floor, along its axis of symmetry, and stops."""
     speed = 0.3
     one = scene(access, smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
     engine = resting(access, one.particle, law_of(one), dt=time_step(one), speed=speed)
@@ -132,52 +119,38 @@ def slide(access: EngineAccess, *, aspect_ratio: float, friction: float) -> list
     reason = "friction at the height of the floor makes it rock on its stiff contacts; seen every 2 ms"
     return [
         Answer(
-            quantity="deceleration",
-            unit="m/s²",
-            theory=friction * G,
-            measured=-float(np.polyfit(np.array(times)[sliding], np.array(speeds)[sliding], 1)[0]),
-            tolerance=5e-3,
-            reason=reason,
+            "deceleration [m/s²]",
+            friction * G,
+            -float(np.polyfit(np.array(times)[sliding], np.array(speeds)[sliding], 1)[0]),
+            5e-3,
+        ).because(reason),
+        Answer("way until it stops [m]", speed**2 / (2 * friction * G), float(ways[-1] - ways[0]), 5e-3).because(
+            reason
         ),
-        Answer(
-            quantity="way until it stops",
-            unit="m",
-            theory=speed**2 / (2 * friction * G),
-            measured=float(ways[-1] - ways[0]),
-            tolerance=5e-3,
-            reason=reason,
+        Answer("speed after it stopped [m/s]", 0.0, float(speeds[-1]), 3e-4, scale=speed).because(
+            "it sticks; the tangential springs' vibration dies away"
         ),
-        Answer(
-            quantity="speed after it stopped",
-            unit="m/s",
-            theory=0.0,
-            measured=float(speeds[-1]),
-            tolerance=3e-4,
-            reason="it sticks; the tangential springs' vibration dies away",
-            scale=speed,
-        ),
-        Answer(
-            quantity="way across",
-            unit="m",
-            theory=0.0,
-            measured=float(state.positions[0, 0]),
-            tolerance=1e-7,
-            reason="symmetry, but for rounding",
-            scale=speed**2 / (2 * friction * G),
+        Answer("way across [m]", 0.0, float(state.positions[0, 0]), 1e-7, scale=speed**2 / (2 * friction * G)).because(
+            "symmetry, but for rounding"
         ),
     ]
 
 
+@ladder(
+    "sliding to rolling",
+    "a ball thrown along the floor, without a tangential dashpot",
+    "way after 0.1 s",
+    "m",
+    0.1,
+    COARSE,
+    on_both(2, "the force of friction does not jump where sliding ends: second order"),
+    phases=2,
+)
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
     """Error of the way of a ball that slides and then rolls, after 0.1 s [m], against a four times finer step.
 
     Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
     acts only at steps that resolve the winding, a few µs.
-
-    Args:
-        access: on the engine.
-        steps: [s].
-        phases: speeds, so that rolling begins anywhere within a step.
     """
     law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
     slowed = FRICTION * G
@@ -214,38 +187,19 @@ def two_high(
     return engine
 
 
+@case("two balls stacked", "come to rest on the floor; MFiX DEM-03", "overlaps 2mg/k and mg/k")
 def stack_at_rest(access: EngineAccess) -> list[Answer]:
-    """Two balls on each other come to rest: the lower contact bears both, the upper one the upper ball."""
     engine = two_high(access, ball_law(restitution=0.2), dt=2e-5, sunk=False)
     engine.advance(5000)
     low, high = engine.state().positions[:, 2]
     reason = "what is left of the vibration after 0.1 s, 40 periods of it"
     weight = BALL_MASS * G
     return [
-        Answer(
-            quantity="overlap with the floor",
-            unit="m",
-            theory=2 * weight / STIFFNESS,
-            measured=float(BALL_RADIUS - low),
-            tolerance=1e-6,
-            reason=reason,
+        Answer("overlap with the floor [m]", 2 * weight / STIFFNESS, float(BALL_RADIUS - low), 1e-6, reason=reason),
+        Answer("overlap of the two [m]", weight / STIFFNESS, float(2 * BALL_RADIUS - (high - low)), 1e-6).because(
+            reason
         ),
-        Answer(
-            quantity="overlap of the two",
-            unit="m",
-            theory=weight / STIFFNESS,
-            measured=float(2 * BALL_RADIUS - (high - low)),
-            tolerance=1e-6,
-            reason=reason,
-        ),
-        Answer(
-            quantity="force on the floor",
-            unit="N",
-            theory=-2 * weight,
-            measured=float(access.floor_force(engine)[2]),
-            tolerance=1e-6,
-            reason=reason,
-        ),
+        Answer("force on the floor [N]", -2 * weight, float(access.floor_force(engine)[2]), 1e-6, reason=reason),
     ]
 
 
@@ -268,7 +222,88 @@ def stack_motion(access: EngineAccess, dt: float, *, time: float) -> tuple[Array
     return engine.state().positions[:, 2] - rest, modes @ (share * np.sin(frequencies * time) / frequencies)
 
 
+@ladder(
+    "stack, elastic",
+    "two balls on each other vibrate without parting",
+    "heights after 20 ms",
+    "m",
+    2e-3 * 0.36e-3,
+    COARSE,
+    on_both(2, LEAPFROG),
+)
 def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the heights of two elastic balls that vibrate on each other, after 20 ms [m]."""
     found = [stack_motion(access, dt, time=0.02048) for dt in steps]
     return [float(np.linalg.norm(one - exact)) for one, exact in found]
+
+
+SETTLED = 0.4  # s
+REASON = "what is left of the vibration after 0.4 s"
+
+
+def _level(found: ContactForces, level: int, each: int) -> Array:
+    """(contacts, 3) forces on a level of `each` bodies from below [N]."""
+    bodies = found.smarticles // each
+    if level:
+        below = (bodies == (level - 1, level)).all(axis=1)
+        upwards: Array = -found.forces[below]
+    else:
+        upwards = found.forces[found.fixtures == FLOOR]
+    return upwards
+
+
+def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) -> list[Answer]:
+    """What the contacts below each level carry; of `contacts` alike each its share."""
+    found = engine.contact_forces()
+    weight = each * engine.particle.boxes.mass * G
+    answers = []
+    for level in range(levels):
+        forces = _level(found, level, each)
+        upwards, across = forces[:, 2].tolist(), float(np.linalg.norm(forces[:, :2].sum(axis=0)))
+        bears, below = (levels - level) * weight, f"level {level - 1}" if level else "the floor"
+        told = [("sum of the forces", sum(upwards), bears)]
+        if level and contacts is not None:
+            told += [("least force of a contact", min(upwards, default=math.nan), bears / contacts)]
+            told += [("largest force of a contact", max(upwards, default=math.nan), bears / contacts)]
+        answers += [
+            Answer(f"{what}, level {level} on {below} [N]", theory, measured, 1e-5, reason=REASON)
+            for what, measured, theory in told
+        ]
+        answers.append(
+            Answer(f"sum across, level {level} on {below} [N]", 0.0, across, 1e-5, scale=bears).because(
+                f"nothing pulls sideways; {REASON}"
+            )
+        )
+    return answers
+
+
+@case(
+    "crossed bars stacked",
+    "five pairs of bars, each pair across the one below, come to rest",
+    "statics and symmetry: a contact bears a quarter of the weight above it",
+)
+def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
+    one = scene(access, fidelity="standard", smarticle={"aspect_ratio": 0})
+    engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
+    radius = one.particle.radius
+    apart = 2 * radius * round(one.particle.boxes.middle_length / 6 / radius)
+    for level in range(levels):
+        turn = Rotation.from_euler("z", 90 * (level % 2), degrees=True)
+        for side in (-1, 1):
+            add(engine, (*turn.apply([0.0, side * apart, 0.0])[:2], (2 * level + 1) * radius), turn)
+    engine.advance(round(SETTLED / engine.time_step))
+    return _answers(engine, levels, 2, contacts=4)
+
+
+@case(
+    "flat smarticles stacked",
+    "four smarticles, link on link, come to rest",
+    "statics: contacts bear the weight above them",
+)
+def flat_smarticles(access: EngineAccess, *, levels: int = 4) -> list[Answer]:
+    one = scene(access, fidelity="standard")
+    engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
+    high = float(np.ptp(one.particle.centres[:, 2])) + 2 * one.particle.radius
+    for level in range(levels):
+        add(engine, (0.0, 0.0, (level + 0.5) * high), FLAT)
+    engine.advance(round(SETTLED / engine.time_step))
+    return _answers(engine, levels, 1, contacts=None)

@@ -9,9 +9,13 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from validation.bench import Array, G, add, body_rotations, law_of, scene
+from validation.case import COARSE, MIDDLE, case, ladder, on_both
 from validation.check import Answer
 from validation.engines import EngineAccess
 from validation.known.theory import free_rotation
+
+MIDPOINT = "the implicit midpoint rule: second order"
+TURNS = "YADE's exactAsphericalRot takes the frame of the step's beginning for its middle: first order"
 
 START = Rotation.from_rotvec([0.4, 0.2, -0.7])
 SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose three moments differ
@@ -20,13 +24,6 @@ ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly ab
 
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
     """A smarticle thrown upwards in free fall.
-
-    Args:
-        access: on the engine.
-        dt: time step [s].
-        time: of flight [s].
-        throw: speed upwards at t = 0 [m/s].
-        centred: whether its first velocity is that of half a step before t = 0, as the scheme takes it.
 
     Returns:
         (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
@@ -42,62 +39,36 @@ def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred:
     return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
 
+@case("free fall", "a tilted smarticle thrown upwards", "z = v₀t − gt²/2; leapfrog is exact")
 def free_fall(access: EngineAccess) -> list[Answer]:
-    """The parabola."""
     dt, time, throw = 5e-5, 0.1, 0.3
     way, velocity, turned = fall(access, dt, time=time, throw=throw, centred=True)
     reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
     return [
+        Answer("rise after 0.1 s [m]", throw * time - G * time**2 / 2, float(way[2]), 1e-11, reason=reason),
+        Answer("velocity half a step before [m/s]", throw - G * (time - dt / 2), velocity, 1e-11, reason=reason),
         Answer(
-            quantity="rise after 0.1 s",
-            unit="m",
-            theory=throw * time - G * time**2 / 2,
-            measured=float(way[2]),
-            tolerance=1e-11,
-            reason=reason,
-        ),
-        Answer(
-            quantity="velocity half a step before",
-            unit="m/s",
-            theory=throw - G * (time - dt / 2),
-            measured=velocity,
-            tolerance=1e-11,
-            reason=reason,
-        ),
-        Answer(
-            quantity="way across",
-            unit="m",
-            theory=0.0,
-            measured=float(np.hypot(*way[:2])),
-            tolerance=1e-11,
-            reason="nothing acts across",
-            scale=abs(throw * time - G * time**2 / 2),
-        ),
-        Answer(
-            quantity="turn",
-            unit="rad",
-            theory=0.0,
-            measured=turned,
-            tolerance=1e-11,
-            reason="nothing turns it",
-            scale=1.0,
-        ),
+            "way across [m]", 0.0, float(np.hypot(*way[:2])), 1e-11, scale=abs(throw * time - G * time**2 / 2)
+        ).because("nothing acts across"),
+        Answer("turn [rad]", 0.0, turned, 1e-11, reason="nothing turns it", scale=1.0),
     ]
 
 
+@ladder(
+    "let go from rest",
+    "a smarticle falls, let go as the pour does it",
+    "height after 0.1 s",
+    "m",
+    9.81 * 0.096**2 / 2,
+    COARSE,
+    on_both(1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"),
+)
 def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the height of a smarticle let go from rest, as the pour does it, after 0.1 s [m]."""
     return [abs(fall(access, dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
 
 
 def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
     """A smarticle spins freely.
-
-    Args:
-        access: on the engine.
-        dt: time step, a whole fraction of all times [s].
-        spin: (3,) laboratory frame [rad/s].
-        times: (n,) rising [s].
 
     Returns:
         Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].
@@ -122,8 +93,12 @@ def _misfit(found: Rotation, exact: Rotation) -> Array:
     return vectors
 
 
+@case(
+    "torque-free spin",
+    "a U about no axis in particular; its three moments differ",
+    "Euler's equations, integrated to 1e-12",
+)
 def torque_free_spin(access: EngineAccess) -> list[Answer]:
-    """A U about no axis in particular: orientation, energy, angular momentum, in the limit of small steps."""
     inertia = scene(access).smarticle.boxes.inertia
     times, coarse = np.linspace(0.02, 0.2, 10), 2e-5
     exact, _ = free_rotation(inertia=inertia, start=START, spin=SPIN, times=times)
@@ -142,54 +117,48 @@ def torque_free_spin(access: EngineAccess) -> list[Answer]:
     limit = "what is left of second order after extrapolation from 20 and 10 µs; the step's own error is of first order"
     return [
         Answer(
-            quantity="orientation after 1.4 turns, dt → 0",
-            unit="rad",
-            theory=0.0,
-            measured=float(np.linalg.norm(2 * misfits[1] - misfits[0], axis=1).max()),
-            tolerance=2e-5,
-            reason=limit,
+            "orientation after 1.4 turns, dt → 0 [rad]",
+            0.0,
+            float(np.linalg.norm(2 * misfits[1] - misfits[0], axis=1).max()),
+            2e-5,
             scale=turned,
-        ),
+        ).because(limit),
         Answer(
-            quantity="orientation after 1.4 turns, dt = 20 µs",
-            unit="rad",
-            theory=0.0,
-            measured=float(np.linalg.norm(misfits[0], axis=1).max()),
-            tolerance=2e-3,
-            reason="YADE's rotation is of first order: some ω dt of the angle turned",
+            "orientation after 1.4 turns, dt = 20 µs [rad]",
+            0.0,
+            float(np.linalg.norm(misfits[0], axis=1).max()),
+            2e-3,
             scale=turned,
+        ).because("YADE's rotation is of first order: some ω dt of the angle turned"),
+        Answer("kinetic energy, dt → 0 [J]", energy, 2 * energies[1] - energies[0], 1e-5, reason=limit),
+        Answer(
+            "kinetic energy after 0.2 s, dt = 20 µs [J]",
+            energy,
+            energies[0],
+            0.25 * float(SPIN @ SPIN) * coarse * times[-1],
+        ).because(
+            "grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a second"
         ),
         Answer(
-            quantity="kinetic energy, dt → 0",
-            unit="J",
-            theory=energy,
-            measured=2 * energies[1] - energies[0],
-            tolerance=1e-5,
-            reason=limit,
-        ),
-        Answer(
-            quantity="kinetic energy after 0.2 s, dt = 20 µs",
-            unit="J",
-            theory=energy,
-            measured=energies[0],
-            tolerance=0.25 * float(SPIN @ SPIN) * coarse * times[-1],
-            reason="grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a "
-            "second",
-        ),
-        Answer(
-            quantity="angular momentum, change of the vector, dt → 0",
-            unit="kg m²/s",
-            theory=0.0,
-            measured=float(np.linalg.norm(2 * momenta[1] - momenta[0] - momentum)),
-            tolerance=1e-5,
-            reason=limit,
+            "angular momentum, change of the vector, dt → 0 [kg m²/s]",
+            0.0,
+            float(np.linalg.norm(2 * momenta[1] - momenta[0] - momentum)),
+            1e-5,
             scale=float(np.linalg.norm(momentum)),
-        ),
+        ).because(limit),
     ]
 
 
+@ladder(
+    "spin",
+    "a smarticle spins about no axis in particular",
+    "orientation after 1.4 turns",
+    "rad",
+    8.6,
+    COARSE,
+    {"yade": (1, TURNS), "links": (2, MIDPOINT)},
+)
 def spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the orientation after 1.4 turns about no axis in particular [rad]."""
     times = np.array([0.2])
     exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=SPIN, times=times)
     return [
@@ -197,8 +166,16 @@ def spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     ]
 
 
+@ladder(
+    "spin in the plane",
+    "a smarticle spins about the normal of its plane",
+    "orientation after 1.3 turns",
+    "rad",
+    8.3,
+    (3.2e-4, 1.6e-4, 8e-5, 4e-5),
+    {"yade": (2, "about a principal axis the frame does not matter: second order"), "links": (2, MIDPOINT)},
+)
 def planar_spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the orientation after 1.3 turns about the normal of the U's plane [rad]."""
     times, spin = np.array([0.192]), START.apply([0.0, 0.0, 43.0])
     exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=spin, times=times)
     return [
@@ -225,31 +202,33 @@ def _flip_times(access: EngineAccess, steps: Sequence[float]) -> tuple[list[floa
     return found, _between_flips(access, exact)
 
 
+@case(
+    "middle axis",
+    "a U about the axis of its middle moment flips over and over",
+    "Euler's equations, integrated to 1e-12",
+)
 def flips(access: EngineAccess) -> list[Answer]:
-    """The middle axis is unstable: the U flips over, again and again."""
     (coarse, fine), exact = _flip_times(access, (2e-5, 1e-5))
     return [
-        Answer(
-            quantity="time between two flips, dt → 0",
-            unit="s",
-            theory=exact,
-            measured=2 * fine - coarse,
-            tolerance=3e-3,
-            reason="what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %",
+        Answer("time between two flips, dt → 0 [s]", exact, 2 * fine - coarse, 3e-3).because(
+            "what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %"
         ),
-        Answer(
-            quantity="time between two flips, dt = 20 µs",
-            unit="s",
-            theory=exact,
-            measured=coarse,
-            tolerance=0.05,
-            reason="first order: energy grows by 0.2 ω² dt per second, and the time goes with the logarithm of what "
-            "little energy parts this motion from one that never flips",
+        Answer("time between two flips, dt = 20 µs [s]", exact, coarse, 0.05).because(
+            "first order: energy grows by 0.2 ω² dt per second, and the time goes with the logarithm of what "
+            "little energy parts this motion from one that never flips"
         ),
     ]
 
 
+@ladder(
+    "flips",
+    "a smarticle about the axis of its middle moment",
+    "time between two flips",
+    "s",
+    0.208,
+    MIDDLE,
+    {"yade": (1, TURNS), "links": (2, MIDPOINT)},
+)
 def flip_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the time between the first two flips [s]."""
     found, exact = _flip_times(access, steps)
     return [abs(time - exact) for time in found]

@@ -12,8 +12,11 @@ from scipy.spatial.transform import Rotation
 from dem.engine.interface import Engine
 from dem.scene.scene import Scene
 from validation.bench import Array, G, add, drive, scene
+from validation.case import FINE, LEAPFROG, case, ladder
 from validation.check import Answer
 from validation.engines import EngineAccess
+
+MODE = "eigenfrequency of links, shafts and pins; √(k/I) but for the pins"
 
 STRONG = 1.0  # N m; a limit that no torque here comes near
 VIBRATION = "the shaft has no damping: what a window over the vibration leaves of it"
@@ -56,15 +59,17 @@ def _barb(one: Scene) -> tuple[float, float, float]:
     return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
 
 
+@case(
+    "hinge pulled",
+    "a straight smarticle is pulled at both ends by a hundred weights",
+    "gap F/k of the pin",
+    absent={"links": "hinges have no pins that give way: links are one body with two angles"},
+    aspect_ratio=0.7,
+    fidelity="standard",
+    largest=0.01,
+)
 def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
-    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays.
-
-    Args:
-        access: on the engine.
-        aspect_ratio: l/w [1].
-        fidelity: draft, standard or reference.
-        largest: gap over the sphere diameter that must not be passed [1].
-    """
+    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
@@ -79,27 +84,23 @@ def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: f
         gaps.append(engine.motors.gaps().max())
     theory = force / access.pin_stiffness(one)
     return [
-        Answer(
-            quantity="gap of a hinge, mean",
-            unit="m",
-            theory=theory,
-            measured=float(np.mean(gaps[-20:])),
-            tolerance=0.01,
-            reason="the links' masses swing on the pin for a while, by per cents",
+        Answer("gap of a hinge, mean [m]", theory, float(np.mean(gaps[-20:])), 0.01).because(
+            "the links' masses swing on the pin for a while, by per cents"
         ),
         Answer(
-            quantity="gap of a hinge, largest",
-            unit="m",
-            theory=theory,
-            measured=float(max(gaps)),
-            tolerance=largest * one.sphere_diameter / theory - 1,
-            reason=f"at most {100 * largest:g} % of a sphere's diameter, as the fidelity promises",
-        ),
+            "gap of a hinge, largest [m]", theory, float(max(gaps)), largest * one.sphere_diameter / theory - 1
+        ).because(f"at most {100 * largest:g} % of a sphere's diameter, as the fidelity promises"),
     ]
 
 
+@case(
+    "barb hanging on its motor",
+    "a straight smarticle, its middle link held, under gravity",
+    "torque M = mgl/2, sag M/k, gap mg/k",
+    aspect_ratio=0.7,
+    fidelity="standard",
+)
 def droop(access: EngineAccess, *, aspect_ratio: float, fidelity: str) -> list[Answer]:
-    """Straight barbs under gravity, the middle link held: torques, angles and gaps."""
     one = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0), torque_limit_N_m=STRONG)
     # What bears a held link on links acts before the spring looks: (ω dt)²/4 of the sag, 2 % at the step of the scene.
     dt = None if access.name == "yade" else one.fidelity.control_interval_s / 20
@@ -114,34 +115,23 @@ def droop(access: EngineAccess, *, aspect_ratio: float, fidelity: str) -> list[A
     mass, _, lever = _barb(one)
     moment, gap = mass * G * lever, mass * G / access.pin_stiffness(one)
     return [
-        Answer(
-            quantity="torque of a motor",
-            unit="N m",
-            theory=-moment,
-            measured=float(means[0]),
-            tolerance=0.01,
-            reason=VIBRATION,
+        Answer("torque of a motor [N m]", -moment, float(means[0]), 0.01, reason=VIBRATION),
+        Answer("sag of a barb [rad]", moment / one.motor.stiffness_N_m_per_rad, float(means[2]), 0.01).because(
+            VIBRATION
         ),
-        Answer(
-            quantity="sag of a barb",
-            unit="rad",
-            theory=moment / one.motor.stiffness_N_m_per_rad,
-            measured=float(means[2]),
-            tolerance=0.01,
-            reason=VIBRATION,
-        ),
-        Answer(
-            quantity="gap of a hinge",
-            unit="m",
-            theory=gap,
-            measured=float(means[1]),
-            tolerance=0.01 if gap else 1e-12,
-            reason=VIBRATION if gap else "rounding: hinges cannot part",
-            scale=gap or lever,
+        Answer("gap of a hinge [m]", gap, float(means[1]), 0.01 if gap else 1e-12, scale=gap or lever).because(
+            VIBRATION if gap else "rounding: hinges cannot part"
         ),
     ]
 
 
+@case(
+    "barb hanging out of plane",
+    "the same lying, after the barbs have turned through 105°",
+    "tilt M/k of the shaft",
+    absent={"links": "shafts do not tilt: both barbs stay in the plane of the middle link"},
+    sweeps=1,
+)
 def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
     """Lying in the air, the middle link held, barbs sweep through 105° a number of times; then they hang out of plane.
 
@@ -170,22 +160,10 @@ def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
     found = np.average(tilts, axis=0, weights=np.hanning(len(tilts)))
     size = float(np.linalg.norm(expected[0]))
     return [
+        Answer("angle that was reached [rad]", goal, float(engine.state().angles[0].mean()), 0.03).because(VIBRATION),
         Answer(
-            quantity="angle that was reached",
-            unit="rad",
-            theory=goal,
-            measured=float(engine.state().angles[0].mean()),
-            tolerance=0.03,
-            reason=VIBRATION,
-        ),
-        Answer(
-            quantity="tilt out of the plane, worst component",
-            unit="rad",
-            theory=size,
-            measured=size + float(np.abs(found - expected).max()),
-            tolerance=0.05,
-            reason=VIBRATION,
-        ),
+            "tilt out of the plane, worst component [rad]", size, size + float(np.abs(found - expected).max()), 0.05
+        ).because(VIBRATION),
     ]
 
 
@@ -199,8 +177,8 @@ def crossings(time: Array, value: Array) -> Array:
     return found
 
 
+@case("pendulum", "barbs hang from a held middle link, let go at 6°", "2π√(I/mga)(1 + θ²/16)", aspect_ratio=0.7)
 def pendulum(access: EngineAccess, *, aspect_ratio: float) -> list[Answer]:
-    """Barbs that hang from a held middle link, their motors as good as free, let go at a small angle."""
     one = hinged(
         access, aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG
     )
@@ -218,20 +196,13 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float) -> list[Answer]:
         angle = sign * np.array(angles)[:, barb]
         checks += [
             Answer(
-                quantity=f"period, barb {barb + 1}",
-                unit="s",
-                theory=period,
-                measured=2 * float(np.diff(crossings(np.array(times), angle)).mean()),
-                tolerance=2e-3,
-                reason="the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for",
-            ),
-            Answer(
-                quantity=f"amplitude, barb {barb + 1}",
-                unit="rad",
-                theory=amplitude,
-                measured=float(np.abs(angle).max()),
-                tolerance=0.01,
-                reason="the first swing, from where it was let go",
+                f"period, barb {barb + 1} [s]",
+                period,
+                2 * float(np.diff(crossings(np.array(times), angle)).mean()),
+                2e-3,
+            ).because("the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for"),
+            Answer(f"amplitude, barb {barb + 1} [rad]", amplitude, float(np.abs(angle).max()), 0.01).because(
+                "the first swing, from where it was let go"
             ),
         ]
     return checks
@@ -285,14 +256,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad.
-
-    Args:
-        access: on the engine.
-        one: the scene.
-        held: whether the middle link is held; otherwise all links are free, and the barbs turn the same way.
-        dt: time step [s]; None: that of the scene.
-    """
+    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
@@ -310,8 +274,9 @@ def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None =
     return engine
 
 
+@case("barbs on their shafts, middle link held", "a U in space, barbs turning the same way", MODE, held=True)
+@case("barbs on their shafts, middle link free", "a U in space, barbs turning the same way", MODE, held=False)
 def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
-    """Frequency √(k/I) of barbs on their shafts, against a held middle link and against a free one."""
     one = hinged(access, fidelity="standard", torque_limit_N_m=STRONG)
     engine = floating(access, one, held=held)
     begun = engine.state().angles
@@ -323,31 +288,28 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     frequency, _ = shaft_mode(one, access.pin_stiffness(one), held=held)
     return [
         Answer(
-            quantity="frequency",
-            unit="Hz",
-            theory=frequency / (2 * math.pi),
-            measured=0.5 / float(np.diff(crossings(time, turned)).mean()),
-            tolerance=3e-3,
-            reason="the damper beside the pin, which theory leaves out, is a quarter as stiff",
-        ),
-        Answer(
-            quantity="amplitude",
-            unit="rad",
-            theory=0.01,
-            measured=float(np.abs(turned).max()),
-            tolerance=0.02,
-            reason="the pins' own vibration, which is set going a little",
+            "frequency [Hz]", frequency / (2 * math.pi), 0.5 / float(np.diff(crossings(time, turned)).mean()), 3e-3
+        ).because("the damper beside the pin, which theory leaves out, is a quarter as stiff"),
+        Answer("amplitude [rad]", 0.01, float(np.abs(turned).max()), 0.02).because(
+            "the pins' own vibration, which is set going a little"
         ),
     ]
 
 
+@ladder(
+    "barbs on their shafts",
+    "an articulated smarticle in space, control period 0.2 ms",
+    "angle of a barb over 10 ms",
+    "rad",
+    0.01,
+    FINE,
+    {
+        "yade": (2, f"{LEAPFROG}, in the plane"),
+        "links": (2, "the spring's force is the mean over the half steps before and after: second order"),
+    },
+)
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad].
-
-    Args:
-        access: on the engine.
-        steps: whole fractions of the control period [s].
-    """
+    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad]."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dem.engine.demand import Demand
+from dem.engine.demand import Demand, contact_law_of
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.lammps.child import lammps_version
@@ -12,7 +12,6 @@ from dem.engine.lammps.cost import seconds_per_second
 from dem.engine.lammps.engine import LammpsEngine
 from dem.engine.lammps.ranks import ranks
 from dem.engine.yade.stable_step import stable_time_step
-from dem.physics.contact import ContactLaw, contact_law
 
 ADDS = {
     EffectName.CONTACT: Adds(
@@ -68,8 +67,3 @@ class LammpsKind:
             time_step=time_step,
             ranks=ranks(),
         )
-
-
-def contact_law_of(scene: Demand) -> ContactLaw:
-    """The contact law of a scene, of one sphere with another."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)

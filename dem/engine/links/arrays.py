@@ -12,8 +12,8 @@ Indices = NDArray[np.int32]
 
 PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
-SURFACES = 3  # that an end of a link can touch at once: floor, wall, ceiling; or two walls of a channel
 BINS = 4  # of the search for neighbours, per link
+LEDGER = 12  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.put_down`
 SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
 
 
@@ -150,16 +150,18 @@ class Law(NamedTuple):
     friction: float
 
 
-class Ends(NamedTuple):
-    """What contacts of the ends of links with flat or round surfaces remember.
+class Kept(NamedTuple):
+    """What contacts of links with boundaries remember from step to step, see `dem.engine.links.contact.boundaries`.
 
     Args:
-        slip: (N S, 2, SURFACES, 4) stretch of the tangential springs of start and end [m], and their energy [J].
-        used: (N S, 2) which of the surfaces touched in the last step, as bits.
+        slip: (N S, slots, 4) stretch of the tangential springs [m], and their energy [J].
+        used: (N S, slots) whether a contact was there in the last step.
+        contacts: (N S,) contacts of a link in the last step.
     """
 
     slip: Array
     used: NDArray[np.uint8]
+    contacts: NDArray[np.uint8]
 
 
 class Ground(NamedTuple):
@@ -197,17 +199,14 @@ class Hooks(NamedTuple):
 
     Args:
         counts: (2,) bars of the lower and the upper hook; the arrays have room for B, those of the one with more.
-        middles: (2, B, 2) where the bars' middles are from the axis [m].
-        halves: (2, B, 3) half edges of the bars [m].
-        slip: (N S, 2, B, SLOTS, 4) stretch of the tangential springs of links at the bars [m], and their energy [J].
-        used: (N S, 2, B) which of the points touched in the last step, as bits.
+        bars: (2, B, 6) start of each bar's axis from the vertical axis, and vector to its end [m]; heights, which are
+            in `Ground.place`, are written where they are needed.
+        radius: of the bars [m].
     """
 
     counts: NDArray[np.int64]
-    middles: Array
-    halves: Array
-    slip: Array
-    used: NDArray[np.uint8]
+    bars: Array
+    radius: float
 
 
 class Rims(NamedTuple):
@@ -216,14 +215,10 @@ class Rims(NamedTuple):
     Args:
         heights: (rims,) above the wall's place [m].
         radii: (rims,) [m].
-        slip: (N S, rims, 4) stretch of the tangential springs of links at the rims [m], and their energy [J].
-        used: (N S, rims) whether they touched in the last step.
     """
 
     heights: Array
     radii: Array
-    slip: Array
-    used: NDArray[np.uint8]
 
 
 class Cords(NamedTuple):

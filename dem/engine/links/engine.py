@@ -20,7 +20,7 @@ from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.links.account import LinksAccount
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
-from dem.engine.links.fixtures import LinksFixtures, ground_for, tier_rims
+from dem.engine.links.fixtures import LinksFixtures, ground_for
 from dem.engine.links.forces import contact_forces
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 
 # Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
+# Diameters; a smarticle between two boundaries that move apart is held where a contact is deeper, far beyond the linear
+# range: nothing but the contacts can give way.
+HOLDS = 0.5
 FORMAT = "links-3"
 
 
@@ -89,9 +92,10 @@ class LinksEngine:
             planar=channel is not None,
             account=account,
         )
-        self._world.rims = tier_rims(cylinder, channel)
         if hooks is not None:
             self._world.add_hooks([cross.bars for cross in hooks])
+        for height, radius in () if channel is not None else cylinder.upper:
+            self._world.add_rim(height, radius)
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
         self.account = LinksAccount(self._world)
@@ -189,9 +193,10 @@ class LinksEngine:
         return self._world.look().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """See the interface; contacts that may have let links pass since the last question count as well.
+        """Return the contacts, those at boundaries with twice their overlap, since half of the room is left there.
 
-        One that is deep for some steps pushes all the same; not so once the axes of two links have crossed.
+        Contacts that may have let links pass since the last check count as well. A smarticle that two boundaries hold
+        counts as too deep from `HOLDS` on.
         """
         found, world = self._world.look(), self._world
         between = world.bodies.deepest.copy()
@@ -199,9 +204,10 @@ class LinksEngine:
         passed = ~(between <= PASSES * self.particle.chain.diameter)
         depths = np.where(passed, np.maximum(found.depths, between), found.depths)
         deep = ~(depths <= limit)
-        return Overlaps(
-            float(depths.max(initial=0.0)), deep, found.elastic_energy, self._held(found.held, deep, APART * limit)
-        )
+        diameter = self.particle.chain.diameter
+        held = self._held(found.held, ~(depths <= min(limit, HOLDS * diameter)), APART * diameter)
+        deep[[one.smarticle for one in held]] = True
+        return Overlaps(float(depths.max(initial=0.0)), deep, found.elastic_energy, held)
 
     def contact_forces(self) -> ContactForces:
         """See the interface; those that the next step begins with."""
@@ -210,7 +216,8 @@ class LinksEngine:
     def glance(self, state: State) -> Glance | None:
         """See the interface; hinges do not give way."""
         found, bodies = self._world.glance(state.link_velocities), self._world.bodies
-        if not found[BETWEEN] <= PASSES * self.particle.chain.diameter:
+        diameter = self.particle.chain.diameter
+        if not (found[BETWEEN] <= PASSES * diameter and found[DEEPEST] <= HOLDS * diameter):
             return None
         bodies.deepest[:] = 0.0
         return Glance(

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, UPPER, WALL, Ground, Rims
+from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, UPPER, WALL, Ground
 from dem.engine.links.world import World
 from dem.errors import RunError
 from dem.setting.container import Cylinder
@@ -38,14 +38,6 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
         force=np.zeros((6, 3)),
         sums=np.zeros((6, 3)),
     )
-
-
-def tier_rims(cylinder: Cylinder, channel: Channel | None) -> Rims | None:
-    """Edges between the tiers of a wall; None where there are none."""
-    if channel is not None or not cylinder.upper:
-        return None
-    heights, radii = np.array(cylinder.upper).T.copy()
-    return Rims(heights, radii, np.zeros((0, len(radii), 4)), np.zeros((0, len(radii)), np.uint8))
 
 
 class LinksFixtures:
@@ -150,12 +142,9 @@ class LinksFixtures:
 
     def _remove_wall(self) -> None:
         ground, world = self._ground, self._world
-        ground.flags[0] = 0
         ground.speed[WALL] = 0.0
         ground.shaken[WALL] = 0
-        world.ends.slip[:, :, 1:] = 0.0
-        world.ends.used[:] &= 1
-        world.rims = None
+        world.remove_wall()
 
     # -- what they feel ----------------------------------------------------------------------------------------
 

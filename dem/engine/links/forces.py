@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.forces import ContactForces, contacts_of_points
-from dem.engine.links.contact.forces import FORCE, FRICTION, LOAD, POINT, WIDTH, forces_of_fixtures, forces_of_pairs
+from dem.engine.links.contact.forces import FORCE, FRICTION, LOAD, POINT, WIDTH, forces_of_boundaries, forces_of_pairs
 from dem.engine.links.world import World
 
 Array = NDArray[np.float64]
@@ -18,11 +18,13 @@ def contact_forces(world: World) -> ContactForces:
     """Forces at all contacts; nothing of the simulation is changed. See `World.look` for who is known."""
     bodies, hinged, slip = world.posed(), world.hinged, np.zeros(4)
     law, wall_law = world.laws
-    between = _rows(lambda rows: forces_of_pairs(world.shape, law, bodies, world.pairs, hinged, world.out, slip, rows))
+    between = _rows(
+        lambda rows: forces_of_pairs(world.shape, law, bodies, world.pairs, hinged, world.meeting, slip, rows)
+    )
     outside = _rows(
-        lambda rows: forces_of_fixtures(
-            world.shape, wall_law, bodies, world.ends, world.ground, world.channel, world.hooks, world.rims, hinged,
-            world.out, slip, rows,
+        lambda rows: forces_of_boundaries(
+            world.shape, wall_law, bodies, world.kept, world.ground, world.channel, world.hooks, world.rims, hinged,
+            world.meeting, world.scratch.contacts, slip, rows,
         )
     )  # fmt: skip
     rows = np.concatenate([between, outside])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numba
 
-from dem.engine.demand import Demand
+from dem.engine.demand import Demand, contact_law_of
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.links.adds import ADDS, ORDER
@@ -14,7 +14,6 @@ from dem.engine.links.compiler import stamp
 from dem.engine.links.cost import seconds_per_second
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.stable_step import links_stable_time_step
-from dem.physics.contact import ContactLaw, contact_law
 from dem.physics.motor import MotorLaw
 
 
@@ -80,8 +79,3 @@ class LinksKind:
             channel=scene.channel,
             strengths=scene.motor_strengths,
         )
-
-
-def contact_law_of(scene: Demand) -> ContactLaw:
-    """The contact law of a scene, of one link with another."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)

@@ -3,23 +3,84 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Cells, Ends, Ground, Law, Pairs
-from dem.engine.links.compiler import inlined, kernel, part
-from dem.engine.links.contact.bars import push_hooks
+from dem.engine.links.arrays import Array, Bodies, Cells, Ground, Kept, Law, Pairs
+from dem.engine.links.compiler import kernel, part
+from dem.engine.links.contact.barrier import FINEST, Step, ticks_for
+from dem.engine.links.contact.boundaries import push_boundaries
 from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import push_apart
-from dem.engine.links.contact.rims import push_rims
-from dem.engine.links.contact.walls import push_sideways, push_up
 from dem.engine.links.motion.motoring import look
-from dem.engine.links.motion.moving import drift, kick
+from dem.engine.links.motion.moving import drift, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motion, find_spin, pose
 from dem.engine.links.neighbours.lists import FULL, GOOD, build, tighten
 from dem.engine.links.neighbours.skins import moved
 from dem.engine.links.shape import Shape
 
-LOST, WORK = 0, 1  # places in `totals`
+
+class Clock(NamedTuple):
+    """Time of the steps of one length.
+
+    Args:
+        begin: when they began [s].
+        made: how many were made since.
+        dt: their length [s].
+    """
+
+    begin: float
+    made: int
+    dt: float
+
+
+class System(NamedTuple):
+    """What every simulation has.
+
+    Args:
+        shape: what all smarticles have in common.
+        law: of their contacts.
+        wall_law: of their contacts with boundaries.
+        bodies: the smarticles.
+        pairs: which of their links are near each other.
+        kept: what contacts with boundaries remember.
+        ground: the boundaries.
+        gravity: g, downwards [m/s²].
+        planar: whether all motion is confined to a horizontal plane.
+        skins: see `look_for_neighbours`.
+    """
+
+    shape: Shape
+    law: Law
+    wall_law: Law
+    bodies: Bodies
+    pairs: Pairs
+    kept: Kept
+    ground: Ground
+    gravity: float
+    planar: bool
+    skins: Array
+
+
+class Scratch(NamedTuple):
+    """Arrays that are written before they are read.
+
+    Args:
+        cells: of the search for neighbours.
+        meeting: (ROWS, COLUMNS) of `dem.engine.links.contact.meeting.meet`.
+        contacts: (slots, COLUMNS) of `dem.engine.links.contact.boundaries.contacts_of_link`.
+        plane: (PLANE,) plane geometry of a smarticle.
+    """
+
+    cells: Cells
+    meeting: Array
+    contacts: Array
+    plane: Array
+
+
+# Places in `totals`: energy dissipated and work of the boundaries [J], length of the last sub-step [s], sub-steps per
+# step that were needed last, the most that were, and ticks of the present step that have passed.
+LOST, WORK, PAST, NEED, MOST, TICK = range(6)
+TOTALS = 6
 NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, STRIP = range(7)  # places in `skins`
 
 
@@ -70,25 +131,13 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
         ledger: see `dem.engine.links.contact.pairs.put_down`; emptied.
         dt: time step [s].
     """
-    find_velocities(shape, bodies, motors, 0, bodies.position.shape[0])
-    return dissipated(bodies, ledger, dt)
-
-
-@inlined
-def find_velocities(shape: Shape, bodies: Bodies, motors: Any, begin: int, stop: int) -> None:
-    """Bring velocities of smarticles from `begin` up to `stop` up to date after a kick."""
-    for i in range(begin, stop):
+    motion, position, total = bodies.motion, bodies.position, 0.0
+    for i in range(position.shape[0]):
         find_spin(bodies, i, motors)
         find_motion(shape, bodies, i, motors)
-
-
-@inlined
-def dissipated(bodies: Bodies, ledger: Array, dt: float) -> float:
-    """What `settle` returns, once velocities are known; the ledger is emptied."""
-    motion, position, total = bodies.motion, bodies.position, 0.0
     for n in range(1, int(ledger[0, 0]) + 1):
         row = ledger[n]
-        total -= row[10]
+        total -= dt * row[10] + row[11]
         for side in range(2):
             m, i = int(row[side]), int(row[2 + side])
             if m >= 0:
@@ -104,79 +153,83 @@ def dissipated(bodies: Bodies, ledger: Array, dt: float) -> float:
 
 @kernel
 def advance(
-    steps: int, made: int, begin: float, dt: float, gravity: float, planar: bool, skins: Array, shape: Shape,
-    law: Law, wall_law: Law, bodies: Bodies, pairs: Pairs, cells: Cells, ends: Ends, ground: Ground, motors: Any,
-    hooks: Any, rims: Any, channel: Any, cords: Any, ledger: Any, out: Array, row: Array, totals: Array,
+    steps: int, clock: Clock, system: System, scratch: Scratch, totals: Array,
+    motors: Any, channel: Any, hooks: Any, rims: Any, cords: Any, ledger: Any,
 ) -> int:  # fmt: skip
     """Make steps.
 
+    What a scene may lack comes as arguments of its own: a kernel is compiled without it where it is None.
+
     Args:
         steps: how many.
-        made: how many were made since `begin`.
-        begin: when steps of this length began [s].
-        dt: time step [s].
-        gravity: g, downwards [m/s²].
-        planar: whether all motion is confined to a horizontal plane.
-        skins: see `look_for_neighbours`.
-        shape: what all smarticles have in common.
-        law: of their contacts.
-        wall_law: of their contacts with fixtures.
-        bodies: the smarticles.
-        pairs: which of their links are near each other.
-        cells: scratch.
-        ends: what contacts with fixtures remember.
-        ground: the fixtures.
+        clock: when these steps are.
+        system: smarticles, boundaries and their laws.
+        scratch: written.
+        totals: (TOTALS,) see `LOST`; brought up to date.
         motors: None while welded.
+        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
         hooks: None where there are none.
         rims: None where the wall has no edges that links can reach.
-        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
         cords: None where no string is tied.
         ledger: of forces that dissipate; None where nobody asks.
-        out: scratch of `dem.engine.links.contact.meeting.meet`.
-        row: (PLANE,) scratch.
-        totals: (2,) energy dissipated, work of the fixtures [J]; added to.
 
     Returns:
         Steps that were made; fewer where a list is full.
     """
-    n = bodies.position.shape[0]
-    for step in range(steps):
-        shaken_to(ground, begin + (made + step) * dt)
-        if motors is not None and motors.due[1] == 0:
-            look(shape, bodies, motors)
-        pose(shape, bodies, motors)
-        if look_for_neighbours(shape, bodies, pairs, cells, skins) == FULL:
-            return step
-        bodies.load[:] = 0.0
-        ground.force[:] = 0.0
-        if motors is not None:
-            bodies.shares[:] = 0.0
-        lost = push_apart(shape, law, bodies, pairs, motors, ledger, dt, out)
-        if channel is None:
-            lost += push_up(shape, wall_law, bodies, ends, ground, motors, ledger, dt, 0, n)
-        else:
-            lost += push_sideways(shape, wall_law, bodies, ends, ground, channel[0], motors, ledger, dt, 0, n)
-        if rims is not None:
-            lost += push_rims(shape, wall_law, bodies, ground, rims, motors, ledger, dt, 0, n)
-        if hooks is not None:
-            lost += push_hooks(shape, wall_law, bodies, ground, hooks, motors, ledger, dt, out, 0, n)
-        if cords is not None:
-            totals[WORK] += pull(shape, bodies, cords, motors, dt)
-        for k in range(6):
-            for d in range(3):
-                ground.sums[k, d] += ground.force[k, d]
-            if k < 4:
-                totals[WORK] -= ground.force[k, 2] * ground.speed[k] * dt
-        kick(shape, bodies, motors, gravity, planar, dt, 0, n)
-        if motors is not None:
-            motors.elapsed[0] += dt
-        if ledger is not None:
-            totals[LOST] += lost + settle(shape, bodies, motors, ledger, dt)
-        drift(shape, bodies, motors, dt, row, 0, n)
+    shape, bodies, pairs, ground, gravity = system.shape, system.bodies, system.pairs, system.ground, system.gravity
+    dt, need = clock.dt, totals[NEED : NEED + 1]
+    for made_now in range(steps):
+        tick = int(totals[TICK])
+        while tick < FINEST:
+            shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
+            if motors is not None and motors.due[1] == 0 and tick == 0:
+                look(shape, bodies, motors)
+            pose(shape, bodies, motors)
+            if look_for_neighbours(shape, bodies, pairs, scratch.cells, system.skins) == FULL:
+                totals[TICK] = tick
+                return made_now
+            step, need[0] = Step(totals[PAST], dt, need), 1.0
+            bodies.load[:] = 0.0
+            ground.force[:] = 0.0
+            if motors is not None:
+                bodies.shares[:] = 0.0
+            lost = push_apart(shape, system.law, bodies, pairs, motors, ledger, step, scratch.meeting)
+            lost += push_boundaries(
+                shape, system.wall_law, bodies, system.kept, ground, channel, hooks, rims, motors, ledger, step,
+                scratch.contacts, scratch.meeting,
+            )  # fmt: skip
+            pulling = 0.0
+            if cords is not None:
+                pulling = pull(shape, bodies, cords, motors, step)
+            resolve_speeds(shape, bodies, motors is not None, gravity, step)
+            # What the forces of this instant ask for decides how far they carry.
+            totals[MOST] = max(totals[MOST], need[0])
+            ticks = ticks_for(need[0], tick)
+            length = dt * (ticks / FINEST)
+            acting = 0.5 * (totals[PAST] + length)
+            totals[PAST] = length
+            totals[WORK] += acting * pulling
+            weight = length / dt
+            for k in range(6):
+                for d in range(3):
+                    ground.sums[k, d] += weight * ground.force[k, d]
+                if k < 4:
+                    totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
+            kick(shape, bodies, motors, gravity, system.planar, acting)
+            if motors is not None:
+                motors.elapsed[0] += acting
+            if ledger is not None:
+                totals[LOST] += lost + settle(shape, bodies, motors, ledger, acting)
+            drift(shape, bodies, motors, length, scratch.plane)
+            for k in range(4):
+                if not ground.shaken[k]:
+                    ground.place[k] += ground.speed[k] * length
+            if cords is not None:
+                for k in range(cords.anchor.shape[0]):
+                    cords.anchor[k, 0] += cords.speed[k] * length
+            tick += ticks
+        totals[TICK] = 0.0
         if motors is not None:
             motors.due[1] -= 1
-        for k in range(4):
-            if not ground.shaken[k]:
-                ground.place[k] += ground.speed[k] * dt
-    shaken_to(ground, begin + (made + steps) * dt)
+    shaken_to(ground, clock.begin + (clock.made + steps) * dt)
     return steps

@@ -15,15 +15,14 @@ from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.links.arrays import (
+    LEDGER,
     PLANE,
-    SLOTS,
-    SURFACES,
     Bodies,
     Cells,
     Cords,
-    Ends,
     Ground,
     Hooks,
+    Kept,
     Law,
     Motoring,
     Pairs,
@@ -33,12 +32,13 @@ from dem.engine.links.arrays import (
     no_bodies,
     pairs_for,
 )
-from dem.engine.links.contact.meeting import COLUMNS, ROWS
-from dem.engine.links.contact.queries import ELASTIC, glance, look_at_all
+from dem.engine.links.contact import boundaries, meeting
+from dem.engine.links.contact.boundaries import END_SLOTS, slots_for
+from dem.engine.links.contact.queries import glance, look_at_all
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
-from dem.engine.links.stepping import advance
+from dem.engine.links.stepping import PAST, TOTALS, Clock, Scratch, System, advance
 from dem.errors import refuse
 from dem.physics.contact import ContactLaw
 from dem.setting.hooks import Bar
@@ -100,7 +100,7 @@ class World:
     """When steps of the present length began [s]."""
     made: int = 0
     """Steps of the present length so far."""
-    totals: Array = field(default_factory=lambda: np.zeros(2))
+    totals: Array = field(default_factory=lambda: np.array([0.0, 0.0, math.nan, 1.0, 1.0, 0.0]))
     hooks: Hooks | None = None
     rims: Rims | None = None
     channel: Array | None = None
@@ -118,9 +118,9 @@ class World:
         self.bodies: Bodies = no_bodies(self.each)
         self.pairs: Pairs = pairs_for(0, self.kinds, 256)
         self.cells: Cells = cells_for(0, 0, 256)
-        self.ends = Ends(np.zeros((0, 2, SURFACES, 4)), np.zeros((0, 2), np.uint8))
-        self.ledger: Array | None = np.zeros((256, 11)) if self.account else None
-        self.out, self.row = np.zeros((ROWS, COLUMNS)), np.zeros(PLANE)
+        self.kept = no_contacts(0, END_SLOTS)
+        self.ledger: Array | None = np.zeros((256, LEDGER)) if self.account else None
+        self.meeting, self.plane = np.zeros((meeting.ROWS, meeting.COLUMNS)), np.zeros(PLANE)
         diameter = 2 * self.shape.radius
         self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])
 
@@ -143,6 +143,8 @@ class World:
         """Take steps of another length [s] from now on."""
         if self.made:
             self.begin, self.made = self.time, 0
+        if not self.totals[PAST] < self.time_step:  # no sub-step, which would have to be kept
+            self.totals[PAST] = time_step
         self.time_step = time_step
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
@@ -172,37 +174,50 @@ class World:
             counts=old.counts, **{name: getattr(old, name) for name in (*LISTS, *LOOKED)}
         )
         self.forget_places()
-        self._make_room_at_fixtures()
+        self._make_room_at_boundaries()
         self.make_room()
 
-    def _make_room_at_fixtures(self) -> None:
-        links = self.count * self.each
-        self.ends = Ends(*(longer(array, links) for array in self.ends))
-        if self.hooks is not None:
-            self.hooks = self.hooks._replace(slip=longer(self.hooks.slip, links), used=longer(self.hooks.used, links))
-        if self.rims is not None:
-            self.rims = self.rims._replace(slip=longer(self.rims.slip, links), used=longer(self.rims.used, links))
+    def _make_room_at_boundaries(self) -> None:
+        """Remember contacts of as many links as there are now, and as many of each as there can be."""
+        old, new = self.kept, no_contacts(self.count * self.each, slots_for(self.hooks, self.rims))
+        links, slots = old.used.shape
+        new.slip[:links, :slots], new.used[:links, :slots], new.contacts[:links] = old.slip, old.used, old.contacts
+        self.kept = new
 
     def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
-        """Add the bars of the lower and the upper hook."""
+        """Add the bars of the lower and the upper hook, before there are smarticles or rims."""
+        assert not self.count
         counts = np.array([len(bars) for bars in hooks])
         most = int(counts.max())
-        middles, halves = np.zeros((2, most, 2)), np.zeros((2, most, 3))
-        for k, bars in enumerate(hooks):
-            middles[k, : len(bars)], halves[k, : len(bars)] = zip(*bars, strict=True)
-        self.hooks = Hooks(counts, middles, halves, np.zeros((0, 2, most, SLOTS, 4)), np.zeros((0, 2, most), np.uint8))
-        self._make_room_at_fixtures()
+        segments, radius = np.zeros((2, most, 6)), 0.0
+        for hook, bars in enumerate(hooks):
+            for k, (middle, halves) in enumerate(bars):
+                # Round, as thick as the square ones that other engines have.
+                along, radius = int(np.argmax(halves)), float(np.min(halves))
+                segments[hook, k, :2] = middle
+                segments[hook, k, along] -= halves[along] - radius
+                segments[hook, k, 3 + along] = 2 * (halves[along] - radius)
+        self.hooks = Hooks(counts, segments, radius)
+        self._make_room_at_boundaries()
 
     def add_rim(self, height: float, radius: float) -> None:
         """Add an edge of the wall at a height above its place [m], of a radius [m]."""
-        links = self.count * self.each
-        old = self.rims or Rims(np.zeros(0), np.zeros(0), np.zeros((links, 0, 4)), np.zeros((links, 0), np.uint8))
-        self.rims = Rims(
-            np.append(old.heights, height),
-            np.append(old.radii, radius),
-            np.concatenate([old.slip, np.zeros((links, 1, 4))], axis=1),
-            np.concatenate([old.used, np.zeros((links, 1), np.uint8)], axis=1),
+        old = self.rims or Rims(np.zeros(0), np.zeros(0))
+        self.rims = Rims(np.append(old.heights, height), np.append(old.radii, radius))
+        self._make_room_at_boundaries()
+
+    def remove_wall(self) -> None:
+        """Take the wall away, and with it what links remember of it."""
+        first = slots_for(self.hooks, None)
+        walls = [slot for slot in range(END_SLOTS) if slot % boundaries.SURFACES] + list(
+            range(first, slots_for(self.hooks, self.rims))
         )
+        self.kept.slip[:, walls] = 0.0
+        self.kept.used[:, walls] = 0
+        self.kept.contacts[:] = self.kept.used.sum(axis=1)
+        self.ground.flags[0] = 0
+        self.rims = None
+        self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
 
     def set_articulated(self, articulated: bool) -> None:
         """Have velocities for each link, or for whole smarticles."""
@@ -228,7 +243,7 @@ class World:
         if self.ledger is not None:
             rows = 3 * capacity // 2 + 6 * links
             if len(self.ledger) < rows:
-                self.ledger = np.zeros((rows, 11))
+                self.ledger = np.zeros((rows, LEDGER))
 
     def advance(self, steps: int) -> None:
         """Make whole steps, however many calls that takes."""
@@ -242,11 +257,25 @@ class World:
 
     def _call(self, steps: int) -> int:
         made: int = advance(
-            steps, self.made, self.begin, self.time_step, self.gravity, self.planar, self.skins, self.shape,
-            self.laws[0], self.laws[1], self.bodies, self.pairs, self.cells, self.ends, self.ground, self.hinged,
-            self.hooks, self.rims, self.channel, self.cords, self.ledger, self.out, self.row, self.totals,
+            steps, Clock(self.begin, self.made, self.time_step), self.system, self.scratch, self.totals,
+            self.hinged, self.channel, self.hooks, self.rims, self.cords, self.ledger,
         )  # fmt: skip
         return made
+
+    @property
+    def system(self) -> System:
+        """What every simulation has, as kernels want it."""
+        law, wall_law = self.laws
+        return System(
+            self.shape, law, wall_law, self.bodies, self.pairs, self.kept, self.ground, self.gravity, self.planar,
+            self.skins,
+        )  # fmt: skip
+
+    @property
+    def scratch(self) -> Scratch:
+        """Arrays that kernels write before they read them."""
+        rows = np.zeros((self.kept.used.shape[1], boundaries.COLUMNS))
+        return Scratch(self.cells, self.meeting, rows, self.plane)
 
     def posed(self) -> Bodies:
         """The smarticles with everything brought up to this instant that follows from their state."""
@@ -284,10 +313,9 @@ class World:
         met = np.zeros((self.pairs.counts[0], 2), np.int32)
         count, energy = look_at_all(
             self.shape, bodies, self.pairs, self.ground, self.channel, self.hooks, self.rims, self.laws[0].stiffness,
-            self.laws[1].stiffness, met, touches, held, depths, self.out,
+            self.laws[1].stiffness, met, touches, held, depths, self.meeting, self.scratch.contacts,
         )  # fmt: skip
-        sheared = [self.pairs.slip[: self.pairs.counts[0]], self.ends.slip]
-        sheared += [more.slip for more in (self.hooks, self.rims) if more is not None]
+        sheared = [self.pairs.slip[: self.pairs.counts[0]], self.kept.slip]
         energy += sum(float(slip[..., 3].sum()) for slip in sheared)
         return Contacts(met[:count].astype(np.int64), touches, depths, held, energy)
 
@@ -300,13 +328,12 @@ class World:
         n, found = self.count, np.empty(7)
         met = np.empty((self.pairs.counts[0], 2), np.int32)
         glance(
-            self.shape, self.bodies, self.pairs, self.ends, self.ground, self.channel, self.hooks, self.rims,
+            self.shape, self.bodies, self.pairs, self.kept, self.ground, self.channel, self.hooks, self.rims,
             self.laws[0].stiffness, self.laws[1].stiffness, velocities, met, np.zeros(n, np.int64),
-            np.zeros((n, 6), np.bool_), np.zeros(n), self.out, found,
+            np.zeros((n, 6), np.bool_), np.zeros(n), self.meeting, self.scratch.contacts, found,
         )  # fmt: skip
-        told: list[float] = found.tolist()
-        told[ELASTIC] += sum(float(more.slip[..., 3].sum()) for more in (self.hooks, self.rims) if more is not None)
-        return told
+        extremes: list[float] = found.tolist()
+        return extremes
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
@@ -329,7 +356,7 @@ class World:
         groups = {
             "bodies": self.bodies,
             "pairs": self.pairs,
-            "ends": self.ends,
+            "kept": self.kept,
             "ground": self.ground,
             "hooks": self.hooks,
             "rims": self.rims,
@@ -358,12 +385,13 @@ class World:
             memory[name] for name in ("steps", "time_step", "begin", "made", "articulated")
         )
         self.totals, self.skins = arrays["totals"], arrays["fast"]
-        self.bodies, self.pairs, self.ends = group(Bodies, "bodies"), group(Pairs, "pairs"), group(Ends, "ends")
+        if len(self.totals) < TOTALS:  # written before steps could be divided
+            self.totals = np.array([*self.totals, self.time_step, 1.0, 1.0, 0.0])
+        self.bodies, self.pairs = group(Bodies, "bodies"), group(Pairs, "pairs")
         fixed: dict[str, Any] = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
         self.ground = self.ground._replace(**fixed)
-        if self.hooks is not None:
-            self.hooks = self.hooks._replace(slip=arrays["hooks.slip"], used=arrays["hooks.used"])
-        self.rims = group(Rims, "rims") if "rims.slip" in arrays else None
+        self.rims = group(Rims, "rims") if "rims.heights" in arrays else None
+        self.kept = group(Kept, "kept") if "kept.slip" in arrays else contacts_of_older(arrays, self.hooks, self.rims)
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
         self.make_room()
 
@@ -384,6 +412,29 @@ def quaternion_of(matrix: Array) -> Array:
     a, b, c, d = (float(value) for value in q)
     unit: Array = q / math.sqrt(a * a + b * b + c * c + d * d)
     return unit
+
+
+def no_contacts(links: int, slots: int) -> Kept:
+    """Return what links remember that have touched no boundary."""
+    return Kept(np.zeros((links, slots, 4)), np.zeros((links, slots), np.uint8), np.zeros(links, np.uint8))
+
+
+def contacts_of_older(arrays: Mapping[str, NDArray[Any]], hooks: Hooks | None, rims: Rims | None) -> Kept:
+    """Read what contacts remember from a checkpoint with one table for ends, hooks and rims each."""
+    links = len(arrays["ends.used"])
+    kept = no_contacts(links, slots_for(hooks, rims))
+    bits = np.arange(boundaries.SURFACES, dtype=np.uint8)
+    begin = 0
+    for name, unpack in (("ends", True), ("hooks", True), ("rims", False)):
+        if f"{name}.slip" in arrays:
+            slip = arrays[f"{name}.slip"].reshape(links, -1, 4)
+            used = arrays[f"{name}.used"].reshape(links, -1)
+            stop = begin + slip.shape[1]
+            kept.slip[:, begin:stop] = slip
+            kept.used[:, begin:stop] = (used[..., None] >> bits & 1).reshape(links, -1) if unpack else used
+            begin = stop
+    kept.contacts[:] = kept.used.sum(axis=1)
+    return kept
 
 
 def longer(array: NDArray[Any], length: int) -> NDArray[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dem.engine.demand import Demand
+from dem.engine.demand import Demand, contact_law_of
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.yade.construction import ADDS, in_order
@@ -13,7 +13,6 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
-from dem.physics.contact import ContactLaw, contact_law
 from dem.physics.motor import MotorLaw
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
@@ -82,11 +81,6 @@ class YadeKind:
             channel=scene.channel,
             strengths=scene.motor_strengths,
         )
-
-
-def contact_law_of(scene: Demand) -> ContactLaw:
-    """The contact law of a scene, of one sphere with another."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def hinge_law(scene: Demand) -> HingeLaw:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 
@@ -11,10 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import RHO, T1, T2, U, W, make_boxes, make_particle
-from scipy.stats import qmc
 
-from dem.body.particle import Boxes, Particle, chain_mean_width, mean_width
-from dem.errors import InputError
+from dem.body.particle import Boxes, Particle, mean_width
 
 SHAPES = [(0.0, U), (0.05, U), (0.4, U), (0.7, U), (1.0, U), (2.0, U)]
 BENT = [(0.7, (0.0, 0.0)), (0.7, (90.0, 0.0)), (0.4, (30.0, 105.0)), (1.0, (-15.0, 60.0)), (2.0, (10.0, 95.0))]
@@ -81,72 +78,6 @@ def test_mass_centre_and_inertia_equal_exact_quadrature(ratio: float, angles: tu
     assert masses @ points / masses.sum() == pytest.approx(np.zeros(3), abs=1e-13 * W)
     expected = tensor(points, masses)
     assert np.diag(boxes.inertia) == pytest.approx(expected, abs=1e-13 * expected.max())
-
-
-@pytest.mark.parametrize(("ratio", "angles"), [(0.4, U), (2.0, U), *BENT])
-def test_inertia_equals_quasi_random_sum_over_the_boxes(ratio: float, angles: tuple[float, float]) -> None:
-    # Membership of Sobol points in the true boxes, no formula of inertia at all. Overlaps at the hinges count twice,
-    # as in the paper's volume. 2^16 points over a frame that the boxes fill to some 10 %: measured error below 0.6 %.
-    vertices = own_vertices(ratio, angles)
-    low, high = vertices.min(axis=0) - T2, vertices.max(axis=0) + T2
-    sample = qmc.scale(qmc.Sobol(3, seed=5).random_base2(16), [*low, -T1 / 2], [*high, T1 / 2])
-    inside = np.zeros(len(sample))
-    for start, end in itertools.pairwise(vertices):
-        length = np.hypot(*(end - start))
-        along = (end - start) / length
-        from_start = sample[:, :2] - start
-        s, d = from_start @ along, from_start @ [-along[1], along[0]]
-        inside += (s >= 0) & (s <= length) & (np.abs(d) <= T2 / 2)
-    masses = inside * RHO * np.prod(high - low) * T1 / len(sample)
-    boxes = make_boxes(ratio, angles)
-    assert masses.sum() == pytest.approx(boxes.mass, rel=0.01)
-    centred = sample - masses @ sample / masses.sum()
-    assert np.sort(np.linalg.eigvalsh(tensor(centred, masses))) == pytest.approx(np.sort(boxes.inertia), rel=0.015)
-
-
-def test_u_by_parallel_axis_rule_written_out() -> None:
-    ratio = 0.7
-    l, section = ratio * W, RHO * T1 * T2  # noqa: E741
-    m_middle, m_barb = section * W, section * l
-    mass = m_middle + 2 * m_barb
-    y = 2 * m_barb * (l / 2) / mass  # centre of mass above the middle link
-    assert y == pytest.approx(l**2 / (W + 2 * l))
-    along_x = m_middle * (T1**2 + T2**2) / 12 + m_middle * y**2
-    along_x += 2 * (m_barb * (l**2 + T1**2) / 12 + m_barb * (l / 2 - y) ** 2)
-    along_y = m_middle * (W**2 + T1**2) / 12 + 2 * (m_barb * (T1**2 + T2**2) / 12 + m_barb * (W / 2) ** 2)
-    along_z = m_middle * (W**2 + T2**2) / 12 + m_middle * y**2
-    along_z += 2 * (m_barb * (l**2 + T2**2) / 12 + m_barb * ((W / 2) ** 2 + (l / 2 - y) ** 2))
-    boxes = make_boxes(ratio)
-    assert boxes.inertia == pytest.approx([along_x, along_y, along_z], rel=1e-12)
-    assert boxes.vertices[:, 1] == pytest.approx([l - y, -y, -y, l - y], rel=1e-12)
-    assert boxes.vertices[:, 0] == pytest.approx([-W / 2, -W / 2, W / 2, W / 2], rel=1e-12)
-
-
-def test_bar_without_barbs_is_the_analytic_bar() -> None:
-    boxes = make_boxes(0.0)
-    mass = RHO * T1 * T2 * W
-    assert boxes.mass == pytest.approx(mass)
-    assert boxes.inertia == pytest.approx(
-        [mass / 12 * (T1**2 + T2**2), mass / 12 * (W**2 + T1**2), mass / 12 * (W**2 + T2**2)], rel=1e-12
-    )
-
-
-@given(
-    ratio=st.floats(0, 2),
-    a1=st.floats(-15, 105),
-    a2=st.floats(-15, 105),
-    scale=st.floats(0.1, 10),
-)
-def test_moments_obey_triangle_inequality_and_scale_laws(ratio: float, a1: float, a2: float, scale: float) -> None:
-    boxes, scaled = make_boxes(ratio, (a1, a2)), make_boxes(ratio, (a1, a2), scale)
-    x, y, z = np.sort(boxes.inertia)
-    assert 0 < x <= y <= z < x + y  # strict: no body of real thickness is flat
-    points, masses = quadrature(ratio, (a1, a2))
-    centred = points - masses @ points / masses.sum()
-    assert boxes.inertia.sum() == pytest.approx(2 * masses @ (centred**2).sum(axis=1), rel=1e-12)
-    assert scaled.volume == pytest.approx(boxes.volume * scale**3, rel=1e-12)
-    assert scaled.mass == pytest.approx(boxes.mass * scale**3, rel=1e-12)
-    assert scaled.inertia == pytest.approx(boxes.inertia * scale**5, rel=1e-9)
 
 
 @given(ratio=st.floats(0.01, 2), a1=st.floats(-15, 105), a2=st.floats(-15, 105))
@@ -225,14 +156,6 @@ def test_tips_and_hinges_are_where_the_geometry_says(ratio: float, layout: dict[
             assert nearest(vertices[hinge], barb) == pytest.approx(1.01 * d, rel=1e-9)
 
 
-def test_bar_ends_where_its_last_spheres_end() -> None:
-    particle = make_particle(0.0)
-    assert set(particle.links) == {1}
-    x = np.sort(particle.centres[:, 0])
-    assert x[-1] + particle.radius == pytest.approx(W / 2, rel=1e-12)
-    assert x[0] - particle.radius == pytest.approx(-W / 2, rel=1e-12)
-
-
 def smallest_gap(particle: Particle, first: int, second: int) -> float:
     """Least distance of the centres of two links over the sphere diameter."""
     a, b = particle.centres[particle.links == first], particle.centres[particle.links == second]
@@ -254,29 +177,6 @@ def test_barbs_never_overlap_the_middle_link_while_they_turn(
     assert smallest_gap(particle, 2, 1) >= 1 - 1e-9
 
 
-@given(ratio=st.floats(0.2, 1.6), a1=st.floats(-15, 105), a2=st.floats(-15, 105))
-def test_barbs_never_overlap_each_other_up_to_long_barbs(ratio: float, a1: float, a2: float) -> None:
-    # Leaning in by 15° on both sides, tips meet at w - d = 2 l sin 15°, which is l/w = 1.72 for the thickest default.
-    assert smallest_gap(make_particle(ratio, (a1, a2), **LAYOUTS[0]), 0, 2) >= 1
-
-
-def test_reach_covers_spheres_and_box_corners() -> None:
-    for ratio, angles in SHAPES + BENT:
-        particle = make_particle(ratio, angles, rows=2, diameter=0.5e-3)
-        rotation, shift = in_body_frame(particle.boxes, ratio, angles)
-        corners = []
-        for start, end in itertools.pairwise(own_vertices(ratio, angles) @ rotation.T + shift):
-            length = np.hypot(*(end - start))
-            if length:
-                across = np.array([-(end - start)[1], (end - start)[0]]) / length * T2 / 2
-                corners += [[*(p + s * across), T1 / 2] for p in (start, end) for s in (-1, 1)]
-        spheres = np.linalg.norm(particle.centres, axis=1).max() + particle.radius
-        exact = max(np.linalg.norm(corners, axis=1).max(), spheres)
-        # An upper bound: an unneeded margin of a fraction of the thickness is harmless, a shortfall is not.
-        assert exact <= particle.reach * (1 + 1e-12)
-        assert particle.reach <= exact + math.hypot(T1, T2) / 2
-
-
 @pytest.mark.parametrize(("ratio", "angles"), [(0.0, U), (0.05, U), (0.4, U), (0.7, (90.0, 0.0)), (2.0, U)])
 def test_smallest_effective_mass_against_random_pushes(ratio: float, angles: tuple[float, float]) -> None:
     particle = make_particle(ratio, angles, rows=2, diameter=0.5e-3)
@@ -294,69 +194,8 @@ def test_smallest_effective_mass_against_random_pushes(ratio: float, angles: tup
     assert particle.smallest_effective_mass < 0.3 * particle.boxes.mass  # a tip is several times lighter than the body
 
 
-def test_spheres_change_neither_mass_nor_inertia() -> None:
-    coarse, fine = make_particle(0.7), make_particle(0.7, rows=4, diameter=0.4e-3, pitch=0.5)
-    assert len(fine.centres) > 5 * len(coarse.centres)
-    assert coarse.boxes == fine.boxes
-
-
-def test_spheres_thicker_than_half_the_middle_link_are_refused() -> None:
-    with pytest.raises(InputError) as caught:
-        make_particle(0.7, diameter=0.009)
-    assert str(caught.value) == (
-        "fidelity.diameter_m: spheres of 0.009 m do not fit a middle link of 0.0117 m; "
-        "use at most half its length, 0.00585 m"
-    )
-
-
-def test_particle_is_frozen() -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        make_boxes(0.7).density = 1.0  # type: ignore[misc]
-
-
 def test_mean_width_of_a_section_by_random_directions() -> None:
     turn = np.random.default_rng(1).random(200_000) * np.pi
     width = np.abs(T1 * np.cos(turn)) + np.abs(T2 * np.sin(turn))
     assert mean_width(T1, T2) == pytest.approx(width.mean(), rel=3e-3)  # standard error 0.1 %
     assert mean_width(T1, T2) != pytest.approx((T1 + T2) / 2, rel=0.05)
-
-
-@pytest.mark.parametrize("pitch", [0.5, 1.0, 1.3])
-def test_chain_mean_width_by_bringing_random_chains_into_touch(pitch: float) -> None:
-    # Two chains at random phases and isotropic directions are lowered onto each other along their common normal:
-    # contact is at the largest height at which any pair of spheres touches. Weighted by sin γ as excluded volume is.
-    rng = np.random.default_rng(2)
-    number = 10_000
-    cosine = rng.random(number)
-    sine = np.sqrt(1 - cosine**2)
-    beads = pitch * np.arange(-4, 5)
-    a = (rng.random(number)[:, None] - 0.5) * pitch + beads
-    b = (rng.random(number)[:, None] - 0.5) * pitch + beads
-    squared = (a[:, :, None] - b[:, None] * cosine[:, None, None]) ** 2 + (b[:, None] * sine[:, None, None]) ** 2
-    heights = np.sqrt(np.clip(1 - squared, 0, None)).max(axis=(1, 2))
-    measured = (heights * sine).sum() / sine.sum()
-    # Scatter of 10 000 draws of spread ~0.1 is 0.001.
-    assert chain_mean_width(pitch) == pytest.approx(measured, abs=5e-3)
-    assert chain_mean_width(pitch) < 1
-
-
-@pytest.mark.parametrize("angles", [(90.0, 90.0), (0.0, 0.0), (105.0, -15.0), (30.0, 70.0)])
-def test_links_make_up_the_smarticle(angles: tuple[float, float]) -> None:
-    particle = make_particle(0.7, angles=angles)
-    boxes = particle.boxes
-    assert boxes.link_masses.sum() == pytest.approx(boxes.mass, rel=1e-14)
-    assert boxes.link_masses @ boxes.link_centres == pytest.approx(np.zeros(3), abs=1e-18)
-    # The links' own tensors, moved to the common centre of mass, add up to the smarticle's principal one.
-    total = np.zeros((3, 3))
-    for mass, moments, centre, frame in zip(
-        boxes.link_masses, boxes.link_inertias, boxes.link_centres, boxes.link_rotations, strict=True
-    ):
-        assert np.linalg.det(frame) == pytest.approx(1)
-        total += frame @ np.diag(moments) @ frame.T + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    assert total == pytest.approx(np.diag(boxes.inertia), rel=1e-12, abs=1e-22)
-    # Spheres lie along their links: across only by the rows, and between the ends.
-    frames = boxes.link_rotations[particle.links]
-    world = np.einsum("sij,sj->si", frames, particle.local_centres) + boxes.link_centres[particle.links]
-    assert world == pytest.approx(particle.centres, abs=1e-15)
-    assert particle.local_centres[:, 1] == pytest.approx(0, abs=1e-15)
-    assert (np.abs(particle.local_centres[:, 0]) <= boxes.lengths[particle.links] / 2 + 1e-12).all()

@@ -38,26 +38,6 @@ def test_no_two_smarticles_overlap_nor_the_wall(ratio: float, count: int) -> Non
     assert placed[..., 2].min() - particle.radius >= BOTTOM * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("facets", [64, 16])
-def test_no_smarticle_overlaps_the_flat_facets_of_the_wall(facets: int) -> None:
-    # The wall is a polygon of the circle's area; the middle of its sides is nearer than the radius.
-    cylinder = Cylinder(radius=RADIUS, height=1.0, facets=facets)
-    inner = RADIUS * np.sqrt(2 * np.pi / (facets * np.sin(2 * np.pi / facets))) * np.cos(np.pi / facets)
-    particle = make_particle()
-    placed = np.concatenate(
-        [spheres(particle, place(particle, count=12, seed=seed, radius=cylinder.inner_radius)) for seed in range(12)]
-    )
-    assert np.hypot(placed[..., 0], placed[..., 1]).max() + particle.radius < inner
-
-
-def test_same_seed_same_poses_and_another_seed_others() -> None:
-    particle = make_particle()
-    first, again, other = (place(particle, count=10, seed=seed) for seed in (1, 1, 2))
-    assert np.array_equal(first.positions, again.positions)
-    assert np.array_equal(spheres(particle, first), spheres(particle, again))
-    assert np.abs(first.positions - other.positions).max() > 1e-3
-
-
 def test_obstacles_are_kept_clear_of() -> None:
     particle = make_particle()
     # A grid that fills the lower half of the slab but for gaps, so that unhindered poses would hit it.
@@ -85,23 +65,6 @@ def test_orientations_are_uniform_over_rotations() -> None:
     assert ((observed - expected) ** 2 / expected).sum() < chi2.ppf(1 - 1e-4, 7)
     # A constant answer must fail these bounds.
     assert kstest(np.full(400, 0.5), "uniform").pvalue < 1e-4
-
-
-def test_centres_are_uniform_over_the_disc_and_the_slab() -> None:
-    particle = make_particle()
-    placed = [place(particle, count=1, seed=seed, radius=1.0) for seed in range(400)]
-    centres = np.array([pose.positions[0] for pose in placed])
-    area = (np.hypot(centres[:, 0], centres[:, 1]) / 1.0) ** 2
-    assert kstest(area, "uniform").pvalue > 1e-4  # the wall takes 1 % of the disc
-    lowest = np.array([spheres(particle, pose)[..., 2].min() - particle.radius for pose in placed])
-    assert kstest((lowest - BOTTOM) / HEIGHT, "uniform").pvalue > 1e-4
-
-
-def test_slab_that_is_too_full_grows_upwards() -> None:
-    particle = make_particle()
-    placed = spheres(particle, place(particle, count=40, height=1e-3))
-    assert placed[..., 2].max() > BOTTOM + 0.0117 + 1e-3  # above what the slab alone would hold
-    assert len(placed) == 40
 
 
 def test_impossible_layer_fails_with_the_way_out() -> None:

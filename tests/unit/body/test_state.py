@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scenes import make_boxes
 from scipy.spatial.transform import Rotation
 
-from dem.body.particle import Boxes, Particle, SphereChain
+from dem.body.particle import Boxes
 from dem.body.state import State
 
 ANGLE = st.floats(-15, 105)
@@ -114,23 +114,3 @@ def test_angles_and_vertices_of_hinged_links(first: float, second: float, seed: 
     chain = np.array([tips[0], hinges[0], hinges[1], tips[1]])
     assert state.vertices[0] == pytest.approx(chain @ turn.T + place, abs=1e-15)
     assert state.kinetic_energy == 0
-
-
-@given(ANGLE, ANGLE, SEED)
-def test_spheres_follow_their_links(first: float, second: float, seed: int) -> None:
-    # Spheres of the U, carried to other angles by its links, are those of a smarticle made at these angles.
-    chain = SphereChain(rows=2, diameter=5e-4, pitch=5e-4)
-    made, exact = (Particle(make_boxes(0.7, angles), chain) for angles in ((90.0, 90.0), (first, second)))
-    rigid, _ = flying(exact.boxes, seed)
-    carried = State(made.boxes, rigid.link_positions, rigid.link_rotations, rigid.link_velocities, rigid.link_spins)
-    assert carried.spheres(made) == pytest.approx(rigid.spheres(exact), abs=1e-15)
-
-
-def test_no_smarticles_have_no_momentum() -> None:
-    none = np.empty((0, 3, 3))
-    state = State(make_boxes(), none, np.empty((0, 3, 3, 3)), none, none)
-    assert state.count == 0
-    assert state.momentum.tolist() == [0, 0, 0]
-    assert state.kinetic_energy == 0
-    assert state.vertices.shape == (0, 4, 3)
-    assert state.angles.shape == (0, 2)

@@ -20,7 +20,6 @@ from dem.body.state import State
 from dem.deck.lammps import BODIES, DATA, DECK, DUMP, write_deck
 from dem.deck.passive import passive
 from dem.errors import InputError
-from dem.physics.contact import contact_law
 from dem.record.frames import FrameWriter
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -31,7 +30,6 @@ Array = NDArray[np.float64]
 RELAX = {"type": "relax", "duration_s": 0.1}
 SHAKE = {"type": "shake", "duration_s": 0.2, "frequency_hz": 30, "peak_acceleration_g": 2}
 REMOVE = {"type": "remove-container", "duration_s": 0.1}
-PHASES = [RELAX, SHAKE, REMOVE, {**SHAKE, "frequency_hz": 50}]
 HEIGHT = 0.004  # m, of the second smarticle above the first
 LMP = shutil.which("lmp")
 
@@ -98,35 +96,6 @@ def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
         np.testing.assert_allclose([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], whole, atol=1e-12 * whole.max())
 
 
-def test_the_deck_has_the_scene_s_law_steps_and_phases(tmp_path: Path) -> None:
-    scene = scene_of(source(tmp_path / "run"), *PHASES, name="two\nlines & more", **{"contact.friction_wall": 0.2})
-    write_deck(scene, tmp_path / "deck")
-    deck, law = (tmp_path / "deck" / DECK).read_text(), contact_law(scene.particle, scene.contact, 250.0)
-    mass, ratio = scene.particle.boxes.mass, law.tangential_damping
-    assert deck.startswith("# two lines & more: 2 smarticles of ")
-    ((_, style, *pair, limited),) = words(deck, "pair_style")
-    assert (style, limited) == ("gran/hooke/history", "limit_damping")
-    # LAMMPS multiplies damping with the effective mass of two bodies, or of one at a wall.
-    own = [250, 250 * 0.82, law.normal_damping / (mass / 2), ratio * law.normal_damping / (mass / 2), 0.4, 1]
-    assert [float(value) for value in pair] == pytest.approx(own, rel=1e-8)
-    fixes = {line[1]: line[2:] for line in words(deck, "fix")}
-    assert set(fixes) == {"bodies", "weight", "floor", "wall"}
-    own = [250, 250 * 0.82, law.wall_damping / mass, ratio * law.wall_damping / mass, 0.2, 1]
-    for name in ("floor", "wall"):
-        assert [float(value) for value in fixes[name][3:9]] == pytest.approx(own, rel=1e-8)
-        assert fixes[name][9:] == ["limit_damping", "region", name]
-    dt = float(words(deck, "timestep")[0][1])
-    assert dt == passive(scene, "x").time_step
-    assert [int(run[1]) for run in words(deck, "run")] == [round(t / dt) for t in (0.05, 0.1, 0.2, 0.1, 0.2)]
-    # Once the wall is gone the floor is shaken alone.
-    moved = [line for line in words(deck, "variable") if line[1].endswith("amplitude") and line[3] != "0"]
-    assert [line[1] for line in moved] == ["floor_amplitude", "wall_amplitude", "floor_amplitude"]
-    own = [2 * 9.81 / (2 * math.pi * frequency) ** 2 for frequency in (30, 30, 50)]
-    assert [float(line[3]) for line in moved] == pytest.approx(own)
-    assert words(deck, "unfix") == [["unfix", "wall"]]
-    assert deck.index("unfix") > deck.index("phase 3")
-
-
 HOOKS = {"hooks": {"lower_height_m": 0.03, "upper_height_m": 0.04}}
 TIERS = {"container": {"tiers": [{"radius_m": 0.04, "height_m": 0.03}, {"radius_m": 0.02, "height_m": 0.05}]}}
 OPEN, SWING = {"type": "shape-change"}, {"type": "internal-oscillation", "theta_deg": 4}
@@ -153,17 +122,6 @@ def test_what_cannot_be_carried_over_is_refused_by_name(
         assert each in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
     assert not (tmp_path / "deck").exists()
-
-
-def test_a_pour_is_refused_with_what_to_do_instead(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"phases\.0 \(deposit\): a pour \(run it here, and begin with take-over"):
-        write_deck(parse_scene(SMALL, source="x"), tmp_path / "deck")
-
-
-def test_poses_that_overlap_as_spheres_are_refused(tmp_path: Path) -> None:
-    scene = scene_of(source(tmp_path / "run", apart=0.004, low=0.01, high=0))
-    with pytest.raises(InputError, match=r"^phases\.0\.run: \d+ pairs of spheres in frame 0 .* more than 0\.05 diam"):
-        write_deck(scene, tmp_path / "deck")
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from scenes import small
 
-from dem.engine.lammps.child import NEEDED, Child, explain, lammps_version
-from dem.engine.lammps.ranks import RANKS, check_ranks, ranks
-from dem.errors import InputError, RunError
+from dem.engine.lammps.child import NEEDED, Child, explain
+from dem.errors import RunError
 from dem.run.run import run_scene
 
 HELP = "Large-scale Atomic/Molecular Massively Parallel Simulator - {version}\n\n" + " ".join(NEEDED)
@@ -47,26 +46,6 @@ def test_what_is_missing_is_named_and_no_directory_is_left(
     with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
         run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
     assert not (tmp_path / "run").exists()
-
-
-def test_the_version_is_that_of_the_program(programs: Programs) -> None:
-    programs(lmp=said("2 Aug 2023 - Update 1"), mpirun="")
-    assert lammps_version() == "2 Aug 2023 - Update 1"
-
-
-@pytest.mark.parametrize("style", NEEDED)
-def test_a_lammps_without_its_packages_is_refused(programs: Programs, style: str) -> None:
-    programs(lmp=said(without=style), mpirun="")
-    with pytest.raises(RunError, match=r"LAMMPS 29 Sep 2021 was built without .*packages GRANULAR and RIGID") as caught:
-        lammps_version()
-    assert style in str(caught.value)
-
-
-@pytest.mark.parametrize("script", ["echo liblammps.so.0: cannot open >&2; exit 127", "echo something else"])
-def test_a_program_that_is_no_lammps_is_told_with_what_it_says(programs: Programs, script: str) -> None:
-    programs(lmp=script, mpirun="")
-    with pytest.raises(RunError, match=r"lmp: is no LAMMPS that starts \((liblammps|something else)"):
-        lammps_version()
 
 
 KILLED = """\
@@ -117,22 +96,3 @@ def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(program
     assert "signal 9 (Killed)" in kept.read_text()
     kept.unlink()
     kept.parent.rmdir()
-
-
-def test_ranks_are_one_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(RANKS, raising=False)
-    assert ranks() == 1
-    monkeypatch.setenv(RANKS, "3")
-    assert ranks() == 3
-
-
-def test_more_ranks_than_cores_are_refused_but_for_those_of_a_batch_system(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
-    monkeypatch.delenv("SLURM_NTASKS", raising=False)
-    check_ranks(2)
-    with pytest.raises(InputError, match=r"^--ranks 3: there are 2 cores .*; use at most 2, or more machines"):
-        check_ranks(3)
-    monkeypatch.setenv("SLURM_NTASKS", "64")
-    check_ranks(64)
-    with pytest.raises(InputError, match=r"use at most 64"):
-        check_ranks(65)

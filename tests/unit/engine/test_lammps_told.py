@@ -11,10 +11,9 @@ from scenes import SMALL, changed, small
 from scipy.spatial.transform import Rotation
 
 from dem.body.state import State
-from dem.engine.kinds import engine_kind
 from dem.engine.lammps.contacts import Contacts
 from dem.engine.lammps.fixtures import LammpsFixtures
-from dem.engine.lammps.text import Moving, body_lines, contact_terms, sphere_lines, sphere_masses
+from dem.engine.lammps.text import Moving, contact_terms
 from dem.errors import InputError
 from dem.physics.contact import contact_law
 from dem.scene.reading import parse_scene
@@ -62,13 +61,6 @@ def test_what_it_cannot_compute_is_refused_by_name_when_the_scene_is_read(
     assert parse_scene({**data, "engine": "yade"}, source="x").engine == "yade"
 
 
-def test_its_spheres_law_and_step_are_those_of_yade() -> None:
-    one, other = small({"engine": "lammps"}), small()
-    assert np.array_equal(one.particle.centres, other.particle.centres)
-    kinds = engine_kind("lammps"), engine_kind("yade")
-    assert kinds[0].stable_step(one, articulated=False) == kinds[1].stable_step(other, articulated=False)
-
-
 def test_damping_is_given_by_mass_as_lammps_multiplies_it() -> None:
     scene = small()
     law, mass = contact_law(scene.particle, scene.contact, 250.0), scene.particle.boxes.mass
@@ -88,33 +80,6 @@ def moving(count: int) -> tuple[Any, Moving]:
     vectors = (rng.normal(size=(count, 3)) for _ in range(5))
     places, *rest = vectors
     return scene, Moving(places, turns, *rest)
-
-
-def test_bodies_keep_all_digits_of_their_motion() -> None:
-    scene, told = moving(3)
-    number, *lines = body_lines(scene.particle, told)
-    assert number == "3"
-    rows = np.array([line.split() for line in lines], float)
-    assert rows.shape == (3, 20)
-    assert np.array_equal(rows[:, 2:5], told.positions)
-    assert np.array_equal(rows[:, 11:14], told.velocities)
-    assert np.array_equal(rows[:, 14:17], told.momenta)
-    xx, yy, zz, xy, xz, yz = rows[:, 5:11].T
-    tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    turned = np.swapaxes(told.turns, 1, 2) @ tensors @ told.turns
-    np.testing.assert_allclose(turned, np.tile(np.diag(scene.particle.boxes.inertia), (3, 1, 1)), atol=1e-20)
-
-
-def test_spheres_that_are_added_go_on_counting() -> None:
-    scene = small()
-    each = len(scene.particle.centres)
-    spheres = np.zeros((2, each, 3))
-    rows = list(sphere_lines(scene.particle, scene.cylinder, spheres, title="more", first=7))
-    atoms = np.array([row.split() for row in rows[-2 * each :]], float)
-    assert atoms[[0, -1], 0].tolist() == [7 * each + 1, 9 * each]
-    assert atoms[[0, -1], 7].tolist() == [8, 9]
-    masses = atoms[:each, 6] * math.pi / 6 * scene.sphere_diameter**3
-    np.testing.assert_allclose(masses, sphere_masses(scene.particle), rtol=1e-12)
 
 
 @pytest.fixture
@@ -161,14 +126,6 @@ def test_floor_and_wall_are_where_lammps_s_variables_put_them(
     again.restore(fixtures.memory)
     clock[0] = 510
     assert again.floor == fixtures.floor != height
-
-
-def test_the_floor_may_move_alone(fixtures: LammpsFixtures, told: list[str], clock: list[float]) -> None:
-    fixtures.shake(amplitude=1e-3, frequency=25.0, walls=False)
-    clock[0] = 70
-    assert fixtures.floor != 0
-    assert fixtures.wall_bottom == -0.002
-    assert "variable wall_amplitude equal 0" in told
 
 
 def test_contacts_are_those_of_all_pairs_of_spheres(fixtures: LammpsFixtures) -> None:

@@ -7,21 +7,17 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from scenes import chain
 
 from dem.errors import InputError
 from dem.phases.gaits.checks import actuation_warnings, overshoot
-from dem.plan.advice import warnings_of
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 
 SceneData = Callable[..., dict[str, Any]]
 
-HOLD = {"type": "hold"}
 RAMP = {"type": "ramp", "to_deg": 0, "duration_s": 1}
 SINE = {"type": "sine", "centre_deg": 90, "amplitude_deg": 5, "frequency_hz": 1}
-TRIANGLE = {"type": "triangle", "centre_deg": 90, "amplitude_deg": 5, "speed_rad_per_s": 6}
 SHAPE_CHANGE = {"type": "shape-change"}
 OSCILLATION = {"type": "internal-oscillation", "theta_deg": 10}
 
@@ -47,9 +43,6 @@ def refused(data: SceneData, *phases: dict[str, Any], **changes: Any) -> str:
     return message.removeprefix("bad.yaml: ")
 
 
-RANGE = "outside -15° … 105°, the range of the hinges"
-
-
 def test_the_ways_out_lead_out(scene_data: SceneData) -> None:
     checked(scene_data, {**SHAPE_CHANGE, "opening_s": 0.262})
     checked(scene_data, {**OSCILLATION, "theta_deg": 30})
@@ -58,16 +51,6 @@ def test_the_ways_out_lead_out(scene_data: SceneData) -> None:
     checked(scene_data, actuate(RAMP, active_fraction=0.1))
     checked(scene_data, SHAPE_CHANGE, fidelity={"diameter_m": 1.2e-3}, smarticle__aspect_ratio=0.155)
     checked(scene_data, SHAPE_CHANGE, fidelity={"control_interval_s": 0.00025})
-
-
-def test_scaled_swing_names_what_is_possible_for_its_barbs(scene_data: SceneData) -> None:
-    # θ = 20° at l/w = 0.4 is a swing of 17.5° to either side; 15° to either side is θ = 120/7°.
-    phase = {**OSCILLATION, "theta_deg": 20}
-    assert refused(scene_data, phase, smarticle__aspect_ratio=0.4) == (
-        f"phases.1.theta_deg: 20° makes the barbs reach 107.5°, {RANGE}; use at most 17.1° or another centre"
-    )
-    checked(scene_data, {**phase, "theta_deg": 17.1}, smarticle__aspect_ratio=0.4)
-    checked(scene_data, {**phase, "scaled": False}, smarticle__aspect_ratio=0.4)
 
 
 def test_speed_depends_on_where_the_phase_before_ended(scene_data: SceneData) -> None:
@@ -80,15 +63,6 @@ def test_speed_depends_on_where_the_phase_before_ended(scene_data: SceneData) ->
     # One smarticle that moved before is enough.
     some = {**there, "active_fraction": 0.1}
     assert refused(scene_data, some, back).startswith("phases.2.barbs.duration_s: 0.2 s makes 7.854 rad/s")
-
-
-def test_a_swing_that_is_cut_before_it_leaves_the_range(scene_data: SceneData) -> None:
-    # Down first: a half cycle of 0.5 s would have to pass before the swing goes above its centre.
-    phase = actuate({**SINE, "amplitude_deg": 20, "cycles_offset": 0.5}, duration_s=0.5)
-    checked(scene_data, phase)
-    assert "makes the barbs reach 110°" in refused(scene_data, {**phase, "duration_s": 0.8})
-    # With random offsets any part of the period may come first.
-    assert "makes the barbs reach 110°" in refused(scene_data, {**phase, "offsets": "random"})
 
 
 def test_crossing_barbs(scene_data: SceneData) -> None:
@@ -132,34 +106,6 @@ def test_first_sphere_of_a_barb_against_the_middle_link(scene_data: SceneData) -
     checked(scene_data, inward_to(98), fidelity=finest)
 
 
-@pytest.mark.parametrize("rows", [1, 2])
-@pytest.mark.parametrize("pitch", [0.1, 0.25, 0.4])
-@pytest.mark.parametrize("width", [0.0117, 0.0083, 0.0061])
-def test_pitch_that_is_named_is_wide_enough(scene_data: SceneData, width: float, pitch: float, rows: int) -> None:
-    changes = {"smarticle__middle_length_m": width, "smarticle__aspect_ratio": 1}
-    message = refused(scene_data, inward_to(105), fidelity={"rows": rows, "pitch": pitch}, **changes)
-    named = float(message.rpartition("at least ")[2])
-    checked(scene_data, inward_to(105), fidelity={"rows": rows, "pitch": named}, **changes)
-
-
-def test_first_sphere_where_the_barbs_begin(scene_data: SceneData) -> None:
-    # The motion itself never asks for 105°, but smarticles start there, and some stay there.
-    phase = actuate({**SINE, "centre_deg": 60}, duration_s=1, active_fraction=0.5)
-    message = refused(scene_data, phase, fidelity={**NARROW, "pitch": 0.4}, smarticle__angles_deg=[105, 90])
-    assert "touches them at the 105° of phases.1" in message
-
-
-def test_scene_without_actuated_phases_is_not_asked(scene_data: SceneData, monkeypatch: pytest.MonkeyPatch) -> None:
-    relax = {"type": "relax", "duration_s": 1}
-    bare = {"fidelity": {"control_interval_s": 3e-4, "pitch": 0.4}, "smarticle__aspect_ratio": 0}
-    checked(scene_data, relax, **bare)
-    refused(scene_data, SHAPE_CHANGE, **bare)
-    monkeypatch.setattr("dem.phases.gaits.actuated.check_actuated", lambda scene, index: 1 / 0)
-    checked(scene_data, relax)
-    with pytest.raises(ZeroDivisionError):
-        checked(scene_data, SHAPE_CHANGE)
-
-
 # -- what is not refused, but said ---------------------------------------------------------------------------------
 
 
@@ -186,15 +132,3 @@ def test_motors_that_one_look_takes_far_beyond_their_limit_are_warned_of(scene_d
         assert actuation_warnings(checked(scene_data, SHAPE_CHANGE, **quick, **way_out)) == ()
     for not_enough in ({"fidelity": {"control_interval_s": 0.004 / 89}}, {"motor__stiffness_N_m_per_rad": 0.00068}):
         assert actuation_warnings(checked(scene_data, SHAPE_CHANGE, **quick, **not_enough))
-
-
-def test_default_motors_and_scenes_without_motors_are_not_warned_of(scene_data: SceneData) -> None:
-    scene = checked(scene_data, SHAPE_CHANGE)
-    assert overshoot(scene) == pytest.approx(0.224, rel=1e-2)
-    assert actuation_warnings(scene) == ()
-    # Without actuated phases nobody asks.
-    assert warnings_of(checked(scene_data, {"type": "relax", "duration_s": 1}, motor__speed_limit_rad_per_s=60)) == ()
-
-
-def test_a_servo_is_capped_and_so_not_warned_of() -> None:
-    assert overshoot(chain({"motor.torque_limit_N_m": 1e-9})) == 0

@@ -55,9 +55,3 @@ def test_what_a_pull_remembers_is_enough_to_go_on() -> None:
     straight, raised, _ = pull(10.0, force_limit_N=0.02, duration_s=ARRIVAL)
     again, too, _ = pull(10.0, anew=True, force_limit_N=0.02, duration_s=ARRIVAL)
     assert (again.steps, too) == (straight.steps, raised)
-
-
-def test_a_hook_that_felt_nothing_is_told() -> None:
-    _, _, pulling = pull(0.0)
-    assert pulling.memory["warning"].startswith("no smarticle touched the upper hook")
-    assert "lower hooks.upper_height_m" in pulling.memory["warning"]

@@ -78,15 +78,6 @@ def test_a_phase_takes_the_time_that_it_says_and_remembers_all_that_it_needs(pha
     assert ends[0] == ends[1]
 
 
-@pytest.mark.parametrize("phase", PHASES, ids=[phase["type"] for phase in PHASES])
-def test_a_phase_without_motors_is_welded_and_one_with_motors_articulated(phase: dict[str, Any]) -> None:
-    scene, engine = begin(SWING, phase, hooks={})
-    run_phase(scene, engine, 1)
-    assert engine.motors.articulated
-    run_phase(scene, engine, 2)
-    assert engine.motors.articulated is scene.phases[2].actuates
-
-
 # -- pour --------------------------------------------------------------------------------------------------------------
 
 
@@ -102,27 +93,6 @@ def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> N
     assert engine.positions[:, 2] == pytest.approx(engine.stands)
 
 
-def test_a_pour_by_the_clock_waits_for_nobody_until_all_are_there() -> None:
-    clocked = {"phases.0.every_s": 0.015, "phases.0.thrown_at_m_per_s": 2.0}
-    scene = small({"count": 12, **clocked})
-    engine, stage = EngineDouble.of(scene, DT), scene.phases[0].begin(scene, 0)
-    counts, waits, tops = [], [], []
-    for _ in range(3):
-        waits.append(stage.proceed(engine))
-        counts.append(engine.count)
-        new = slice(0, 5) if engine.count == 5 else slice(engine.count - (5 if engine.count == 10 else 2), None)
-        assert (engine.velocities[new, 2] == -2.0).all()
-        tops.append(engine.state().vertices[new, :, 2].min())
-        engine.advance(round(waits[-1] / DT))
-    assert (counts, waits) == ([5, 10, 12], [0.015] * 3)
-    # All from the same height, high up at the wall, whatever is below.
-    least = scene.cylinder.height - scene.phases[0].layer_height_w * 0.0117 - 2 * scene.particle.reach
-    assert least < min(tops)
-    assert max(tops) < least + 0.0117
-    perform(stage, engine)
-    assert engine.touches().all()
-
-
 def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
     poses = []
     for anew in (False, True):
@@ -135,12 +105,6 @@ def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
         )
         poses.append(engine.state().link_positions)
     assert np.array_equal(*poses)
-
-
-def test_a_layer_that_does_not_come_down_is_told() -> None:
-    scene = small({"gravity_m_per_s2": 1e-4})
-    with pytest.raises(RunError, match=r"a layer of 5 had not come down 2 s after .* phases\.0\.landed_speed_m_per_s"):
-        run_phase(scene, EngineDouble.of(scene, 1e-3), 0)
 
 
 @pytest.mark.parametrize(
@@ -160,21 +124,7 @@ def test_a_pile_that_does_not_settle_is_told_with_its_residuals(
     assert said in str(caught.value)
 
 
-def test_what_does_not_fit_is_told_with_how_many_did() -> None:
-    # On the double nobody lies on another: it is the reach of those that stand that leaves no room for a layer more.
-    scene = small({"container.height_m": 0.035})
-    with pytest.raises(RunError, match=r"10 smarticles do not fit: after 5 the next layer would reach .* lower count"):
-        run_phase(scene, EngineDouble.of(scene, DT), 0)
-
-
 # -- container ---------------------------------------------------------------------------------------------------------
-
-
-def test_shaking_tells_amplitude_and_frequency_and_stops() -> None:
-    scene, engine = begin({"type": "shake", "duration_s": 0.1, "frequency_hz": 25, "peak_acceleration_g": 3})
-    run_phase(scene, engine)
-    amplitude = 3 * 9.81 / (2 * np.pi * 25) ** 2
-    assert engine.told == [("shake", pytest.approx(amplitude), 25), ("stop",)]
 
 
 def test_the_floor_alone_is_shaken_within_its_wall() -> None:
@@ -244,14 +194,6 @@ def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> 
     assert duration == pytest.approx(0.01 / 0.5, abs=1e-4)
 
 
-def test_straining_ends_when_the_chain_has_parted() -> None:
-    engine, duration = strained()
-    assert engine.told[-1] == ("untie",)
-    # The last one is drawn out of the next by two thicknesses and a gap; looked at every 10 ms.
-    needed = (2 * 0.0095 + 0.00105) / 0.5
-    assert needed <= duration <= needed + CHECK_INTERVAL + 1e-4
-
-
 @pytest.mark.parametrize("at_once", [2, 7, 64])
 def test_looks_that_are_told_at_once(at_once: int) -> None:
     ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
@@ -264,14 +206,3 @@ def test_looks_that_are_told_at_once(at_once: int) -> None:
     assert len(ends[0][0]) == round(0.01 / scene.fidelity.control_interval_s) + 1
     np.testing.assert_array_equal(ends[0][0], ends[1][0])
     assert ends[0][1] == pytest.approx(ends[1][1], abs=1e-9)
-
-
-def test_a_chain_that_has_parted_is_noticed_whatever_is_told_at_once() -> None:
-    ends = []
-    for looks in (1, 64):
-        scene = chain({"phases.1.distance_m": 0.05, "phases.1.speed_m_per_s": 0.5})
-        engine = EngineDouble.of(scene, scene.fidelity.control_interval_s)
-        engine.motors.looks_at_once = looks
-        run_phase(scene, engine, 0)
-        ends.append(run_phase(scene, engine, 1))
-    assert ends[0] == pytest.approx(ends[1], abs=1e-9)

@@ -16,23 +16,15 @@ from double import EngineDouble, KindDouble
 from numpy.typing import NDArray
 from scenes import SMALL, changed
 
-from dem.body.fitting import fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
 from dem.phases.take_over import STRIDE, TakeOver
-from dem.plan.outlook import plan
-from dem.record.frame import Frame, frame_mesh
+from dem.record.frame import Frame
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
-from dem.record.rundir import claimed
 from dem.run.run import run_scene
 from dem.run.simulation import Simulation
-from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
-from smarticles.scene_sweep import write_sweep
-from templates.sweep.expand import expand
-from templates.sweep.folder import create_folder
-from templates.sweep.sweep_file import load_sweep
 
 DT = 2e-4
 RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04}
@@ -129,31 +121,6 @@ def test_a_run_begins_with_the_poses_of_the_frame_above_its_floor(
     assert ("still",) not in kind.built[-1].told
 
 
-def test_the_manifest_says_whose_smarticles_they_are(pour: Path, tmp_path: Path) -> None:
-    run_scene(scene_of(pour), tmp_path / "deep" / "on", command="test", progress=False)
-    manifest, source = read_run(tmp_path / "deep" / "on"), read_run(pour)
-    assert manifest.taken_over is not None
-    told = dict(manifest.taken_over)
-    assert (tmp_path / "deep" / "on" / told.pop("run")).resolve() == pour
-    frames = read_frames(pour)
-    assert (told["frame"], told["time_s"]) == (len(frames) - 1, frames[-1].time)
-    assert (told["scene_sha256"], told["seed"], told["engine"]) == (source.scene_sha256, source.seed, source.engine)
-    assert told["fastest_m_per_s"] == np.linalg.norm(frames[-1].link_velocity, axis=-1).max() > 0
-    assert [phase.type for phase in manifest.phases] == ["take-over", "relax", "shake"]
-    assert source.taken_over is None
-
-
-def test_poses_that_move_are_told(pour: Path) -> None:
-    rested = max(k for k, frame in enumerate(read_frames(pour)) if frame.phase == 1)
-    assert plan(scene_of(pour, {"frame": rested})).warnings == ()
-    speeds = [float(np.linalg.norm(frame.link_velocity, axis=-1).max()) for frame in read_frames(pour)]
-    number = max(range(rested + 1, len(speeds)), key=speeds.__getitem__)
-    (warning,) = plan(scene_of(pour, {"frame": number})).warnings
-    assert warning.startswith(
-        f"phases.0.frame: frame {number} of {pour} is not at rest, up to {speeds[number]:.3g} m/s"
-    )
-
-
 # -- how a scene is resolved -------------------------------------------------------------------------------------------
 
 
@@ -197,60 +164,6 @@ def test_a_directory_is_seen_from_the_scene_s_file(pour: Path, tmp_path: Path, m
     )
 
 
-def test_a_sweep_sees_directories_from_its_template_and_its_scenes_from_themselves(pour: Path, tmp_path: Path) -> None:
-    (tmp_path / "sweeps").mkdir()
-    data = data_of("../pour") | {"seed": "SEED"}
-    text = yaml.safe_dump(data).replace("SEED", "{{ seed }}")
-    (tmp_path / "sweeps" / "on.yaml.j2").write_text(text, encoding="utf-8")
-    content = {
-        "template": "on.yaml.j2",
-        "run_name": "s{{ seed }}",
-        "points": {"list": [{}]},
-        "repeats": {"seeds": [1, 2]},
-    }
-    file = tmp_path / "sweeps" / "on.yaml"
-    file.write_text(yaml.safe_dump({"schema_version": 1, "name": "on", **content}), encoding="utf-8")
-    sweep = load_sweep(file)
-    points = expand(sweep)
-    folder = create_folder(tmp_path / "out", sweep, points, command="test", versions={}, expected_s=lambda _: 1.0)
-    for entry, point in zip(folder.entries, points, strict=True):
-        scene = load_scene(folder.scene(entry))
-        assert first(scene).run == str(pour)
-        assert scene_hash(scene) == entry.scene_sha256 == point.scene_sha256
-        assert str(tmp_path) not in folder.scene(entry).read_text(encoding="utf-8")
-
-
-def test_a_scene_whose_keys_vary_sees_directories_from_its_own_file(pour: Path, tmp_path: Path) -> None:
-    (tmp_path / "scenes").mkdir()
-    (tmp_path / "deep" / "scratch").mkdir(parents=True)
-    file = tmp_path / "scenes" / "on.yaml"
-    file.write_text(yaml.safe_dump(data_of("../pour")), encoding="utf-8")
-    for scene in (file, load_scene(file)):
-        points = expand(load_sweep(write_sweep(scene, {"seed": [3, 4]}, tmp_path / "deep" / "scratch")))
-        assert [first(point.scene).run for point in points] == [str(pour)] * 2
-
-
-def test_a_link_on_the_way_does_not_lead_astray(pour: Path, tmp_path: Path) -> None:
-    (tmp_path / "far" / "away").mkdir(parents=True)
-    (tmp_path / "link").symlink_to(tmp_path / "far" / "away")
-    folder = tmp_path / "link"
-    (folder / "scene.yaml").write_text(dump_scene(scene_of(pour), folder), encoding="utf-8")
-    assert first(load_scene(folder / "scene.yaml")).run == str(pour)
-
-
-def test_a_run_is_read_and_told_where_its_source_is_gone_but_not_run_again(pour: Path, tmp_path: Path) -> None:
-    scene = scene_of(pour)
-    run_scene(scene, tmp_path / "on", command="test", progress=False)
-    pour.rename(tmp_path / "elsewhere")
-    again = load_scene(tmp_path / "on" / "scene.yaml")
-    assert scene_hash(again) == scene_hash(scene)
-    assert plan(again).warnings == ()
-    assert run_scene(again, tmp_path / "on", command="test", progress=False, resume=True) is None
-    with pytest.raises(InputError, match=r"^phases\.0\.run: cannot read run directory .*pour: no such directory; give"):
-        run_scene(again, tmp_path / "anew", command="test", progress=False)
-    assert not (tmp_path / "anew").exists()
-
-
 def test_a_run_goes_on_from_its_checkpoint_without_its_source(
     pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,30 +185,6 @@ def test_a_run_goes_on_from_its_checkpoint_without_its_source(
     assert np.array_equal(*ends)
 
 
-def test_a_source_that_has_changed_is_noticed(pour: Path, tmp_path: Path) -> None:
-    (tmp_path / "pinned.yaml").write_text(dump_scene(scene_of(pour), tmp_path), encoding="utf-8")
-
-    def move(mesh: meshio.Mesh) -> None:
-        mesh.points[:, 0] += 1e-9
-
-    rewrite(pour, -1, move)
-    scene = load_scene(tmp_path / "pinned.yaml")
-    with pytest.raises(InputError, match=r"^phases\.0\.sha256: frame \d+ of .* has other poses .* leave sha256 out"):
-        run_scene(scene, tmp_path / "on", command="test", progress=False)
-
-
-def test_what_was_not_said_is_filled_in_anew(pour: Path, tmp_path: Path) -> None:
-    """Who changes the run of a scene that was read gets that run's last frame, not a hash that cannot be."""
-    said = scene_of(pour).model_dump(exclude_unset=True)["phases"][0]
-    assert said == {"type": "take-over", "run": str(pour)}
-
-
-def test_the_schema_knows_it() -> None:
-    keys = json_schema()["$defs"]["TakeOver"]
-    assert keys["required"] == ["type", "run"]
-    assert set(keys["properties"]) == {"type", "run", "frame", "sha256", "settle"}
-
-
 # -- what is refused ---------------------------------------------------------------------------------------------------
 
 
@@ -313,27 +202,6 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
         assert line.startswith("phases.0")
     assert refused(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
     assert refused(pour, {"run": ""}).startswith("phases.0.run: ")
-
-
-def test_damaged_frames(pour: Path) -> None:
-    path = read_frames(pour).paths[-1]
-    path.write_bytes(path.read_bytes()[:-200])
-    line = refused(pour)
-    assert line.startswith(f"phases.0.frame: cannot read frame {path}: truncated")
-    (pour / "frames.pvd").unlink()
-    assert refused(pour).startswith("phases.0.run: cannot read list of frames")
-
-
-def test_runs_that_are_not_done(pour: Path) -> None:
-    with claimed(pour, resume=True):
-        for frame in ("last", 7):
-            assert refused(pour, {"frame": frame}).startswith(f"phases.0.run: {pour} is still being computed; wait")
-    (pour / "done.json").unlink()
-    assert refused(pour) == (
-        f"phases.0.frame: last, but {pour} is unfinished; go on with it (smarticles resume {pour}), or give the number "
-        "of a frame"
-    )
-    assert first(scene_of(pour, {"frame": 7})).frame == 7
 
 
 @pytest.mark.parametrize(
@@ -355,71 +223,6 @@ def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) 
     told = refused(pour, **changes)
     assert told.startswith(line)
     assert "; " in told
-
-
-def test_barbs_that_all_stand_alike_name_the_scene_that_would_do(pour: Path) -> None:
-    assert refused(pour, **{"smarticle.angles_deg": [90, 80]}).endswith("use smarticle.angles_deg: [90, 90]")
-
-
-def test_barbs_that_stand_apart_are_refused(pour: Path) -> None:
-    def bend(mesh: meshio.Mesh) -> None:
-        # One tip of one smarticle moves by 0.1 mm.
-        mesh.points[3] += 1e-4 * (mesh.points[1] - mesh.points[2]) / 0.0117
-
-    rewrite(pour, -1, bend)
-    line = refused(pour)
-    assert line.startswith("smarticle.angles_deg: (90, 90) here, but the barbs of frame")
-    assert line.endswith("smarticles of a scene begin in one shape: take a frame in which all barbs stand alike")
-
-
-def test_a_pile_that_is_not_poured_to_the_end(pour: Path) -> None:
-    frames = read_frames(pour)
-    few = next(k for k, frame in enumerate(frames) if frame.count < 10)
-    line = refused(pour, {"frame": few})
-    assert line.startswith(f"count: 10 here, but frame {few} of {pour}")
-    assert f"holds {frames[few].count} of 10, poured so far; use the same, or another frame" in line
-
-
-def test_a_wall_that_is_too_low_and_a_hook_in_the_pile(pour: Path) -> None:
-    def lift(mesh: meshio.Mesh) -> None:
-        mesh.points[:, 2] += 0.05
-
-    assert scene_of(pour, hooks={"lower_height_m": 0.03, "upper_height_m": 0.04}).hooks is not None  # above the pile
-    vertices = above_floor(read_frames(pour)[-1])
-    low = float(vertices[..., 2].mean())
-    line = refused(pour, hooks={"lower_height_m": low, "upper_height_m": 0.04, "length_m": 0.03, "side_m": 0.004})
-    assert line.startswith(f"hooks.lower_height_m: {low:g} m; ")
-    assert line.endswith("lie in this hook; take over a run that was poured with these hooks")
-    rewrite(pour, -1, lift)
-    assert refused(pour, **{"container.height_m": 0.05}).startswith("container.height_m: 0.05 m, but the smarticles of")
-
-
-def test_a_tip_may_be_under_the_floor_as_deep_as_contacts_are_and_an_axis_may_not(pour: Path) -> None:
-    floor, radius = read_frames(pour)[-1].floor_z, parse_scene(SMALL, source="x").particle.radius
-
-    def stand(tip: float) -> Callable[[meshio.Mesh], None]:
-        """One smarticle on its tips, barbs upright, at a height [m] over the floor; the others stay."""
-
-        def change(mesh: meshio.Mesh) -> None:
-            half, long = 0.0117 / 2, float(np.linalg.norm(mesh.points[1] - mesh.points[0]))
-            heights = floor + tip + np.array([0.0, long, long, 0.0])
-            mesh.points[:4] = np.column_stack([[-half, -half, half, half], np.zeros(4), heights])
-
-        return change
-
-    rewrite(pour, -1, stand(-0.5 * radius))
-    assert scene_of(pour).count == 10
-    rewrite(pour, -1, stand(-1.05 * radius))
-    assert "takes over, lie at -3.248e-05 to" in refused(pour)
-
-
-def test_how_a_straight_smarticle_is_turned_is_unknown(tmp_path: Path) -> None:
-    straight = {"smarticle.aspect_ratio": 0, "recording": RECORDING}
-    source = parse_scene(changed(SMALL, straight), source="pour")
-    run_scene(source, tmp_path / "pour", command="test", progress=False)
-    assert scene_of(tmp_path / "pour", **{"smarticle.aspect_ratio": 0}).count == 10
-    line = refused(tmp_path / "pour", **{"smarticle.aspect_ratio": 0, "fidelity": "reference"})
-    assert line.startswith("fidelity.rows: 2, but frames do not know how a straight smarticle is turned")
 
 
 # -- the stage ---------------------------------------------------------------------------------------------------------
@@ -473,15 +276,3 @@ def test_what_never_comes_apart_fails(pour: Path) -> None:
     ):
         perform(scene, engine)
     assert engine.time < 0.11
-
-
-def test_poses_are_those_of_the_centres_of_mass(pour: Path) -> None:
-    scene = scene_of(pour)
-    engine = EngineDouble.of(scene, DT)
-    scene.phases[0].begin(scene, 0).proceed(engine)
-    vertices = above_floor(read_frames(pour)[-1])
-    assert np.array_equal(engine.positions, fitted_poses(scene.particle.boxes, vertices)[0].positions)
-    np.testing.assert_allclose(engine.state().vertices, vertices, atol=1e-15)
-    assert frame_mesh(engine.state(), contacts=np.zeros(10, np.int64), time=0, floor=0, phase=0).points == (
-        pytest.approx(vertices.reshape(-1, 3), abs=1e-15)
-    )

@@ -38,18 +38,6 @@ def test_damping_ratio_inverts_it(restitution: float) -> None:
     assert restitution_of(damping_ratio(restitution)) == pytest.approx(restitution, rel=1e-9)
 
 
-def test_less_damping_rebounds_faster() -> None:
-    ratios = [damping_ratio(restitution) for restitution in (0.01, 0.2, 0.5, 0.9, 1.0)]
-    assert ratios == sorted(ratios, reverse=True)
-    assert ratios[2] == pytest.approx(0.2565, abs=5e-3)  # a contact that pulled would need 0.2155
-
-
-def test_elastic_contact_has_no_damping() -> None:
-    assert damping_ratio(1.0) == 0
-    law = contact_law_of(small({"contact.restitution": 1}))
-    assert (law.normal_damping, law.wall_damping) == (0, 0)
-
-
 def test_typical_mass_by_random_pushes() -> None:
     particle = small().particle
     pushes = np.random.default_rng(4).normal(size=(4000, 3))

@@ -29,97 +29,7 @@ def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors 
     return motors
 
 
-# -- speed -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_jump_of_the_target_is_followed_at_the_speed_limit(sign: int) -> None:
-    law = replace(HALT, torque_limit=1.0)
-    motors = Motors(law, np.zeros((2, 2)))
-    seen = []
-    for _ in range(30):
-        motors.look(np.zeros((2, 2)), np.full((2, 2), sign * 0.02), PERIOD, STEP)
-        seen.append(motors.commands[1, 0])
-    steps = np.diff([0.0, *seen])
-    whole = int(0.02 // (6 * PERIOD))
-    assert steps[:whole] == pytest.approx(np.full(whole, sign * 6 * PERIOD), rel=1e-12)
-    assert seen[-1] == sign * 0.02
-    assert (np.diff(seen[whole + 1 :]) == 0).all()
-
-
-def test_slow_schedule_is_followed_exactly_and_each_barb_its_own() -> None:
-    motors = Motors(replace(HALT, torque_limit=1.0), np.array([[0.1, 0.2], [0.3, 0.4]]))
-    for look in range(1, 6):
-        targets = np.array([[0.1 + 1e-4 * look, 0.2 - 2e-4 * look], [0.3, 0.4 + 3e-4 * look]])
-        torques = motors.look(np.array([[0.1, 0.2], [0.3, 0.4]]), targets, PERIOD, STEP)
-        assert motors.commands == pytest.approx(targets, rel=1e-14)
-        assert torques == pytest.approx(3e-3 * (targets - [[0.1, 0.2], [0.3, 0.4]]), abs=1e-18)
-        assert (motors.torques == torques).all()
-
-
-def test_a_motor_that_halts_falls_behind_its_schedule_by_what_it_did_not_go() -> None:
-    motors = held(HALT, 0.0, 0.1, 40)
-    # It stopped at the first look that found τ_max, 1.6e-5 N m / 3e-3 N m/rad, in steps of 6 rad/s for one period.
-    stopped = math.ceil(1.6e-5 / 3e-3 / (6 * PERIOD)) * 6 * PERIOD
-    assert motors.schedule == pytest.approx(np.full((1, 2), 0.1))
-    assert motors.schedule - motors.commands == pytest.approx(np.full((1, 2), 0.1 - stopped), rel=1e-12)
-    again = Motors(HALT, np.zeros((1, 2)))
-    again.restore(motors.memory)
-    assert again.memory == motors.memory
-    motors.engage(np.full((1, 2), 0.3))
-    assert (motors.schedule == motors.commands).all()
-
-
 # -- the halting law ---------------------------------------------------------------------------------------------------
-
-
-@given(st.floats(-1, 1), st.floats(1e-3, 60), st.floats(1e-6, 1e-3), st.sampled_from([1, -1]))
-def test_halting_motor_stops_within_one_periods_advance(angle: float, speed: float, limit: float, sign: int) -> None:
-    law = replace(HALT, speed_limit=speed, torque_limit=limit)
-    looks = math.ceil(limit / (3e-3 * speed * PERIOD)) + 3
-    if looks > 5000:
-        return
-    motors = held(law, angle, angle + sign * 10.0, looks)
-    assert (np.abs(motors.torques) >= limit * (1 - 1e-9)).all()
-    assert (np.abs(motors.torques) < limit + 3e-3 * speed * PERIOD * (1 + 1e-9)).all()
-    assert motors.halted.all()
-    stopped = motors.commands.copy()
-    assert (held(law, angle, angle + sign * 10.0, 50, motors).commands == stopped).all()
-
-
-def test_halting_motor_gives_way_at_once_and_goes_on_when_freed() -> None:
-    motors = held(HALT, 0.5, 1.0, 40)
-    stopped = motors.commands.copy()
-    assert motors.halted.all()
-    # Told to go back: it does, although the torque is still above the limit.
-    motors.look(np.full((1, 2), 0.5), np.full((1, 2), 0.4), PERIOD, STEP)
-    assert motors.commands == pytest.approx(stopped - 6 * PERIOD, rel=1e-12)
-    assert not motors.halted.any()
-    # Held again, then free: the barb follows, the torque is gone, and the motor goes on.
-    motors = held(HALT, 0.5, 1.0, 40, motors)
-    assert motors.halted.all()
-    motors.look(motors.commands.copy(), np.full((1, 2), 1.0), PERIOD, STEP)
-    assert not motors.halted.any()
-    assert motors.commands[0, 0] > stopped[0, 0]
-
-
-def test_halting_motor_that_is_overpowered_holds_its_command() -> None:
-    # A load that turns the barb against the motor: any torque is taken, none moves the command away.
-    motors = Motors(HALT, np.zeros((1, 2)))
-    for look in range(100):
-        torques = motors.look(np.full((1, 2), -1e-3 * look), np.full((1, 2), 0.5), PERIOD, STEP)
-    assert torques == pytest.approx(3e-3 * (motors.commands + 0.099), rel=1e-12)
-    assert (torques > 10 * HALT.torque_limit).all()
-    assert (motors.commands < 0.02).all()
-
-
-def test_one_barb_halts_alone() -> None:
-    motors = Motors(HALT, np.zeros((2, 2)))
-    angles = np.zeros((2, 2))
-    for look in range(40):
-        angles[0, 1] = 1.15e-3 * look  # this one is free to follow
-        motors.look(angles.copy(), np.full((2, 2), 1.0), PERIOD, STEP)
-    assert motors.halted.tolist() == [[True, False], [True, True]]
 
 
 def test_stalled_motor_moves_in_neither_direction_until_its_torque_falls() -> None:
@@ -154,22 +64,6 @@ def test_an_easing_motor_goes_on_at_half_the_speed_whatever_it_takes() -> None:
     assert not motors.halted.any()
 
 
-def test_easing_motors_stop_when_both_are_found_at_the_limit_ten_times_in_a_row() -> None:
-    slow = math.ceil(EASE.torque_limit / ADVANCE)
-    # Twenty findings, of barb 1 and barb 2 in turn: the second barb is the twentieth and stops a look earlier.
-    motors = held(EASE, 0.0, 1.0, slow + 10)
-    assert motors.halted.tolist() == [[False, True]]
-    stopped = held(EASE, 0.0, 1.0, 100)
-    assert stopped.halted.all()
-    assert stopped.commands[0] / (6 * PERIOD) == pytest.approx([slow + 5.0, slow + 4.5], rel=1e-12)
-    # One that comes free starts the count anew, for both.
-    angles = np.array([[0.0, stopped.commands[0, 1]]])
-    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
-    stopped.look(angles, np.full((1, 2), 1.0), PERIOD, STEP)
-    assert not stopped.halted.any()
-    assert stopped.commands[0, 0] / (6 * PERIOD) > slow + 5
-
-
 @given(st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=40))
 def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
     motors, free = Motors(SLIP, np.zeros((1, 2))), Motors(replace(HALT, torque_limit=1.0), np.zeros((1, 2)))
@@ -184,24 +78,6 @@ def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
 
 
 # -- work --------------------------------------------------------------------------------------------------------------
-
-
-def test_work_against_a_held_command_is_the_springs() -> None:
-    # The command stays; the barb is turned by hand along any path: ∫ k (c - α) dα depends on its ends alone.
-    motors = Motors(HALT, np.zeros((1, 2)))
-    path = np.array([0.0, 0.001, 0.004, -0.002, -0.003, 0.002, 0.002, 0.002])
-    for angle in path:
-        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
-    assert motors.work == pytest.approx(np.full((1, 2), -3e-3 * 0.002**2 / 2), rel=1e-12)
-
-
-def test_work_of_a_slipping_motor_is_limit_times_way() -> None:
-    motors = Motors(SLIP, np.zeros((1, 2)))
-    for angle in np.linspace(0, 0.5, 2001):  # wound up after 5.3 mrad
-        motors.look(np.full((1, 2), angle), np.zeros((1, 2)), PERIOD, STEP)
-    wound = 1.6e-5 / 3e-3
-    expected = -(1.6e-5 * (0.5 - wound) + 1.6e-5 * wound / 2)
-    assert motors.work == pytest.approx(np.full((1, 2), expected), rel=1e-3)
 
 
 @pytest.mark.parametrize("law", [replace(HALT, torque_limit=1.0), SLIP])
@@ -225,19 +101,6 @@ def test_work_is_the_energy_that_a_barb_gains(law: MotorLaw) -> None:
     early = law.stiffness * 3.0**2 * STEP / 2 * 1000 * PERIOD
     assert early > 4 * np.ptp(energies)
     assert np.array(works) == pytest.approx(np.array(energies), abs=0.1 * np.ptp(energies))
-
-
-def test_engaging_forgets_torque_but_not_work() -> None:
-    motors = held(HALT, 0.5, 1.0, 40)
-    motors.look(np.full((1, 2), 0.502), np.full((1, 2), 1.0), PERIOD, STEP)
-    work = motors.work.copy()
-    assert (work > 0).all()
-    motors.engage(np.full((1, 2), 0.7))
-    assert (motors.commands == 0.7).all()
-    assert (motors.torques == 0).all()
-    assert not motors.halted.any()
-    motors.look(np.full((1, 2), 0.7), np.full((1, 2), 0.7), PERIOD, STEP)
-    assert (motors.work == work).all()  # the way in between was not the motor's
 
 
 # -- memory ------------------------------------------------------------------------------------------------------------
@@ -264,13 +127,6 @@ def test_memory_through_json_keeps_every_bit(law: MotorLaw) -> None:
             first, second = getattr(motors, name), getattr(again, name)
             assert first.dtype == second.dtype, name
             assert first.tobytes() == second.tobytes(), name
-
-
-def test_memory_is_a_copy() -> None:
-    motors = Motors(HALT, np.zeros((1, 2)))
-    memory = motors.memory
-    held(HALT, 0.0, 1.0, 10, motors)
-    assert memory["commands"] == [[0.0, 0.0]]
 
 
 # -- servos ------------------------------------------------------------------------------------------------------------

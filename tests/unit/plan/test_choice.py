@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from dem.errors import InputError
-from dem.plan import measured
 from dem.plan.choice import Expectation, choose, pick
 from dem.plan.measured import Error, Measured, read_table
 from dem.plan.outlook import plan
@@ -108,17 +106,6 @@ def test_limits_that_cannot_be_kept_say_which_gives_way(
     assert "\n" not in str(error.value)
 
 
-def test_an_unknown_error_is_within_no_limit() -> None:
-    unknown = [expected("draft", math.nan, 0.5), expected("standard", 0.02, 2.0)]
-    assert pick(unknown, max_error=0.5, max_hours=None)[0].measured.fidelity == "standard"
-    with pytest.raises(
-        InputError, match="no fidelity of the table is known to be within; the best is standard on yade"
-    ):
-        pick(unknown, max_error=0.01, max_hours=None)
-    # What is suggested is enough.
-    assert pick(unknown, max_error=0.02, max_hours=None)[0].measured.fidelity == "standard"
-
-
 def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -> None:
     scene = scene_of(fidelity={"base": "draft", "pitch": 1.1})
     chosen = choose(scene, read_table(table_file), max_error=0.03)
@@ -179,69 +166,3 @@ def test_of_what_the_hours_allow_the_most_exact_is_taken() -> None:
     assert pick([*THREE[:2], links], max_error=None, max_hours=4)[0] is THREE[1]
     exact = replace(links, measured=replace(expected("standard", 0.01, 0.1).measured, engine="links"))
     assert pick([*THREE[:2], exact], max_error=None, max_hours=4)[0] is exact
-
-
-def test_an_engine_that_the_table_does_not_tell_of_is_refused(table_file: Path) -> None:
-    with pytest.raises(
-        InputError, match="tells nothing of the engine links, only of yade; leave --engine out, or make"
-    ):
-        read_table(table_file, engine="links")
-
-
-def test_an_assured_error_needs_no_caution_and_another_scene_does(table_file: Path) -> None:
-    table = read_table(table_file)
-    notes = choose(scene_of(), table, max_error=0.05).notes
-    assert notes == ("not asked for (--of): ⟨N⟩ -0.200 ± 0.100", f"table: {table_file}")
-    notes = choose(scene_of(count=270, smarticle={"aspect_ratio": 0.5}), table, max_error=0.05).notes
-    assert notes[1:3] == (
-        "errors were measured at l/w 0.7, this scene has 0.5",
-        "errors were measured at N 60, this scene has 270",
-    )
-
-
-def test_a_limit_can_be_of_the_crossings(table_file: Path) -> None:
-    chosen = choose(scene_of(), read_table(table_file, of=["crossings"]), max_error=0.05)
-    assert chosen.fidelity == "reference"
-    chosen = choose(scene_of(), read_table(table_file, of=["phi_0", "crossings"]), max_error=0.25)
-    assert chosen.fidelity == "standard"
-    assert "φ_0 +0.010 ± 0.015, ⟨N⟩ -0.200 ± 0.100" in chosen.to_text()
-    assert "not asked for (--of): φ_f -0.020 ± 0.020" in chosen.to_text()
-
-
-def test_a_fidelity_that_the_scene_cannot_have_is_passed_over(table_file: Path) -> None:
-    square = scene_of(smarticle={"thickness_in_plane_m": 1.27e-3})
-    chosen = choose(square, read_table(table_file), max_hours=1e6)
-    assert chosen.fidelity == "standard"
-    assert "2 rows of 0.00127 m do not fit" in chosen.notes[0]
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("variant,seeds [-]\ndraft,3\n", "has no column 'knob', so it is no table of work and precision; make one: "),
-        ("", "has no column 'knob'"),
-        (f"{HEADER}\n", "tells of fewer than two named fidelities with runs"),
-        (TABLE.replace("reference,3", "reference,0"), "tells of fewer than two named fidelities with runs"),
-        (TABLE.replace("-2,1.5", "about two,1.5"), "a row of knob fidelity does not hold numbers"),
-        (TABLE.replace("fidelity,draft,,base,3,0.7", "fidelity,draft,,base,3"), "does not hold numbers"),
-    ],
-)
-def test_another_table_is_refused(text: str, message: str, tmp_path: Path) -> None:
-    file = tmp_path / "other.csv"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=message) as error:
-        read_table(file)
-    assert str(file) in str(error.value)
-    assert "\n" not in str(error.value)
-
-
-def test_without_a_table_the_way_to_one_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"absent.csv: cannot be read \(No such file or directory\); make one: smart"):
-        read_table(tmp_path / "absent.csv")
-    monkeypatch.setattr(measured, "SHIPPED", tmp_path / "shipped.csv")
-    with pytest.raises(
-        InputError, match=r"no table of measured errors ships at .*; make one: smarticles accuracy SCENE"
-    ):
-        read_table(None)
-    (tmp_path / "shipped.csv").write_text(TABLE, encoding="utf-8")
-    assert read_table(None).count == 60

@@ -50,15 +50,6 @@ def test_what_is_lifted_or_pulled_too_fast_is_refused(kind: str) -> None:
     time_steps(moved_at(10.0, {"base": "draft", "time_step_s": step}))
 
 
-def test_a_chain_is_strained_by_the_same_rule() -> None:
-    most = fastest(chain())
-    assert most > 1  # spheres are large
-    time_steps(chain({"phases.1.speed_m_per_s": 0.999 * most}))
-    told = refusal(chain({"phases.1.speed_m_per_s": 2 * most}))
-    assert told.startswith("phases.1.speed_m_per_s: ")
-    assert "(strain) is 0.1 sphere diameters in a time step" in told
-
-
 @pytest.mark.parametrize("fidelity", ["draft", "standard", "reference"])
 @pytest.mark.parametrize("series", [0.004, 0.0033, 1e-5])
 def test_time_step_divides_the_recording_intervals(fidelity: str, series: float) -> None:
@@ -72,24 +63,6 @@ def test_time_step_divides_the_recording_intervals(fidelity: str, series: float)
     assert dt <= min(wanted, series) * (1 + 1e-9)
     if series > 10 * wanted:
         assert dt > 0.9 * wanted  # no smaller than needed
-
-
-def test_given_time_step_is_taken_exactly_where_it_divides() -> None:
-    assert time_step(small({"fidelity": {"time_step_s": 1e-5}})) == pytest.approx(1e-5, rel=1e-12)
-    assert time_step(small({"fidelity": {"time_step_s": 3e-5}})) == pytest.approx(0.004 / 134, rel=1e-12)
-
-
-def test_given_time_step_above_the_stable_one_is_refused_with_both() -> None:
-    scene = small({"fidelity": {"time_step_s": 0.001}})
-    stable = stable_step(scene)
-    with pytest.raises(InputError) as caught:
-        time_step(scene)
-    assert str(caught.value) == (
-        f"fidelity.time_step_s: 0.001 s is above the stable step {stable:.4g} s of this smarticle at "
-        f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
-    )
-    least = float(str(caught.value).split("use at most ")[1].split(" s")[0])
-    assert 0.98 * stable < time_step(small({"fidelity": {"time_step_s": least}})) <= stable
 
 
 @pytest.mark.parametrize(("key", "value"), [("hinge_stiffness_N_per_m", 1e6), ("stiffness", 10.0)])
@@ -120,27 +93,7 @@ def test_phases_before_the_motors_have_the_step_of_a_scene_without() -> None:
     assert time_steps(scene)[0] > 1.5 * shortest
 
 
-@pytest.mark.parametrize("changes", [{"fidelity": {"time_step_s": 1e-5}}, {"phases": [{"type": "deposit"}]}])
-def test_a_step_by_hand_or_no_motors_make_all_phases_alike(changes: dict[str, object]) -> None:
-    scene = small({"phases": [{"type": "deposit"}, SWING], **changes})
-    assert set(time_steps(scene)) == {time_step(scene)}
-
-
 def test_a_servo_must_look_at_every_step() -> None:
     assert time_step(chain()) == pytest.approx(1e-4)
     with pytest.raises(InputError, match=r"fidelity.control_interval_s: 0.0005 s is 5 time steps, but a servo"):
         time_step(chain({"fidelity.control_interval_s": 5e-4}))
-
-
-def test_a_stiff_string_shortens_the_stable_step() -> None:
-    # A string whose mode is far above all others rules alone: the step goes as the square root of its softness.
-    usual, steps = stable_step(chain()), []
-    for stiffness in (1e9, 4e9):
-        steps.append(
-            stable_step(chain({"phases.1.string_stiffness_N_per_m": stiffness, "phases.1.string_damping_N_s_per_m": 0}))
-        )
-    assert steps[0] < usual / 30
-    assert steps[0] / steps[1] == pytest.approx(2, rel=1e-3)
-    assert stable_step(chain({"phases.1.string_damping_N_s_per_m": 1e6})) < usual / 1e3
-    with pytest.raises(InputError, match="or softer contacts, servos and strings"):
-        time_step(chain({"phases.1.string_stiffness_N_per_m": 1e9}))

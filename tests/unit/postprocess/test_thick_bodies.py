@@ -15,14 +15,12 @@ from synthetic import SyntheticRun, mesh_of, write_manifest, write_run
 from dem.body.chain import Chain
 from dem.body.particle import HINGE_CLEARANCE, INWARDS, Boxes, Particle, SphereChain
 from dem.body.state import State
-from dem.record.frames import FrameWriter, read_frames
-from dem.record.manifest import manifest_data, read_run
+from dem.record.frames import FrameWriter
+from dem.record.run import open_run
 from dem.scene.reading import dump_scene
-from postprocess.bodies.fields import BY_NAME, link_values
-from postprocess.bodies.meshes import Bodies, link_boxes
-from postprocess.bodies.surroundings import read_surroundings
 from postprocess.geometry import chains
 from postprocess.measures.contacts import chain_of
+from postprocess.pictures.canvas import link_boxes
 
 W, L, T1, BARB, BODY = 0.0467, 0.042, 0.021, 0.0095, 0.0213
 SPREAD = np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])  # m/s, of barb 1, middle link, barb 2
@@ -52,8 +50,8 @@ def run(tmp_path: Path) -> Path:
     state = State.rigid(robot(), poses.positions, turns, np.zeros((2, 3)), np.zeros((2, 3)))
     made = SyntheticRun(count=2, phases=("relax", "strain"), frames_per_phase=1, packing=(0.1, 0.1))
     write_run(tmp_path, made)
-    size = {"middle_length": W, "barb_length": L, "sphere_diameter": BARB, "thickness_normal": T1}
-    size |= {"thickness_in_plane": BARB, "middle_thickness_in_plane": BODY}
+    size = {"middle_length_m": W, "barb_length_m": L, "sphere_diameter_m": BARB, "thickness_normal_m": T1}
+    size |= {"thickness_in_plane_m": BARB, "middle_thickness_in_plane_m": BODY}
     write_manifest(tmp_path, made, planar=True, **size)
     scene = chain({"phases.0.gap_m": 0.001, "phases.1.tied_at": "axis"})
     (tmp_path / "scene.yaml").write_text(dump_scene(scene))
@@ -69,16 +67,6 @@ def run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_manifest_keeps_the_thickness_and_old_ones_have_none(run: Path, tmp_path: Path) -> None:
-    manifest = read_run(run)
-    assert manifest.thicknesses_in_plane == (BARB, BODY, BARB)
-    assert manifest.bulge == pytest.approx((BODY - BARB) / 2)
-    assert manifest_data(manifest)["middle_thickness_in_plane_m"] == BODY
-    plain = read_run(write_run(tmp_path / "plain", SyntheticRun(count=2, frames_per_phase=1)))
-    assert plain.bulge == 0
-    assert "middle_thickness_in_plane_m" not in manifest_data(plain)
-
-
 def test_boxes_are_as_thick_as_their_links() -> None:
     vertices = robot().vertices[None]
     mesh = link_boxes(
@@ -90,29 +78,13 @@ def test_boxes_are_as_thick_as_their_links() -> None:
     assert mesh.triangulate().volume * 1e-9 == pytest.approx(T1 * (W * BODY + 2 * L * BARB), rel=1e-6)
 
 
-def test_exported_bodies_and_speeds_know_it(run: Path) -> None:
-    manifest, frame = read_run(run), read_frames(run)[-1]
-    mesh = Bodies(manifest, ["smarticles"]).at(frame)["smarticles"]
-    assert np.ptp(mesh.points[:, 1]) == pytest.approx(LAYOUT.width)
-    masses = robot().link_masses
-    expected = np.linalg.norm(masses @ SPREAD) / masses.sum()
-    assert link_values(BY_NAME["speed_m_per_s"], frame, manifest)[0] == pytest.approx([expected] * 3)
-
-
-def test_strings_are_tied_on_the_axis(run: Path) -> None:
-    strings = read_surroundings(read_run(run)).strings
-    assert strings is not None
-    (frame,) = read_frames(run)
-    assert strings.lines(frame)[:, 0, 1] == pytest.approx([0, 0], abs=1e-12)
-
-
 @pytest.mark.parametrize("angles", [(90.0, 90.0), (30.0, 100.0)])
 @pytest.mark.parametrize("pitch", [0.2, 1.0])
 def test_spheres_are_where_the_simulator_puts_them(angles: tuple[float, float], pitch: float, run: Path) -> None:
     boxes = robot(angles)
     particle = Particle(boxes, SphereChain(rows=1, diameter=BARB, pitch=pitch * BARB))
     turn = Rotation.from_euler("xyz", [0.3, -1.1, 2.0]).as_matrix()
-    known = chain_of(read_run(run))
+    known = chain_of(open_run(run))
     chain = chains.Chain(
         diameter=known.diameter, rows=known.rows, width=known.width, pitch=pitch * BARB, bulge=known.bulge
     )

@@ -1,4 +1,4 @@
-"""Forces at contacts: points made into contacts, and the file that ARCHITECTURE.md promises, read by VTK."""
+"""Forces at contacts: points made into contacts, and the file that docs/reference/files.md promises, read by VTK."""
 
 from __future__ import annotations
 

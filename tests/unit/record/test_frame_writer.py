@@ -1,4 +1,4 @@
-"""A frame on disk is what ARCHITECTURE.md promises to `postprocess`, read back with meshio and with plain XML."""
+"""A frame on disk is what docs/reference/files.md promises, read back with meshio and with plain XML."""
 
 from __future__ import annotations
 

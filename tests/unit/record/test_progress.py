@@ -41,7 +41,6 @@ def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
         "phi": 0.123,
         "count": 270,
         "wall_s": 5.0,
-        "checkpoint_s": None,
     }
     assert [path.name for path in tmp_path.iterdir()] == ["progress.json"]
     bar.finish()
@@ -51,7 +50,7 @@ def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
 def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
     def told() -> tuple[float, float | None]:
         data = json.loads((tmp_path / "progress.json").read_text())
-        return data["time_s"], data["checkpoint_s"]
+        return data["time_s"], data.get("checkpoint_s")
 
     bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
@@ -68,13 +67,13 @@ def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
     assert told() == (0.5, 0.3)
 
 
-def test_unknown_phi_is_null(tmp_path: Path, wall: Wall) -> None:
+def test_unknown_phi_is_left_out(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
     wall.now += 1
     bar.update(time=0.1, phi=float("nan"), count=1)
     data = json.loads((tmp_path / "progress.json").read_text())
-    assert (data["phi"], data["end_s"]) == (None, None)
+    assert not {"phi", "end_s"} & data.keys()
 
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:

@@ -9,14 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from double import EngineDouble
-from scenes import chain, small
+from scenes import small
 from scipy.spatial.transform import Rotation
 
-from dem.body.chain import Tie
 from dem.body.placement import Poses
 from dem.engine.effect import EffectName
-from dem.physics.strings import StringLaw
-from dem.run.sampler import COLUMNS_OF, Sampler
+from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 
 RADIUS, DT = 0.0234, 1e-4
@@ -59,12 +57,6 @@ def test_columns_hold_what_the_engine_says() -> None:
     assert row["packing_fraction"] == pytest.approx(3 * boxes.volume / (math.pi * RADIUS**2 * 0.022))
 
 
-def test_an_empty_container_has_a_row() -> None:
-    row = sample(Sampler(RADIUS, set(EffectName) - {EffectName.HOOKS, EffectName.STRINGS}), engine_with([]))
-    assert row["count"] == row["kinetic_energy_J"] == row["max_speed_m_per_s"] == 0
-    assert math.isnan(row["com_height_m"])
-
-
 def force(engine: EngineDouble, steps: int = 40) -> np.ndarray:
     """Mean force on the container over some steps."""
     sampler = Sampler(RADIUS)
@@ -78,12 +70,6 @@ def test_force_at_rest_is_the_weight_downwards() -> None:
     engine.advance(1000)
     assert engine.touches().all()
     assert force(engine) == pytest.approx([0, 0, -2 * engine.particle.boxes.mass * 9.81], rel=1e-12)
-
-
-def test_force_in_free_fall_is_zero() -> None:
-    engine = engine_with([0.1, 0.2])
-    engine.velocities[:, 0] = 0.2
-    assert np.abs(force(engine)).max() < 1e-9 * engine.particle.boxes.mass * 9.81
 
 
 def test_force_of_an_impact_is_its_momentum_whenever_it_came() -> None:
@@ -120,27 +106,6 @@ def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside(
     assert row["packing_fraction"] > 0
     engine.fixtures.remove_wall()
     assert math.isnan(sample(sampler, engine)["packing_fraction"])
-
-
-def test_strings_tell_their_pull_and_how_far_they_are() -> None:
-    scene = chain()
-    engine, sampler = EngineDouble.of(scene, DT), Sampler(math.nan, {EffectName.STRINGS})
-    assert math.isnan(sample(sampler, engine)["chain_width_m"])  # nothing is there yet
-    engine.add(scene.phases[0].begin(scene, 0)._chain.poses())  # type: ignore[attr-defined]
-    assert sample(sampler, engine)["chain_width_m"] == pytest.approx(0.062)
-    engine.strings.tension = 2.0
-    engine.strings.tie([Tie(0, 0, 0.0), Tie(5, 0, 0.0)], StringLaw(length=0.1, stiffness=1, damping=0), (0.0, 0.1))
-    begun = sample(sampler, engine)
-    assert begun["pulled_m"] == 0
-    assert np.isnan(begun["string_pulled_force_N"]).all()
-    engine.advance(100)
-    row = sample(sampler, engine)
-    assert row["pulled_m"] == pytest.approx(0.1 * 100 * DT)
-    assert row["chain_length_m"] - begun["chain_length_m"] == pytest.approx(row["pulled_m"])
-    assert row["string_fixed_force_N"] == pytest.approx([-2, 0, 0])
-    assert row["string_pulled_force_N"] == pytest.approx([2, 0, 0])
-    engine.strings.untie()
-    assert math.isnan(sample(sampler, engine)["pulled_m"])
 
 
 def test_motors_tell_what_they_hold_while_at_work_and_nothing_while_welded() -> None:
@@ -185,8 +150,3 @@ def test_the_account_of_energies_closes_over_fall_impact_and_shaking() -> None:
     (falling, _), (landed, still), (_, worked) = moved
     assert falling == still == 0 < landed
     assert abs(worked) > 1e-3 * scale
-
-
-@pytest.mark.parametrize("effect", COLUMNS_OF)
-def test_an_effect_adds_its_own_columns_and_no_other(effect: EffectName) -> None:
-    assert Sampler(1.0, {effect}).described == Sampler(1.0).described | COLUMNS_OF[effect]

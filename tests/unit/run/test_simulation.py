@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import resource
 import signal
 import subprocess
 from collections.abc import Callable
@@ -139,38 +137,6 @@ def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
     assert len(kind.built) == 1
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"seed": 2}, "seed 1 there, 2 here; resume with"),
-        (
-            {"seed": 2, "count": 12, "engine": "links", "gravity_m_per_s2": 5},
-            "engine yade there, links here; seed 1 there",
-        ),
-    ],
-)
-def test_a_finished_run_of_another_scene_is_not_called_done(
-    kind: KindDouble, tmp_path: Path, changes: dict[str, Any], told: str
-) -> None:
-    run(scene_of("rested"), tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    with pytest.raises(InputError, match="was made from another scene: ") as caught:
-        run(scene_of("rested", **changes), tmp_path, resume=True)
-    assert told in str(caught.value)
-    assert "run the changed scene in another directory" in str(caught.value)
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
-    assert len(kind.built) == 1
-
-
-def test_a_scene_changed_in_the_run_directory_is_told_as_that(kind: KindDouble, tmp_path: Path) -> None:
-    run(scene_of("rested"), tmp_path)
-    path = tmp_path / "scene.yaml"
-    path.write_text(path.read_text().replace("seed: 1", "seed: 5"))
-    with pytest.raises(InputError, match=r"scene.yaml is not the scene that this run was made from .* put it back"):
-        run(load_scene(path), tmp_path, resume=True)
-    assert len(kind.built) == 1
-
-
 def test_another_scene_or_another_version_does_not_go_on(
     kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -226,33 +192,6 @@ def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
         assert failed["time_s"] - file["time_s"][-1] <= 0.004
 
 
-def test_a_defect_of_ours_is_told_in_the_run_directory(
-    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(EngineDouble, "unbalanced_force", lambda engine: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        run(scene_of("rested"), tmp_path)
-    assert "unexpected ZeroDivisionError" in json.loads((tmp_path / "failed.json").read_text())["cause"]
-
-
-def test_what_other_processes_spend_for_the_engine_is_spent_by_the_run(
-    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(EngineDouble, "cpu_elsewhere", property(lambda self: 50 * self.time, lambda *_: None))
-    run(scene_of("rested"), tmp_path / "run")
-    done = json.loads((tmp_path / "run" / "done.json").read_text())
-    assert done["cpu_s"] == pytest.approx(50 * done["time_s"], abs=40 * done["time_s"])
-    relax = done["phases"][1]
-    assert relax["cpu_s"] == pytest.approx(50 * 0.1, abs=4)
-
-
-def test_the_same_scene_is_the_same_run(kind: KindDouble, tmp_path: Path) -> None:
-    for out in ("one", "other"):
-        run(scene_of("actuated"), tmp_path / out)
-    assert series(tmp_path / "one") == series(tmp_path / "other")
-    assert kind.built[0].told == kind.built[1].told
-
-
 # -- directories that are not a run's ----------------------------------------------------------------------------------
 
 
@@ -283,40 +222,6 @@ def test_a_directory_that_holds_something_is_left_as_it_is(
     assert not kind.built
 
 
-def test_a_directory_that_is_moved_while_it_runs_leaves_nothing_behind(
-    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    taken, left = Simulation._checkpoint, [2]
-
-    def checkpoint(simulation: Simulation) -> None:
-        taken(simulation)
-        left[0] -= 1
-        if not left[0]:
-            simulation.folder.rename(tmp_path / "moved")
-
-    monkeypatch.setattr(Simulation, "_checkpoint", checkpoint)
-    with pytest.raises(RunError, match=r"its folder is gone; if it was moved, .* smarticles resume DIR"):
-        run(scene_of("rested"), tmp_path / "here")
-    assert not (tmp_path / "here").exists()
-    # It goes on where it lies now, to the same bits.
-    left[0] = 0
-    run(scene_of("rested"), tmp_path / "moved", resume=True)
-    assert series(tmp_path / "moved")
-
-
-@pytest.mark.parametrize("most_bytes", [500, 2000, 6000, 12_000])
-def test_a_limit_of_file_sizes_ends_a_run_in_one_line(kind: KindDouble, tmp_path: Path, most_bytes: int) -> None:
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
-    try:
-        with pytest.raises(RunError, match=r"cannot be written \(File too large\); free space") as caught:
-            run(scene_of("rested"), tmp_path / "run")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert len(str(caught.value).splitlines()) == 1
-    assert not (tmp_path / "run" / "done.json").exists()
-
-
 def test_a_disk_that_cannot_be_written_is_told_before_anything_runs(
     kind: KindDouble, mount_disk: Callable[[str], Path]
 ) -> None:
@@ -329,31 +234,3 @@ def test_a_disk_that_cannot_be_written_is_told_before_anything_runs(
     with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\); choose another directory"):
         run(scene_of("rested"), folder / "run", resume=True)
     assert len(kind.built) == 1
-
-
-def test_who_comes_second_does_not_write_over_who_was_quicker(
-    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    locked = fcntl.flock
-
-    def quicker(file: Any, how: int) -> None:
-        # Between the look into the directory and the lock, another process runs from beginning to end.
-        monkeypatch.setattr("dem.record.rundir.fcntl.flock", locked)
-        (tmp_path / "run.json").write_text("{}")
-        locked(file, how)
-
-    monkeypatch.setattr("dem.record.rundir.fcntl.flock", quicker)
-    with pytest.raises(InputError, match="holds a run and is left as it is"):
-        run(scene_of("rested"), tmp_path)
-    assert (tmp_path / "run.json").read_text() == "{}"
-    assert not kind.built
-
-
-@pytest.mark.usefixtures("kind")
-def test_out_that_is_a_file_is_refused(tmp_path: Path) -> None:
-    out = tmp_path / "taken"
-    out.write_text("mine")
-    with pytest.raises(InputError) as caught:
-        run(scene_of("rested"), out)
-    assert str(caught.value) == f"--out {out}: cannot be made (File exists); choose another directory"
-    assert out.read_text() == "mine"

@@ -85,13 +85,6 @@ def test_each_cause_stops_the_run(harm: Callable[[State], None], text: str) -> N
     assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
 
 
-def test_many_smarticles_are_counted_and_the_first_named() -> None:
-    positions = np.full((8, 3), -0.01)
-    state = State.rigid(BOXES, positions, np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3)), np.zeros((8, 3)))
-    with pytest.raises(RunError, match=r"8 smarticle\(s\) \(0, 1, 2, 3, 4, …\): left through"):
-        check(state)
-
-
 def test_broken_hinge_is_named_with_its_gap() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, gap=2e-4)
     gaps = np.full((4, 2), 1e-6)
@@ -112,7 +105,8 @@ def test_deep_contacts_are_named() -> None:
         dog.check_depths(Overlaps(7e-4, deep, 0.0), time=1.25)
     assert str(caught.value) == (
         "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
-        "pass through each other or through the container; raise fidelity.stiffness_N_per_m, or load the pile less"
+        "pass through each other or through the container; raise fidelity.stiffness_N_per_m, about 2.3 times, or load "
+        "the pile less"
     )
 
 
@@ -131,22 +125,9 @@ def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
     with pytest.raises(RunError) as caught:
         dog.check_depths(Overlaps(7e-4, deep, 0.0, (Held(3, between, 0.0051),)), time=1.25)
     assert str(caught.value) == (
-        "at t = 1.2500 s: 2 smarticle(s) (1, 3): contacts more than 0.0006 m deep (deepest 0.0007 m), so that links "
-        f"pass through each other or through the container; smarticle 3 is held by {between[0]} and {between[1]}, "
-        f"which have moved apart by 0.0051 m; {way_out}"
+        f"at t = 1.2500 s: 2 smarticle(s) (1, 3): smarticle 3 is held by {between[0]} and {between[1]}, which have "
+        f"moved apart by 0.0051 m: only its contacts can give way, the deepest by 0.0007 m; {way_out}"
     )
-
-
-@pytest.mark.parametrize("where", [(0.0, 0.0, -1e-6), (0.0235, 0.0, 0.05)])
-def test_a_single_sphere_that_is_outside_is_seen(where: tuple[float, float, float]) -> None:
-    state = healthy()
-    spheres = np.repeat(state.positions[:, None], 7, axis=1)
-    WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
-    spheres[2, 3] = [0.05, 0.0, 0.1001]  # over the rim: allowed for a barb
-    WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
-    spheres[2, 3] = where
-    with pytest.raises(RunError, match=r"1 smarticle\(s\) \(2\): left through the wall or the floor"):
-        WATCHDOG.check(state, floor=0.0, time=1.25, points=spheres)
 
 
 def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
@@ -175,44 +156,9 @@ def test_energy_from_nowhere_stops_the_run() -> None:
     )
 
 
-def test_energy_that_rises_slowly_is_seen_however_slowly() -> None:
-    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
-    with pytest.raises(RunError, match="an energy that has risen by"):
-        looks(dog, *[(1.0 + 0.003 * n, 0.0) for n in range(40)])
-
-
-def test_unknown_work_forgets_what_was_seen() -> None:
-    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
-    looks(dog, (1.0, 0.0), (math.nan, 0.0), (9.0, 0.0), (9.05, 0.0))
-    with pytest.raises(RunError, match="risen by"):
-        looks(dog, (9.2, 0.0))
-
-
-TIERED = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),)), speed=5.0)
-
-
 def at(*position: float) -> State:
     still = np.zeros((1, 3))
     return State.rigid(BOXES, np.array([position], dtype=float), np.eye(3)[None], still, still)
-
-
-def test_it_knows_a_wall_that_is_gone_and_a_hook_that_is_raised() -> None:
-    far, high = at(0.2, 0.0, 0.01), at(0.0, 0.0, 0.11)
-    for state in (far, high):
-        with pytest.raises(RunError):
-            TIERED.check(state, floor=0.0, time=1.0)
-        TIERED.check(state, floor=0.0, time=1.0, raised=None)
-    TIERED.check(high, floor=0.0, time=1.0, raised=0.02)
-    with pytest.raises(RunError, match="left through the wall"):
-        TIERED.check(far, floor=0.0, time=1.0, raised=0.02)
-    with pytest.raises(RunError, match="left through the wall or the floor"):
-        TIERED.check(at(0.2, 0.0, -0.01), floor=0.0, time=1.0, raised=None)  # the floor stays
-
-
-def test_it_knows_the_tiers() -> None:
-    TIERED.check(at(0.02, 0.0, 0.04), floor=0.0, time=1.0)
-    with pytest.raises(RunError, match="left through the wall"):
-        TIERED.check(at(0.02, 0.0, 0.06), floor=0.0, time=1.0)
 
 
 GLANCE = {"fastest": 4.9, "lowest": 1.0, "highest": 1.09, "widest": 0.0234, "gap": 1e-5, "deepest": 1e-4}
@@ -237,10 +183,3 @@ def test_extremes_within_all_limits_need_no_close_look() -> None:
 def test_an_extreme_beyond_a_limit_or_no_number_needs_one(name: str, value: float) -> None:
     assert not content(**{name: value})
     assert not content(**{name: math.nan})
-
-
-def test_of_tiers_the_narrowest_counts() -> None:
-    cylinder = Cylinder(radius=0.0234, height=0.1, facets=64, upper=((0.05, 0.012),))
-    tiers = Watchdog(cylinder=cylinder, speed=5.0)
-    assert content(widest=0.0119, dog=tiers)
-    assert not content(widest=0.0234, dog=tiers)

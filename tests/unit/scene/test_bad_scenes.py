@@ -1,9 +1,4 @@
-"""Every bad scene is refused with one line: key, value with its unit, way out.
-
-What a line must have is asserted here for each; the exact sentences lie in one snapshot,
-`__snapshots__/test_bad_scenes.ambr`, to be read as a reader of a terminal would; after a wanted change
-`pytest tests/unit/scene/test_bad_scenes.py --snapshot-update` writes it anew.
-"""
+"""Every bad scene is rejected with one line: key, value with its unit, way out."""
 
 from __future__ import annotations
 
@@ -14,7 +9,6 @@ from typing import Any
 
 import pytest
 from scenes import CHAIN, SMALL, changed
-from syrupy.assertion import SnapshotAssertion
 
 from dem.errors import InputError
 from dem.scene.reading import parse_scene
@@ -34,7 +28,6 @@ TRIANGLE = {"type": "triangle", "centre_deg": 90, "amplitude_deg": 5, "speed_rad
 BOUNCING = {"type": "actuate", "barbs": {"type": "sequence", "steps": 3}, "duration_s": 1}
 SHAPE_CHANGE = {"type": "shape-change"}
 OSCILLATION = {"type": "internal-oscillation", "theta_deg": 10}
-NARROW = {"rows": 1, "diameter_m": 1.17e-3, "pitch": 0.4}
 
 
 def on(*phases: dict[str, Any]) -> dict[str, Any]:
@@ -52,52 +45,33 @@ def sequence(*steps: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 SCENE: Bad = [
     ({"smarticle.middle_length_m": -0.0117}, "smarticle.middle_length_m", "-0.0117"),
-    ({"smarticle.middle_length_m": 0}, "smarticle.middle_length_m", "0"),
     ({"smarticle.thickness_normal_m": 0.0}, "smarticle.thickness_normal_m", "0.0"),
-    ({"smarticle.thickness_in_plane_m": -1}, "smarticle.thickness_in_plane_m", "-1"),
     ({"smarticle.middle_thickness_in_plane_m": 0.001}, "smarticle.middle_thickness_in_plane_m", "0.001 m"),
     ({"container.radius_m": -0.02}, "container.radius_m", "-0.02"),
-    ({"container.height_m": 0}, "container.height_m", "0"),
     ({"smarticle.middle_length_m": math.nan}, "smarticle.middle_length_m", "nan"),
-    ({"container.radius_m": math.inf}, "container.radius_m", "inf"),
-    ({"gravity_m_per_s2": -math.inf}, "gravity_m_per_s2", "-inf"),
-    ({"phases.2.duration_s": math.nan}, "phases.2.duration_s", "nan"),
     ({"smarticle.aspect_ratio": 2.5}, "smarticle.aspect_ratio", "2.5"),
-    ({"smarticle.aspect_ratio": -0.1}, "smarticle.aspect_ratio", "-0.1"),
     ({"smarticle.angles_deg": [120, 90]}, "smarticle.angles_deg", "120"),
     ({"smarticle.thickness_normal_m": 0.008}, "smarticle", "0.008 m"),
     ({"smarticle.middle_length_m": 11.7}, "smarticle.middle_length_m", "11.7"),
-    ({"container.radius_m": 23.4}, "container.radius_m", "23.4"),
     ({"smarticle.density_kg_per_m3": 7.85}, "smarticle.density_kg_per_m3", "7.85 kg/m³"),
     ({"count": 5000, "container.height_m": 0.01}, "count", "5000"),
     ({"engine": "abacus"}, "engine", "'abacus'"),
     ({"count": 0}, "count", "0"),
-    ({"count": 2.5}, "count", "2.5"),
     ({"count": "ten"}, "count", "got the text 'ten'"),
-    ({"count": None}, "count", "null"),
     ({"count": True}, "count", "got the boolean true"),
     ({"seed": -1}, "seed", "-1"),
-    ({"smarticle.aspect_ratio": True}, "smarticle.aspect_ratio", "got the boolean true"),
-    ({"contact.friction_wall": False}, "contact.friction_wall", "got the boolean false"),
-    ({"smarticle.aspect_ratio": "wide"}, "smarticle.aspect_ratio", "got the text 'wide'"),
     ({"contact.friction_wall": -0.1}, "contact.friction_wall", "-0.1"),
-    ({"contact.restitution": 0}, "contact.restitution", "0"),
     ({"contact.restitution": 1.5}, "contact.restitution", "1.5"),
     ({"phases.2.frequency_hz": 0}, "phases.2.frequency_hz", "0"),
     ({"gravity_m_per_s2": 0}, "gravity_m_per_s2", "0 m/s²"),
     ({"smarticle.aspect_ration": 0.5}, "smarticle", "unknown key 'aspect_ration'"),
-    ({"phases.1.duration": 3}, "phases.1", "unknown key 'duration'"),
     ({"cont": 3}, "", "unknown key 'cont'"),
-    ({"container.zzz": 3}, "container", "unknown key 'zzz'"),
     ({"phases.0.settle.timeout": 3}, "phases.0.settle", "unknown key 'timeout'"),
-    ({"fricton": 1}, "", "unknown key 'fricton'"),
     ({"container.height_m": 117.0}, "container.height_m", "117"),
-    ({"smarticle.angles_deg": [True, 90]}, "smarticle.angles_deg", "got the boolean true"),
     ({"smarticle.aspect_ratio": "0.5"}, "smarticle.aspect_ratio", "got the text '0.5'"),
     ({"fidelity": {"base": ["draft"]}}, "fidelity", "unknown fidelity ['draft']"),
     ({"smarticle.aspect_ratio": 2, "smarticle.angles_deg": [105, 105]}, "smarticle.angles_deg", "105"),
     ({"schema_version": 2}, "schema_version", "2"),
-    ({"schema_version": "1"}, "schema_version", "'1'"),
     ({"fidelity": "fine"}, "fidelity", "unknown fidelity 'fine'"),
     ({"fidelity": {"rows": 9}}, "fidelity.rows", "9"),
     ({"fidelity": {"rows": 2, "diameter_m": 0.002}}, "fidelity.rows", "2"),
@@ -114,34 +88,20 @@ SCENE: Bad = [
     ({"container": {"tiers": [{"radius_m": 0.03}]}}, "container.tiers.0.height_m", "missing"),
     ({"smarticle.thickness_in_plane_m": 0.5}, "smarticle", "0.5 m"),
     ({"recording.dissipation_interval_s": 10}, "recording.dissipation_interval_s", "10"),
-    ({"motor": {"speed": 6}}, "motor", "unknown key 'speed'"),
-    ({"contact.friction": 0.4}, "contact", "unknown key 'friction'"),
     ({"recording.frame_interval_s": 0.05}, "recording.frame_interval_s", "0.05"),
     ({"recording.frame_interval_s": 0.001}, "recording.frame_interval_s", "0.001"),
     ({"phases.1.duration_s": 0.001}, "phases.1.duration_s", "0.001"),
     ({"container": {"tiers": []}}, "container.tiers", "an empty list"),
-    ({"container": {"tiers": "two"}}, "container.tiers", "'two'"),
-    ({"container": {"tiers": [1]}}, "container.tiers.0", "1"),
-    ({"container": {"tiers": [{**TIER, "radius_m": "x"}]}}, "container.tiers.0.radius_m", "got the text 'x'"),
     ({"container": {"tiers": [TIER, {**TIER, "height_m": -1}]}}, "container.tiers.1.height_m", "-1"),
     ({"phases": []}, "phases", "an empty list"),
-    ({"phases": None}, "phases", "null"),
-    ({"phases.1": 3}, "phases.1", "3"),
     ({"phases.1": {"type": "relax", "duration_s": "1 s"}}, "phases.1.duration_s", "got the text '1 s'"),
     ({"phases.2.frequency_hz": 3000}, "phases.2.frequency_hz", "3000"),
     ({"phases.0.layer_height_w": 11}, "phases.0.layer_height_w", "11"),
-    ({"phases.0.settle": 3}, "phases.0.settle", "3"),
-    ({"phases.0.per_layer": 2.5}, "phases.0.per_layer", "2.5"),
     ({"phases.1": BOUNCING}, "phases.1.barbs.steps", "3"),
     ({"smarticle.angles_deg": [90, 90, 90]}, "smarticle.angles_deg", "[90, 90, 90]"),
-    ({"smarticle.aspect_ratio": [0.7]}, "smarticle.aspect_ratio", "[0.7]"),
-    ({"container.radius_m": [0.02]}, "container.radius_m", "[0.02]"),
     ({"name": 5}, "name", "5"),
-    ({"name": ""}, "name", "''"),
     ({"count": 1e300}, "count", "1e+300"),
     ({"recording": {"energy": "yes"}}, "recording.energy", "'yes'"),
-    ({"recording": [1]}, "recording", "[1]"),
-    ({"schema_version": True}, "schema_version", "got the boolean true"),
     ({"hooks": {"side_m": None}}, "hooks.side_m", "null"),
     ({"motor": {"law": "servo", "damping_N_m_s_per_rad": -1}}, "motor.damping_N_m_s_per_rad", "-1"),
     (
@@ -151,21 +111,17 @@ SCENE: Bad = [
     ),
     ({"phases": [DEPOSIT, {"type": "remove-container", "parts": None}]}, "phases.1.parts", "null"),
     ({"phases": [{"type": "arrange", "gap_m": -1}]}, "phases.0.gap_m", "-1"),
-    ({"phases.1": {"type": "internal-oscillation", "theta_deg": -3, "duration_s": 1}}, "phases.1.theta_deg", "-3"),
 ]
 
 HOOKS: Bad = [
     ({"phases": [DEPOSIT, PULL]}, "phases.1", "pull-hook"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": 0}]}, "phases.1.speed_m_per_s", "0 m/s"),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": -1}]}, "phases.1.speed_m_per_s", "-1 m/s"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]}, "phases.1.distance_m", "0"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m", "23.4"),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "duration_s": 1}]}, "phases.1.duration_s", "1"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which", "'lower'"),
     ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s", "-0.1 m/s"),
     ({"phases": [DEPOSIT, {**REMOVE, "parts": "floor"}]}, "phases.1.parts", "'floor'"),
     ({"phases": [DEPOSIT, REMOVE, SHAKE, REMOVE]}, "phases.3", "remove-container"),
-    ({"phases": [DEPOSIT, REMOVE, REMOVE]}, "phases.2", "remove-container"),
     ({"phases": [REMOVE, DEPOSIT]}, "phases", "got remove-container"),
     ({"hooks": {"length_m": 0.048}}, "hooks.length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.048, "lower_bars": 3}}, "hooks.lower_length_m", "0.048"),
@@ -178,10 +134,6 @@ HOOKS: Bad = [
     ({"container": {"tiers": [{**tier, "height_m": 0.01} for tier in TIERS]}}, "container.tiers", "0.02"),
     ({"container.height_m": 0.02}, "container.height_m", "0.02"),
     ({"hooks": {"side_m": 0.02}}, "hooks.side_m", "0.02"),
-    ({"hooks": {"length_m": 11.7}}, "hooks.length_m", "11.7"),
-    ({"hooks": {"sides_m": 1}}, "hooks", "unknown key 'sides_m'"),
-    ({"hooks": True}, "hooks", "got the boolean true"),
-    ({"hooks": [1]}, "hooks", "[1]"),
     ({"container": {"tiers": [TIERS[1], TIERS[0]]}}, "container.tiers.1.radius_m", "0.0234"),
     ({"container": {"tiers": TIERS, "radius_m": 0.02}}, "container.radius_m", "0.02"),
     ({"container": {"tiers": [*TIERS, {"radius_m": 0.005, "height_m": 0.01}]}}, "container.tiers.2.radius_m", "0.005"),
@@ -215,8 +167,6 @@ ACTUATED: Bad = [
     (on(actuate(HOLD, duration_s=2, offsets="random")), "phases.1.offsets", "random"),
     (on(actuate(RAMP, offsets="some")), "phases.1.offsets", "'some'"),
     (on(actuate(RAMP, active_fraction=0.04)), "phases.1.active_fraction", "0.04"),
-    (on(actuate(RAMP, active_fraction=0)), "phases.1.active_fraction", "0"),
-    (on(actuate(RAMP, active_fraction=1.1)), "phases.1.active_fraction", "1.1"),
     (on(actuate({**RAMP, "to_deg": 110})), "phases.1.barbs.to_deg", "110"),
     (on({**SHAPE_CHANGE, "straight_deg": -16}), "phases.1.straight_deg", "-16"),
     (on(actuate({**SINE, "amplitude_deg": 20}, duration_s=2)), "phases.1.barbs.amplitude_deg", "20"),
@@ -241,24 +191,15 @@ ACTUATED: Bad = [
     (on(actuate({**TRIANGLE, "speed_rad_per_s": 6.1}, duration_s=1)), "phases.1.barbs.speed_rad_per_s", "6.1 rad/s"),
     (on({**SHAPE_CHANGE, "opening_s": 0.2}), "phases.1.opening_s", "0.2"),
     (on({**SHAPE_CHANGE, "closing_s": 0.2, "straight_hold_s": 1}), "phases.1.closing_s", "0.2"),
-    (on({**SHAPE_CHANGE, "duration_s": 3}), "phases.1", "unknown key 'duration_s'"),
-    (on(actuate(RAMP, barb1=RAMP)), "phases.1", "unknown key 'barb1'"),
-    (on(actuate({**SINE, "amplitude": 3})), "phases.1.barbs", "unknown key 'amplitude'"),
     (on(actuate(sequence(RAMP, {"type": "ramp", "to_deg": 3}))), "phases.1.barbs.steps.1.duration_s", "missing"),
-    (on(actuate(barb_1=HOLD, barb_2={**RAMP, "to_deg": None})), "phases.1.barb_2.to_deg", "null"),
     (on(actuate({"type": "jump"})), "phases.1.barbs.type", "'jump'"),
     (on(actuate(sequence(HOLD, RAMP))), "phases.1.barbs.steps.0", "hold has no end"),
     (on({"type": "internal-oscillation"}), "phases.1.theta_deg", "missing"),
-    (on({**OSCILLATION, "theta_deg": 0}), "phases.1.theta_deg", "0"),
     ({**on(SHAPE_CHANGE), "motor.torque_limit_N_m": 0}, "motor.torque_limit_N_m", "0"),
-    ({**on(SHAPE_CHANGE), "motor.torque_limit_N_m": -1e-5}, "motor.torque_limit_N_m", "-1e-05"),
     ({**on(SHAPE_CHANGE), "motor.speed_limit_rad_per_s": 0}, "motor.speed_limit_rad_per_s", "0 rad/s"),
     ({**on(SHAPE_CHANGE), "motor.stiffness_N_m_per_rad": -1}, "motor.stiffness_N_m_per_rad", "-1"),
     ({**on(SHAPE_CHANGE), "motor.law": "brake"}, "motor.law", "'brake'"),
-    ({**on(SHAPE_CHANGE), "motor.torque_limit": 1}, "motor", "unknown key 'torque_limit'"),
     ({**on(SHAPE_CHANGE), "motor.torque_limit_N_m": "1e-5"}, "motor.torque_limit_N_m", "got the text '1e-5'"),
-    ({**on(SHAPE_CHANGE), "fidelity": {"hinge_stiffness_N_per_m": 0}}, "fidelity.hinge_stiffness_N_per_m", "0 N/m"),
-    ({**on(SHAPE_CHANGE), "fidelity": {"control_interval_s": 0}}, "fidelity.control_interval_s", "0"),
     ({**on(SHAPE_CHANGE), "fidelity": {"control_interval_s": 0.005}}, "fidelity.control_interval_s", "0.005"),
     ({**on(SHAPE_CHANGE), "fidelity": {"control_interval_s": 3e-4}}, "fidelity.control_interval_s", "0.0003"),
     ({**on(SHAPE_CHANGE), "smarticle.aspect_ratio": 0}, "smarticle.aspect_ratio", "0"),
@@ -293,8 +234,6 @@ CHAINS: Bad = [
     ({"fidelity.rows": 2, "fidelity.diameter_m": 0.004}, "fidelity.rows", "2"),
     ({THICK: 0.009}, THICK, "0.009 m"),
     ({THICK: 0.024}, "smarticle", "0.024 m"),
-    ({THICK: -0.02}, THICK, "-0.02"),
-    ({THICK: 21}, THICK, "21"),
     ({THICK: 0.02, "engine": "links"}, THICK, "0.02 m on engine: links"),
     ({THICK: 0.02, "engine": "lammps"}, "engine", "plane"),
     ({THICK: 0.02, "smarticle.aspect_ratio": 0.4}, THICK, "0.01868 m"),
@@ -341,7 +280,3 @@ def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
     both = refused(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
     assert both.count("11.7 means") == 2
     assert "; also hooks.lower_length_m: 11.7 means" in both
-
-
-def test_sentences(snapshot: SnapshotAssertion) -> None:
-    assert "\n".join(refused(good, changes) for good, changes, *_ in ALL) == snapshot

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-import numpy as np
 import pytest
 import yaml
-from pydantic import BaseModel, ValidationError
-from scenes import chain, small
+from scenes import small
 
-from dem.plan.steps import time_step
-from dem.scene.reading import dump_scene, json_schema, load_scene, parse_scene, scene_hash
+from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene, derive_seed
 
 SceneData = Callable[..., dict[str, Any]]
@@ -30,33 +26,6 @@ def write(folder: Path, text: str = MINIMAL) -> Path:
     path = folder / "scene.yaml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_defaults_are_the_papers(tmp_path: Path) -> None:
-    scene = load_scene(write(tmp_path))
-    smarticle, container, contact = scene.smarticle, scene.container, scene.contact
-    assert (smarticle.middle_length_m, smarticle.thickness_normal_m, smarticle.thickness_in_plane_m) == (
-        0.0117,
-        1.27e-3,
-        0.5e-3,
-    )
-    assert smarticle.density_kg_per_m3 == 7850
-    assert smarticle.angles_deg == (90, 90)
-    assert container.radius_m == pytest.approx(2 * 0.0117)
-    assert (contact.friction_smarticle, contact.friction_wall) == (0.4, 0.4)
-    shake = scene.phases[1]
-    assert (shake.duration_s, shake.frequency_hz, shake.peak_acceleration_g) == (20, 30, 2)
-    assert scene.fidelity.base == "standard"
-    assert scene.gravity_m_per_s2 == 9.81
-    assert (scene.seed, scene.count) == (3, 12)
-
-
-def test_boxes_carry_the_scenes_numbers() -> None:
-    scene = small({"smarticle.aspect_ratio": 0.4, "smarticle.density_kg_per_m3": 2700})
-    boxes = scene.smarticle.boxes
-    assert boxes.barb_length == pytest.approx(0.4 * 0.0117)
-    assert boxes.mass == pytest.approx(2700 * 1.27e-3 * 0.5e-3 * 0.0117 * 1.8)
-    assert boxes.vertices[0, 1] - boxes.vertices[1, 1] == pytest.approx(0.4 * 0.0117)  # 90 degrees is the U
 
 
 def test_overrides_reach_every_depth(tmp_path: Path) -> None:
@@ -81,21 +50,6 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
         scene.fidelity.stiffness_N_per_m == load_scene(write(tmp_path), ["fidelity=draft"]).fidelity.stiffness_N_per_m
     )
     assert scene.smarticle.angles_deg == (80, 85)
-
-
-def test_fidelity_by_name_and_by_mapping() -> None:
-    named = small({"fidelity": "reference"})
-    mapped = small({"fidelity": {"base": "reference"}})
-    assert named == mapped
-    knob = small({"fidelity": {"base": "reference", "stiffness_N_per_m": 123.0}}).fidelity
-    assert knob.stiffness_N_per_m == 123
-    assert knob.rows == named.fidelity.rows
-    assert small({"fidelity": {"rows": 2}}).fidelity.base == "standard"
-    scenes = [small({"fidelity": name}) for name in ("draft", "standard", "reference")]
-    counts = [len(scene.particle.centres) for scene in scenes]
-    steps = [time_step(scene) for scene in scenes]
-    assert counts == sorted(set(counts))  # three settings that differ, each finer than the one before
-    assert steps == sorted(set(steps), reverse=True)
 
 
 @pytest.mark.parametrize(("text", "value"), [("1e-3", 1e-3), ("1.e1", 10.0), ("2E0", 2.0), ("5", 5.0), (".5", 0.5)])
@@ -128,19 +82,6 @@ def test_the_default_engine_is_neither_written_nor_hashed_and_another_is_both() 
     assert parse_scene(yaml.safe_load(dump_scene(other)), source="dump") == other
 
 
-def test_dump_survives_the_file(tmp_path: Path) -> None:
-    scene = small({"fidelity": {"time_step_s": 1e-6}, "recording.series_interval_s": 1e-3})
-    assert load_scene(write(tmp_path, dump_scene(scene))) == scene
-
-
-def test_what_a_shake_moves_is_neither_written_nor_hashed_where_it_is_the_container() -> None:
-    plain, named, alone = small(), small({"phases.2.moves": "container"}), small({"phases.2.moves": "floor"})
-    assert "moves" not in dump_scene(named)
-    assert scene_hash(named) == scene_hash(plain) == PLAIN_HASH
-    assert scene_hash(alone) != scene_hash(plain)
-    assert parse_scene(yaml.safe_load(dump_scene(alone)), source="dump") == alone
-
-
 def test_hash_is_stable_over_notation_and_sensitive_to_everything(scene_data: SceneData) -> None:
     scene = small()
     assert re.fullmatch(r"[0-9a-f]{64}", scene_hash(scene))
@@ -168,95 +109,3 @@ def test_seeds_for_purposes_come_from_the_seed_alone() -> None:
     drawn = {derive_seed(seed, purpose) for seed in range(500) for purpose in ("deposit", "shake")}
     assert len(drawn) == 1000
     assert max(drawn) > 2**63  # all 64 bits are used: seeds of a sweep do not collide
-
-
-def test_scene_and_its_parts_are_frozen() -> None:
-    scene = small()
-    for part, name in ((scene, "count"), (scene.smarticle, "aspect_ratio"), (scene.phases[1], "duration_s")):
-        with pytest.raises(ValidationError, match="frozen"):
-            setattr(part, name, 1)
-    assert isinstance(scene.phases, tuple)
-
-
-def models(*made_of: Any) -> list[type[BaseModel]]:
-    """All models that types are made of, themselves included; a sequence of motions may hold sequences."""
-    seen: list[type[BaseModel]] = []
-    waiting = list(made_of)
-    while waiting:
-        annotation = waiting.pop()
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            if annotation not in seen:
-                seen.append(annotation)
-                waiting += [field.annotation for field in annotation.model_fields.values()]
-        else:
-            waiting += get_args(annotation)
-    return seen
-
-
-def test_every_field_says_what_it_is_and_in_which_unit() -> None:
-    seen = models(Scene)
-    assert {"Scene", "Smarticle", "Container", "Contact", "Fidelity", "Settle", "Deposit", "Relax", "Shake"} <= {
-        model.__name__ for model in seen
-    }
-    assert {"Motor", "Actuate", "ShapeChange", "InternalOscillation", "Sequence", "Sine"} <= {m.__name__ for m in seen}
-    units = {"1", "m", "kg/m³", "deg", "s", "Hz", "N", "N/m", "m/s", "m/s²", "rad/s", "N m", "N m/rad"}
-    units |= {"N s/m", "N m s/rad"}
-    numbers = 0
-    for model in seen:
-        for name, field in model.model_fields.items():
-            if name == "type":  # the tag of a phase or motion: its own docstring describes it
-                assert model.__doc__
-                continue
-            assert field.description, f"{model.__name__}.{name} has no description"
-            if {int, float} & {field.annotation, *get_args(field.annotation)}:
-                numbers += 1
-                found = re.search(r"\[([^\]]+)\]", field.description)
-                assert found, f"{model.__name__}.{name} has no unit"
-                assert found[1] in units, f"{model.__name__}.{name}: [{found[1]}]"
-    assert numbers > 25
-
-
-def test_names_and_units_agree() -> None:
-    suffixes = {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad"}
-    suffixes |= {"_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s", "_N_m": "N m"}
-    suffixes |= {"_N_per_m": "N/m", "_m_per_s2": "m/s²", "_m_per_s": "m/s", "_kg_per_m3": "kg/m³", "_deg": "deg"}
-    suffixes |= {"_N_s_per_m": "N s/m", "_N_m_s_per_rad": "N m s/rad", "_hz": "Hz", "_N": "N", "_m": "m", "_s": "s"}
-    checked = set()
-    for model in models(Scene):
-        for name, field in model.model_fields.items():
-            unit = next((unit for suffix, unit in suffixes.items() if name.endswith(suffix)), None)
-            if unit is not None:
-                assert f"[{unit}]" in (field.description or ""), f"{model.__name__}.{name}"
-                checked.add(unit)
-    assert checked == set(suffixes.values())
-
-
-def test_json_schema_exports_with_descriptions() -> None:
-    schema = json.loads(json.dumps(json_schema()))
-    assert schema["additionalProperties"] is False
-    assert set(schema["required"]) == {"schema_version", "seed", "count", "phases"}
-    ratio = schema["$defs"]["Smarticle"]["properties"]["aspect_ratio"]
-    assert (ratio["minimum"], ratio["maximum"], ratio["default"]) == (0, 2, 0.7)
-    assert "[1]" in ratio["description"]
-
-
-def test_json_schema_allows_what_the_loader_allows() -> None:
-    fidelity = json_schema()["properties"]["fidelity"]
-    assert any(option.get("type") == "string" for option in fidelity.get("anyOf", [fidelity]))
-
-
-def test_strengths_are_drawn_from_the_seed_within_the_spread() -> None:
-    assert chain().motor_strengths is None
-    strengths = chain({"motor.strength_spread": 0.1}).motor_strengths
-    assert strengths is not None
-    assert strengths.shape == (6, 2)
-    assert 0.02 < strengths.std() < 0.1
-    assert np.abs(strengths - 1).max() <= 0.1
-    again = chain({"motor.strength_spread": 0.1}).motor_strengths
-    assert (again == strengths).all()
-    assert (chain({"motor.strength_spread": 0.1, "seed": 4}).motor_strengths != strengths).all()
-
-
-def test_a_chain_survives_its_own_dump() -> None:
-    scene = chain()
-    assert parse_scene(yaml.safe_load(dump_scene(scene)), source="dump") == scene

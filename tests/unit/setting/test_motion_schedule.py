@@ -78,42 +78,6 @@ def test_steps_begin_where_the_one_before_ended() -> None:
     assert motion(**data).period is None
 
 
-def test_a_swing_as_a_step_starts_anew_and_is_left_where_it_is() -> None:
-    data = sequence(ramp(60, 1), triangle(duration_s=0.75), hold(1), back(1))
-    assert degrees(data, [1, 1.25, 1.5, 1.75, 2.0, 2.7, 3.25, 3.75]) == pytest.approx(
-        [60, 70, 80, 70, 70, 70, 80, 90], abs=1e-9
-    )
-
-
-def test_an_end_belongs_to_the_step_that_ends_there() -> None:
-    # The second step jumps to 80°: a motion that is cut at 1 s has ended at 0°.
-    data = sequence(ramp(0, 1), sine(cycles_offset=0.25))
-    assert degrees(data, [1.0, 1.0 + 1e-12]) == pytest.approx([0, 80], abs=1e-6)
-    assert degrees(data, 1.0) == pytest.approx(0)
-    assert degrees(data, 1.0 + 1e-12) == pytest.approx(80)
-    again = sequence(sine(cycles_offset=0.25, duration_s=0.125), repeat=3)
-    assert degrees(again, [0.125, 0.25, 0.375]) == pytest.approx([60, 60, 60], abs=1e-9)
-
-
-def test_beyond_the_end_what_is_periodic_goes_on_and_all_else_stays() -> None:
-    assert degrees(ramp(0, 1), 5) == pytest.approx(0)
-    assert degrees(sequence(ramp(0, 1), back(1)), 5) == pytest.approx(90)
-    assert degrees(sine(duration_s=0.25), 0.625) == pytest.approx(80)
-    assert degrees(sequence(ramp(0, 1), ramp(60, 1), repeat=2), [4.5, 5, 6]) == pytest.approx([30, 0, 60])
-
-
-@pytest.mark.parametrize("repeat", [3, None])
-def test_repeated_sequence(repeat: int | None) -> None:
-    data = sequence(ramp(0, 1), ramp(60, 1), repeat=repeat)
-    # The first time from 90°, later from 60°.
-    assert degrees(data, [0, 0.5, 1, 2, 2.5, 3, 4, 4.5, 5, 6]) == pytest.approx(
-        [90, 45, 0, 60, 30, 0, 60, 30, 0, 60], abs=1e-9
-    )
-    found = motion(**data)
-    assert found.duration == (6 if repeat else math.inf)
-    assert found.period == 2
-
-
 def test_sequences_within_sequences() -> None:
     wave = sequence(ramp(80, 0.5), ramp(40, 0.5), repeat=2)
     data = sequence(ramp(40, 1), wave, back(1))
@@ -121,95 +85,6 @@ def test_sequences_within_sequences() -> None:
     # `return` leads to the beginning of the phase, not of the inner sequence.
     inner = sequence(ramp(40, 1), sequence(ramp(0, 1), back(1)), repeat=None)
     assert degrees(inner, [1, 2, 3, 4, 5, 6]) == pytest.approx([40, 0, 90, 40, 0, 90], abs=1e-9)
-
-
-def test_many_starts_and_times_at_once() -> None:
-    data = sequence(ramp(0, 1), back(1), repeat=None)
-    table = degrees(data, np.array([[0.0], [0.5], [2.0], [3.5]]), np.array([90.0, 60.0, 30.0]))
-    assert table == pytest.approx(np.array([[90, 60, 30], [45, 30, 15], [90, 60, 30], [45, 30, 15]]), abs=1e-9)
-    alike = degrees(sine(), 0.125, np.array([90.0, 60.0]))
-    assert alike == pytest.approx([80, 80])
-    each = degrees(data, np.array([0.25, 1.5, 2.75]), np.array([80.0, 40.0, 20.0]))
-    assert each == pytest.approx([60, 20, 5], abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("data", "duration", "period"),
-    [
-        (hold(), math.inf, None),
-        (hold(2), 2, None),
-        (ramp(0, 1.5), 1.5, None),
-        (back(3), 3, None),
-        (sine(), math.inf, 0.5),
-        (sine(duration_s=4), 4, 0.5),
-        (triangle(), math.inf, 2),
-        (sequence(ramp(0, 1), hold(), repeat=1), math.inf, None),
-        (sequence(ramp(0, 1), ramp(9, 0.5), repeat=4), 6, 1.5),
-    ],
-)
-def test_duration_and_period(data: dict[str, Any], duration: float, period: float | None) -> None:
-    found = motion(**data)
-    assert found.duration == duration
-    assert found.period == (None if period is None else pytest.approx(period))
-
-
-@pytest.mark.parametrize(
-    ("data", "until", "expected"),
-    [
-        (hold(), 5, (90, 90)),
-        (ramp(0, 1), 5, (0, 90)),
-        (ramp(0, 1), 0.5, (45, 90)),
-        (sine(), 5, (40, 80)),
-        (sine(), 1 / 8, (60, 80)),
-        (sine(), 1 / 24, (60, 70)),
-        (sine(cycles_offset=0.25), 1 / 4, (40, 80)),
-        (sine(cycles_offset=0.25), 1 / 8, (60, 80)),
-        (triangle(), 0.25, (60, 70)),
-        (triangle(), 1.25, (50, 80)),
-        (triangle(duration_s=0.25), 0.25, (60, 70)),
-        # A swing within a sequence is cut at its end; one at the end of it goes on.
-        (sequence(ramp(85, 1), triangle(centre_deg=80, duration_s=0.25), hold(1)), 2.25, (80, 90)),
-        (sequence(ramp(85, 1), triangle(centre_deg=80, duration_s=0.25)), 1.5, (80, 100)),
-        (sequence(ramp(0, 1), ramp(100, 1)), 2, (0, 100)),
-        (sequence(ramp(0, 1), ramp(100, 1)), 1, (0, 90)),
-        (sequence(ramp(0, 1), ramp(100, 1)), 1.5, (0, 90)),
-        (sequence(hold(1), ramp(30, 1), repeat=None), 1.5, (60, 90)),
-        (sequence(ramp(95, 1), sequence(ramp(60, 1), ramp(20, 1)), repeat=2), 9, (20, 95)),
-    ],
-)
-def test_extremes_by_hand(data: dict[str, Any], until: float, expected: tuple[float, float]) -> None:
-    low, high = motion(**data).extremes(math.radians(90), until)
-    assert (math.degrees(low), math.degrees(high)) == pytest.approx(expected, abs=1e-9)
-
-
-def test_extremes_for_each_start() -> None:
-    low, high = motion(**sequence(ramp(40, 1), back(1))).extremes(np.radians([90.0, 10.0]), 2)
-    assert np.degrees(low) == pytest.approx([40, 10])
-    assert np.degrees(high) == pytest.approx([90, 40])
-
-
-@pytest.mark.parametrize(
-    ("data", "expected"),
-    [
-        (hold(), 0),
-        (ramp(0, 1.5), math.pi / 2 / 1.5),
-        (back(1), 0),
-        (sine(), 2 * math.pi * 2 * math.radians(20)),
-        (triangle(), 2 * math.pi / 9),
-        (sequence(ramp(60, 1), ramp(0, 0.5), back(1)), math.radians(120)),
-        # From 90° the first time, from 0° each later one.
-        (sequence(ramp(60, 0.5), ramp(0, 1), repeat=2), math.radians(120)),
-        (sequence(ramp(90, 1), sine(cycles_offset=0.25, amplitude_deg=0.1)), 2 * math.pi * 2 * math.radians(0.1)),
-    ],
-)
-def test_speed_by_hand_without_jumps(data: dict[str, Any], expected: float) -> None:
-    assert motion(**data).speed(math.radians(90)) == pytest.approx(expected)
-
-
-def test_speed_is_the_greatest_over_all_starts_and_within_the_time() -> None:
-    assert motion(**ramp(60, 1)).speed(np.radians([90.0, 0.0])) == pytest.approx(math.radians(60))
-    slow_then_fast = motion(**sequence(ramp(80, 1), ramp(0, 1)))
-    assert slow_then_fast.speed(math.radians(90), until=1) == pytest.approx(math.radians(10))
 
 
 ANGLES = st.floats(-15, 105)
@@ -267,18 +142,6 @@ def test_speed_is_that_of_dense_sampling(data: dict[str, Any], start: float) -> 
     assert steepest == pytest.approx(found.speed(begun), rel=1e-3, abs=1e-6)
 
 
-@given(data=SEQUENCES, start=ANGLES, times=st.lists(st.floats(0, 1), min_size=2, max_size=20))
-def test_one_time_and_many_times_agree(data: dict[str, Any], start: float, times: list[float]) -> None:
-    found = motion(**data)
-    # The same with a last step that has no end.
-    endless = motion(**sequence(*data["steps"], hold()))
-    asked = found.duration * np.array(times)
-    last = [endless.angle(np.array([time]), math.radians(start))[0] for time in asked]
-    assert endless.angle(asked, math.radians(start)) == pytest.approx(last, abs=1e-9)
-    alone = [found.angle(np.array([time]), math.radians(start))[0] for time in asked]
-    assert found.angle(asked, math.radians(start)) == pytest.approx(alone, abs=1e-9)
-
-
 @given(data=SEQUENCES, start=ANGLES, share=st.floats(0.01, 0.99))
 def test_from_the_second_time_on_a_sequence_is_periodic(data: dict[str, Any], start: float, share: float) -> None:
     found = motion(**{**data, "repeat": None})
@@ -318,30 +181,3 @@ def test_refused(data: dict[str, Any], message: str) -> None:
         ADAPTER.validate_python(data)
     errors = caught.value.errors()
     assert [error["msg"] for error in errors] == [f"Value error, {message}"]
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        hold(0),
-        ramp(0, -1),
-        {"type": "ramp", "to_deg": 0},
-        back(math.inf),
-        sine(amplitude_deg=0),
-        sine(frequency_hz=-1),
-        sine(centre_deg=math.nan),
-        triangle(speed_rad_per_s=0),
-        sequence(hold(1), repeat=0),
-        sequence(hold(1), repeat=True),
-        {"type": "square"},
-    ],
-)
-def test_refused_values(data: dict[str, Any]) -> None:
-    with pytest.raises(ValidationError):
-        ADAPTER.validate_python(data)
-
-
-def test_motions_are_frozen_and_compare_by_value() -> None:
-    assert motion(**sequence(hold(1), sine())) == motion(**sequence(hold(1), sine()))
-    with pytest.raises(ValidationError, match="frozen"):
-        motion(**hold(1)).duration_s = 2

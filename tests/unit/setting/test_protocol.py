@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 import yaml
-from scenes import CHAIN, changed
 
 from dem.plan.outlook import plan
 from dem.plan.protocol import protocol_lines
@@ -54,21 +53,3 @@ def test_a_resolved_scene_reads_as_itself(name: str) -> None:
     again = parse_scene(yaml.safe_load(dump_scene(scene)), source="scene.yaml")
     assert again == scene
     assert scene_hash(again) == scene_hash(scene)
-
-
-def test_without_a_protocol_a_scene_is_told_as_it_was_before_there_were_any() -> None:
-    told = yaml.safe_load(dump_scene(scene_with()))
-    assert "protocol" not in told
-    assert "packing_radius_m" not in told["container"]
-    assert not {"every_s", "thrown_at_m_per_s", "moves"} & {key for phase in told["phases"] for key in phase}
-
-
-def test_a_mould_of_tiers_keeps_its_radii() -> None:
-    tiers = [{"radius_m": 0.03, "height_m": 0.05}, {"radius_m": 0.02, "height_m": 0.3}]
-    assert scene_with(protocol="code", container={"tiers": tiers}, phases=PHASES[:1]).container.radius_m == 0.03
-
-
-def test_a_plane_has_no_container_by_any_protocol() -> None:
-    scene = parse_scene({**changed(CHAIN, {}), "protocol": "code"}, source="scene.yaml")
-    assert scene.plane is not None
-    assert scene.contact.friction_smarticle == CHAIN.get("contact", {}).get("friction_smarticle", 0.2)

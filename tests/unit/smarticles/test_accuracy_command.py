@@ -110,7 +110,8 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
     said = smarticles("accuracy", base, "--out", out, "--knobs", "fidelity")
     assert said.status == 0
     assert "base_seed1 finished before" in said.err
-    assert "Use fidelity standard (3.3 %): each is the cheapest whose errors against the reference are" in said.out
+    assert "use standard, " in said.out
+    assert "and 3.3 % in φ cannot be excluded" in said.out
     table = out / "results" / "work_precision.csv"
     assert table.is_file()
     assert (out / "results" / "accuracy.png").is_file()
@@ -132,7 +133,7 @@ def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
     base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
-    monkeypatch.setattr("studies.accuracy.figures.draw", lambda *_, **__: [])
+    monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
     out = tmp_path / "ladder"
     written(base, out, smarticles, "--seeds", "1,2")
     finish(out, write_run)

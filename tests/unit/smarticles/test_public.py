@@ -67,7 +67,9 @@ def test_every_name_is_there_and_the_stub_tells_the_same() -> None:
 
 
 def test_an_unknown_name_is_refused_and_the_known_ones_are_named() -> None:
-    with pytest.raises(AttributeError, match=r"'nothing'; known: .*load_scene, measures, read, read_sweep, run, sweep"):
+    with pytest.raises(
+        AttributeError, match=r"'nothing'; known: .*load_scene, measure, measures, read, read_sweep, run, sweep"
+    ):
         _ = smarticles.nothing  # type: ignore[attr-defined]
 
 
@@ -101,7 +103,7 @@ def test_a_directory_that_holds_something_else_is_left_alone(tmp_path: Path) -> 
 
 def test_a_series_is_a_table_with_a_column_per_component(write_run: WriteRun, tmp_path: Path) -> None:
     found = smarticles.read(write_run(tmp_path / "run", phases=("deposit", "relax", "shape-change", "relax")))
-    table = found.recorded()
+    table = found.series.table()
     assert list(table.columns[:2]) == ["time_s", "phase"]
     assert {"angle_rad barb 1", "angle_rad barb 2"} <= {*table.columns}
     assert table["com_height_m"].tolist() == found.series["com_height_m"].tolist()
@@ -109,8 +111,8 @@ def test_a_series_is_a_table_with_a_column_per_component(write_run: WriteRun, tm
 
 def test_a_table_of_a_run_has_a_row_per_phase_or_frame(write_run: WriteRun, tmp_path: Path) -> None:
     found = smarticles.read(write_run(tmp_path / "run"))
-    assert found.table()["phase type"].tolist() == ["deposit", "relax", "shake", "relax"]
-    assert len(found.table(frames=True)) == len(found.frames) == 16
+    assert smarticles.measure(found)["phase type"].tolist() == ["deposit", "relax", "shake", "relax"]
+    assert len(smarticles.measure(found, frames=True)) == len(found.frames) == 16
 
 
 # -- sweeps ------------------------------------------------------------------------------------------------------------

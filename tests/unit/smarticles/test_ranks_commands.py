@@ -9,7 +9,6 @@ import pytest
 from command_cases import Smarticles
 
 from dem.engine.lammps.ranks import RANKS
-from dem.record.manifest import write_manifest
 from dem.run.run import manifest
 from dem.scene.reading import dump_scene, load_scene
 
@@ -45,7 +44,8 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_told(
     scene, out = load_scene(scene_file, ["engine=lammps"]), scene_file.parent / "out"
     out.mkdir()
     steps = [1e-4] * len(scene.phases)
-    write_manifest(manifest(scene, out, steps=steps, command="", made_by=("lammps", "1"), threads=2))
+    made = manifest(scene, out, steps=steps, command="", made_by=("lammps", "1"), threads=2)
+    made.write(out / "run.json", make_folder=True)
     (out / "scene.yaml").write_text(dump_scene(scene))
     assert smarticles("resume", out).status == 0
     assert smarticles("resume", out, "--ranks", "3").status == 0

@@ -190,14 +190,13 @@ def test_the_page_of_a_study_has_its_verdicts(tmp_path: Path, write_run: WriteRu
     assert smarticles("study", "gravish", "--quick", "--out", folder.path, "--analyse").status == 0
     assert smarticles("report", folder.path, "--overwrite").status == 0
     page = Read(folder.path / "report.html")
-    assert page.row("question") == ["question", "answer", "evidence"]
-    assert page.row("Is phi_f above phi_0 at every l/w?")[1] == "yes"
+    assert page.row("φ_f is above φ_0 at every l/w")[2] == "found"
     assert any(row[0] == "phi_f" and "0.7" in row and "0.13" in row for row in page.rows)  # Gravish's, at 0.7
     assert any("Gravish et al., PRL 108, 208001" in line for line in page.text.splitlines())
     assert [alt for a in page.of("img") if (alt := a["alt"] or "").startswith("Figure “phi” of the study gravish")]
     # The results alone make a page as well.
     assert smarticles("report", folder.path / "results", "--output", tmp_path / "results.html").status == 0
-    assert Read(tmp_path / "results.html").row("question")
+    assert Read(tmp_path / "results.html").row("φ_f is above φ_0 at every l/w")
 
 
 def test_results_that_are_damaged_are_refused(tmp_path: Path, smarticles: Smarticles) -> None:

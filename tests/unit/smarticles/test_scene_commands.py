@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
-from dem.record.manifest import write_manifest
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
 
@@ -128,7 +127,8 @@ def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
     scene = load_scene(scene_file)
     steps = [1e-4] * len(scene.phases)
     out.mkdir()
-    write_manifest(manifest(scene, out, steps=steps, command="", made_by=("links", "1"), threads=3))
+    made = manifest(scene, out, steps=steps, command="", made_by=("links", "1"), threads=3)
+    made.write(out / "run.json", make_folder=True)
     assert smarticles("run", scene_file, "--out", out, "--resume", *options).status == 0
     shutil.copy(scene_file, out / "scene.yaml")
     assert smarticles("resume", out, *options).status == 0

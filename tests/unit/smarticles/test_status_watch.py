@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 from pathlib import Path
+from typing import TextIO
 
 import pytest
 from command_cases import Smarticles, WriteRun
 
 from smarticles.commands import status as command
-from templates.sweep.folder import open_folder
 
 
 class Clock:
@@ -30,16 +31,22 @@ def out(tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smart
     return tmp_path / "out"
 
 
+def held(run: Path) -> TextIO:
+    """A run that a process computes."""
+    lock = (run / ".lock").open("w")
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    return lock
+
+
 def test_it_ends_when_nothing_runs(
     out: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = write_run(out / "runs" / "n6", status="unfinished")
-    lock = open_folder(out).lock()
-    lock.__enter__()
+    lock = held(run)
     clock = Clock(
         lambda: None,
         lambda: (run / "progress.json").write_text('{"phase": "shake", "time_s": 1.5}'),
-        lambda: (lock.__exit__(None, None, None), write_run(out / "runs" / "n6")),
+        lambda: (lock.close(), write_run(out / "runs" / "n6")),
     )
     monkeypatch.setattr(command, "time", clock)
     said = smarticles("status", out, "--watch", "--every", "0.5")
@@ -57,9 +64,9 @@ def test_ctrl_c_is_its_way_to_end(
     def stop() -> None:
         raise KeyboardInterrupt
 
-    write_run(out / "runs" / "n6", status="unfinished")
+    run = write_run(out / "runs" / "n6", status="unfinished")
     monkeypatch.setattr(command, "time", Clock(stop))
-    with open_folder(out).lock():
+    with held(run):
         said = smarticles("status", out, "--watch")
     assert (said.status, said.err) == (0, "")
     assert said.out.count("running") == 2

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
+from synthetic import write_ended
 
 from dem.errors import InputError
 from dem.record.rundir import claimed
@@ -20,10 +21,7 @@ def finish(directory: Path) -> None:
     """Make every run of a sweep look finished."""
     folder = open_folder(directory)
     for entry in folder.entries:
-        run = folder.run(entry)
-        run.mkdir(parents=True)
-        (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
-        (run / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0, "wall_s": 2.0}))
+        write_ended(folder.run(entry), entry.scene_sha256)
 
 
 def test_a_dry_run_lists_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
@@ -231,8 +229,8 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     lines = said.out.splitlines()
     assert lines[0].startswith("not the full study: 18 runs instead of 73; ")
     assert "shake_s: 1.5 instead of 20.0" in lines[0]
-    assert lines[2].split()[:5] == ["links", "phi_0", "0.4", "3", "0.1050"]
-    assert "Is phi_f above phi_0 at every l/w? YES" in lines
+    assert lines[2].split()[:4] == ["links", "0.4", "20", "3"]
+    assert "FOUND: φ_f is above φ_0 at every l/w" in lines
     results = finished_study / "results"
     figures = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
     assert figures
@@ -242,16 +240,12 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     assert "1 of 18 runs are missing: lw1.00_yade_seed1: " in said.err.splitlines()[-1]
     missing = (results / "missing.csv").read_text(encoding="utf-8")
     assert "lw1.00_yade_seed1" in missing
-    # The quick analysis leaves out what takes seconds per run.
-    header = (results / "runs.csv").read_text(encoding="utf-8").splitlines()[0]
-    assert "phi_f voxel [-]" in header
-    assert "voronoi" not in header
 
 
 def test_a_study_can_be_analysed_without_starting_a_run(finished_study: Path, smarticles: Smarticles) -> None:
     said = smarticles("study", "gravish", "--quick", "--analyse", "--out", finished_study)
     assert said.status == 0
-    assert "Is phi_f above phi_0 at every l/w? YES" in said.out.splitlines()
+    assert "FOUND: φ_f is above φ_0 at every l/w" in said.out.splitlines()
     assert "lw1.00_yade_seed1" in (finished_study / "results" / "missing.csv").read_text(encoding="utf-8")
     assert not (finished_study / "runs" / "lw1.00_yade_seed1").exists()
 
@@ -369,41 +363,3 @@ def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
         "smarticles: error: --fidelity draft: study gravish sets the fidelity of its runs itself; leave --fidelity "
         "out\n"
     )
-
-
-@pytest.mark.parametrize("study", ["sensitivity", "sensitivity-section"])
-def test_a_study_of_sensitivity_is_analysed(
-    study: str, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "study"
-    points = expand(load_sweep(study_file(study)))
-    smarticles("sweep", study_file(study), "--out", out)
-    variants = list(dict.fromkeys(point.values["variant"] for point in points))
-    for point in points:
-        # φ after shaking: 0.100 of all variants but the last one, which has 0.130.
-        after = (0.130 if point.values["variant"] == variants[-1] else 0.100) * (1 + 0.002 * point.values["seed"])
-        run = write_run(
-            out / "runs" / point.name,
-            seed=point.values["seed"],
-            count=6,
-            frames_per_phase=1,
-            phases=("deposit", "relax", "shake"),
-            packing=(0.1, 0.1, after),
-        )
-        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
-        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
-    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
-    said = smarticles("study", study, "--out", out)
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert lines[0] == "the full study as shipped"
-    assert lines[1].split()[:3] == ["variant", "seeds", "phi_0"]
-    table = lines[2 : 2 + len(variants)]
-    assert [line.split()[0] for line in table] == variants
-    assert [("+30.0 ± " in line and " *" in line) for line in table] == [False] * (len(variants) - 1) + [True]
-    assert "Changes are against draft; * beyond the error at 95 %." in lines
-    assert (out / "results" / "sensitivity.png").is_file()
-    assert f"Study {study}, fidelity draft: {len(points)} of {len(points)} runs" in (
-        out / "results" / "summary.csv"
-    ).read_text(encoding="utf-8")

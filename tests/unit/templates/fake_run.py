@@ -25,7 +25,7 @@ def main() -> int:
     directory.mkdir(parents=True, exist_ok=True)
     sha256 = re.search(r"# sha256 (\w+)", scene.read_text())
     assert sha256 is not None
-    (directory / "run.json").write_text(json.dumps({"scene_sha256": sha256[1]}))
+    write_manifest(directory, sha256[1])
     (directory / "searched").write_text(os.environ.get("PYTHONPATH", ""))
     (directory / "threads").write_text(os.environ["OMP_NUM_THREADS"])
     held = [str(fd.readlink()) for fd in descriptors() if fd.is_symlink()]
@@ -46,8 +46,20 @@ def main() -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         (directory / "progress.json").write_text("{}")
         time.sleep(600)
-    (directory / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0}))
+    (directory / "done.json").write_text(
+        json.dumps({"status": "done", "time_s": 1.0, "steps": 1, "wall_s": 1.0, "phases": []})
+    )
     return 0
+
+
+def write_manifest(directory: Path, sha256: str) -> None:
+    """The keys that `Manifest` asks for."""
+    words = dict.fromkeys(("name", "command", "started", "fidelity"), "")
+    lengths = ("middle_length_m", "barb_length_m", "thickness_normal_m", "thickness_in_plane_m", "container_radius_m")
+    numbers = dict.fromkeys((*lengths, "smarticle_mass_kg", "solid_volume_m3", "sphere_diameter_m", "time_step_s"), 1.0)
+    counts = dict.fromkeys(("seed", "threads", "count", "aspect_ratio", "spheres_per_smarticle"), 1)
+    data = {"format": 1, "scene_sha256": sha256, "versions": {}, "phases": [], **words, **numbers, **counts}
+    (directory / "run.json").write_text(json.dumps(data))
 
 
 def descriptors() -> list[Path]:
@@ -64,7 +76,7 @@ def wait(directory: Path) -> int:
         temporary.replace(directory / "progress.json")
         time.sleep(600)
     except KeyboardInterrupt:
-        (directory / "failed.json").write_text(json.dumps({"status": "interrupted", "cause": "…"}))
+        (directory / "failed.json").write_text(json.dumps({"status": "interrupted", "cause": "…", "time_s": 1.25}))
         return 130
     return 0
 

@@ -12,7 +12,7 @@ from sweep_cases import SWEEP, MakeFolder
 
 from dem.errors import InputError
 from dem.scene.reading import load_scene, scene_hash
-from templates.sweep.folder import Folder, count_states, open_folder, run_status
+from templates.sweep.folder import Folder, count_states, open_folder
 
 
 def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> None:
@@ -33,14 +33,14 @@ def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> 
 
 def test_runs_start_the_longest_first(make_folder: MakeFolder) -> None:
     folder = make_folder()
-    assert not folder.seed_by_seed
+    assert not folder.manifest.seed_by_seed
     started = [entry.name for entry in folder.in_order_of_start(folder.entries)]
     assert started == ["n20_seed1", "n20_seed2", "n10_seed1", "n10_seed2"]
 
 
 def test_runs_start_seed_by_seed_where_the_sweep_says_so(make_folder: MakeFolder) -> None:
     folder = make_folder(SWEEP.replace("{seeds: [1, 2]}", "{seeds: [2, 1], seed_by_seed: true}"))
-    assert folder.seed_by_seed
+    assert folder.manifest.seed_by_seed
     assert open_folder(folder.path) == folder
     started = [entry.name for entry in folder.in_order_of_start(folder.entries)]
     assert started == ["n20_seed2", "n10_seed2", "n20_seed1", "n10_seed1"]
@@ -120,7 +120,7 @@ def test_an_empty_directory_is_used(make_folder: MakeFolder, tmp_path: Path) -> 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 2}', '{"format": 1, "points": [{}]}'])
 def test_a_damaged_manifest_is_an_input_error(tmp_path: Path, text: str) -> None:
     (tmp_path / "sweep.json").write_text(text)
-    with pytest.raises(InputError, match=r"sweep.json: not a sweep manifest of format 1"):
+    with pytest.raises(InputError, match=r"cannot read manifest .*sweep\.json: .*; write the sweep to a new directory"):
         open_folder(tmp_path)
 
 
@@ -131,34 +131,27 @@ def test_no_manifest_is_an_input_error(tmp_path: Path) -> None:
         open_folder(tmp_path)
 
 
-def write_run(directory: Path, **files: dict[str, object]) -> Path:
-    directory.mkdir(parents=True)
-    for name, content in files.items():
-        (directory / f"{name}.json").write_text(json.dumps(content))
-    return directory
+def test_states_of_its_runs(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    for entry, (name, content) in zip(folder.entries, FILES, strict=False):
+        folder.run(entry).mkdir(parents=True)
+        (folder.run(entry) / name).write_text(json.dumps(content))
+    found = folder.status()
+    assert [(run.state, run.cause, run.time_s) for run in found] == [
+        ("done", None, 6.0),
+        ("failed", "why", 2.0),
+        ("stopped", None, 1.5),
+        ("missing", None, None),
+    ]
+    assert count_states(found) == {"done": 1, "failed": 1, "stopped": 1, "missing": 1}
+    assert json.loads(json.dumps(found[2].to_dict()))["checkpoint_s"] == 1.2
 
 
-def test_states_of_a_run(tmp_path: Path) -> None:
-    manifest: dict[str, object] = {"scene_sha256": "x"}
-    progress: dict[str, object] = {"phase": "shake", "time_s": 1.5, "wall_s": 20.0, "checkpoint_s": 1.2}
-    done = write_run(tmp_path / "a", run=manifest, done={"time_s": 6.0, "wall_s": 99.0})
-    failed = write_run(
-        tmp_path / "b", run=manifest, failed={"status": "failed", "cause": "why", "time_s": 2.0, "checkpoint_s": 1.6}
-    )
-    interrupted = write_run(tmp_path / "c", run=manifest, failed={"status": "interrupted"})
-    killed = write_run(tmp_path / "d", run=manifest, progress=progress)
-    empty = write_run(tmp_path / "e")
-    found = [run_status(path) for path in (done, failed, interrupted, killed, empty)]
-    found += [run_status(tmp_path / "absent"), run_status(killed, active=True)]
-    states = [status.state for status in found]
-    assert states == ["done", "failed", "interrupted", "stopped", "missing", "missing", "running"]
-    assert (found[0].time_s, found[0].wall_s) == (6.0, 99.0)
-    assert (found[1].cause, found[1].time_s) == ("why", 2.0)
-    assert (found[3].phase, found[3].time_s, found[3].wall_s) == ("shake", 1.5, 20.0)
-    # From where they would go on.
-    assert [status.checkpoint_s for status in found[:4]] == [None, 1.6, None, 1.2]
-    assert count_states(found)["missing"] == 2
-    assert json.loads(json.dumps(found[3].to_dict()))["state"] == "stopped"
+FILES = [
+    ("done.json", {"status": "done", "time_s": 6.0, "steps": 9, "wall_s": 99.0, "phases": []}),
+    ("failed.json", {"status": "failed", "cause": "why", "time_s": 2.0, "checkpoint_s": 1.6}),
+    ("progress.json", {"phase": "shake", "time_s": 1.5, "wall_s": 20.0, "checkpoint_s": 1.2}),
+]
 
 
 def test_runs_left_behind_by_a_killed_runner_still_hold_the_sweep(make_folder: MakeFolder) -> None:
@@ -170,7 +163,9 @@ def test_runs_left_behind_by_a_killed_runner_still_hold_the_sweep(make_folder: M
             pass_fds=(lock,),
         )
     try:
-        assert folder.is_active()
+        with pytest.raises(InputError, match="computed already"), folder.lock():
+            pass
     finally:
         left.communicate(b"\n")
-    assert not folder.is_active()
+    with folder.lock():
+        pass

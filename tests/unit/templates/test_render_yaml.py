@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -111,8 +110,6 @@ def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
         ("a: {{ x.y }}", "has no attribute 'y'"),
         ("a: {{ x / 0 }}", "t, line 1: .*division"),
         ("a: {{ range }}", "gives function; it must give numbers, text or lists"),
-        ("{% macro m() %}1{% endmacro %}a: {{ m() }}", "t, line 1: macro, call, filter and set"),
-        ("{% set y %}1{% endset %}a: {{ y }}", "t, line 1: macro, call, filter and set"),
         ("{% include 'other' %}", "t, line 1: no loader"),
         ("a: {{ x.__class__.__mro__ }}", "unsafe"),
         ("? [a]\n: 1", "a key must be plain"),
@@ -154,8 +151,6 @@ def test_expressions(expression: str, value: Any) -> None:
         ("n.__class__", "unsafe"),
         ("n.__class__.__base__.__subclasses__()", "unsafe"),
         ("(n", "derived.x = '\\(n'"),
-        ("9 ** 9 ** 9 ** 9", "too large"),
-        ("'a' * 10 ** 12", "takes numbers: got 'a'"),
         ("range(3)", "gives range; it must give numbers or text"),
         ("n / 0", "division by zero"),
         ("(-1) ** 0.5", "gives complex"),
@@ -170,15 +165,3 @@ def test_names_are_rendered_as_text() -> None:
     assert render_text("lw{{ '%.2f' | format(x) }}", {"x": 0.7}, "t") == "lw0.70"
     with pytest.raises(InputError, match="'y' is undefined"):
         render_text("lw{{ y }}", {"x": 0.7}, "t")
-
-
-def test_the_oracle_would_notice_plain_substitution() -> None:
-    """What string formatting does to the hostile strings: the tests above are not empty."""
-    broken = 0
-    for text in HOSTILE:
-        try:
-            data = yaml.safe_load(f"key: {text}")
-        except yaml.YAMLError:
-            data = None
-        broken += data != {"key": text}
-    assert broken > len(HOSTILE) / 2

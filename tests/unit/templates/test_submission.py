@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from sweep_cases import MakeFolder
+from synthetic import write_ended
 
 from dem.errors import InputError, RunError
 from templates.slurm import queue as slurm
@@ -97,10 +98,7 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def finish(folder: Folder, number: int) -> None:
     entry = folder.entries[number]
-    run = folder.run(entry)
-    run.mkdir(parents=True)
-    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
-    (run / "done.json").write_text(json.dumps({"status": "done", "time_s": 1.0}))
+    write_ended(folder.run(entry), entry.scene_sha256)
 
 
 def test_longer_runs_come_first_and_share_a_task(folder: Folder) -> None:
@@ -197,9 +195,7 @@ def test_a_damaged_record_is_an_error(folder: Folder, text: str) -> None:
 def test_runs_that_cannot_go_on_are_set_aside(folder: Folder) -> None:
     entry = folder.entries[0]
     run = folder.run(entry)
-    run.mkdir(parents=True)
-    (run / "run.json").write_text(json.dumps({"scene_sha256": entry.scene_sha256}))
-    (run / "failed.json").write_text(json.dumps({"status": "failed", "cause": "why"}))
+    write_ended(run, entry.scene_sha256, status="failed")
     submitted(folder)
     assert not run.exists()
     assert (run.parent / f"{entry.name}.stopped-1" / "failed.json").exists()

@@ -7,6 +7,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Bodies, Cords
 from dem.engine.links.compiler import kernel, part
+from dem.engine.links.contact.barrier import Step
 from dem.engine.links.contact.pairs import push
 from dem.engine.links.shape import Shape
 
@@ -34,20 +35,20 @@ def find_knots(shape: Shape, bodies: Bodies, cords: Cords) -> None:
 
 
 @part
-def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, dt: float) -> float:
-    """Add the forces of the strings, and move their other ends on.
+def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) -> float:
+    """Add the forces of the strings.
 
     Args:
         shape: what all smarticles have in common.
         bodies: the smarticles; `load` or `shares` is written.
-        cords: the strings; `anchor`, `sums` and `knot` are written.
+        cords: the strings; `sums` and `knot` are written.
         hinged: None while welded.
-        dt: time step [s].
+        step: lengths of time around these forces.
 
     Returns:
-        Work of the strings on the links in the step [J], to first order in dt.
+        Power of the strings on the links [W].
     """
-    work, motion, position = 0.0, bodies.motion, bodies.position
+    power, motion, position = 0.0, bodies.motion, bodies.position
     for k in range(cords.along.shape[0]):
         find_knot(shape, bodies, cords, k)
         i, kind = cords.owner[k, 0], cords.owner[k, 1]
@@ -68,9 +69,9 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, dt: float) -> 
             tension = max(0.0, cords.law[1] * stretch + cords.law[2] * rate)
         fx, fy, fz = tension * ex, tension * ey, tension * ez
         push(shape, bodies, i, kind, hinged, x, y, z, fx, fy, fz)
-        cords.sums[k, 0] += fx
-        cords.sums[k, 1] += fy
-        cords.sums[k, 2] += fz
-        cords.anchor[k, 0] += cords.speed[k] * dt
-        work += dt * (fx * vx + fy * vy + fz * vz)
-    return work
+        weight = step.past / step.whole
+        cords.sums[k, 0] += weight * fx
+        cords.sums[k, 1] += weight * fy
+        cords.sums[k, 2] += weight * fz
+        power += fx * vx + fy * vy + fz * vz
+    return power

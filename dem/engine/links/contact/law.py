@@ -13,6 +13,7 @@ def resist(
     law: Law,
     load: float,
     weight: float,
+    hardening: float,
     nx: float,
     ny: float,
     nz: float,
@@ -32,6 +33,7 @@ def resist(
         law: of the contact.
         load: of the normal spring here [N], not negative.
         weight: share of a whole contact's springs and dashpots that act here [1].
+        hardening: of the normal dashpot, see `barrier.stretch` [1].
         nx: normal, from the second body to the first [1].
         ny: the same.
         nz: the same.
@@ -43,7 +45,7 @@ def resist(
         slip: (4,) stretch of the tangential spring [m], of a whole contact, and its energy [J]; brought up to date.
     """
     approach = vx * nx + vy * ny + vz * nz
-    normal = load - law.damping * weight * approach
+    normal = load - law.damping * weight * hardening * approach
     normal = max(normal, 0.0)
     tx, ty, tz = vx - approach * nx, vy - approach * ny, vz - approach * nz
     sx, sy, sz = slip[0], slip[1], slip[2]

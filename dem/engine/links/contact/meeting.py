@@ -2,20 +2,22 @@
 
 For two swept segments with the greatest overlap δ0, at their nearest points, and overlaps δ1 and δ2 at the two ends of
 the stretch over which they lie along each other (at the end of one link and the nearest point of the other; 0 where
-these do not touch), of length ℓ,
+these do not touch), of length ℓ, and with u(δ) the stretched overlap of `dem.engine.links.contact.barrier`,
 
-    E = kn/2 (δ0² + g(ℓ) (δ1 δ2 / δ0)²),   g from 0 to 1 as ℓ grows from 0 to a diameter.
+    E = kn/2 (u0² + g(ℓ) (u1 u2 / u0)²),   g from 0 to 1 as ℓ grows from 0 to a diameter.
 
-Links that cross have δ1 δ2 = 0 and one contact. Links that lie on each other have δ0 = δ1 = δ2 and two contacts, at the
-ends; tilted ones have δ0 = δ1 and again two, of δ1 and δ2, so that a bar rests on a bar and resists tilting. Between
-these the energy is smooth: there is no angle at which links change from one to two contacts, and nothing jumps. The
+Ordinary contacts have u = δ. Links that cross have δ1 δ2 = 0 and one contact. Links that lie on each other have
+δ0 = δ1 = δ2 and two contacts, at the ends; tilted ones have δ0 = δ1 and again two, of δ1 and δ2, so that a bar rests on
+a bar and resists tilting. Between these the energy is smooth: there is no angle at which links change from one to two
+contacts, and nothing jumps. The
 forces are its derivatives. Nearest points and ends are extremal or fixed, so that forces act along the normals of the
 three pairs of points alone, and along the first link where ℓ changes:
 
-    f0 = kn δ0 (1 - g x1² x2²),  f1 = kn g δ1 x2²,  f2 = kn g δ2 x1²,  x = δ/δ0,  f_ℓ = kn/2 (δ1 δ2/δ0)² g'.
+    f0 = kn u0 u0' (1 - g x1² x2²),  f1 = kn g u1 u1' x2²,  f2 = kn g u2 u2' x1²,  x = u/u0,
+    f_ℓ = kn/2 (u1 u2/u0)² g'.
 
 A barb begins at a hinge, where the middle link ends: what overlaps there would count twice. E of a barb is therefore
-less by kn/2 δ_h², δ_h the overlap of the hinge itself with the other link, which the middle link's own E has; for two
+less by kn/2 u_h², of the overlap of the hinge itself with the other link, which the middle link's own E has; for two
 barbs less by both hinges' and more by that of hinge against hinge. What remains goes to zero as the point of contact
 moves to the hinge, and a bend is as stiff as a bar.
 """
@@ -26,14 +28,15 @@ import math
 
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact.barrier import stretch
 from dem.engine.links.contact.nearest import nearest
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
 POINTS, BARE = 3, 6
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
-PX, NX, LOAD, CARRIED, WEIGHT = 0, 3, 6, 7, 8
-COLUMNS = 9
+PX, NX, LOAD, CARRIED, WEIGHT, HARDENING, DISTANCE = 0, 3, 6, 7, 8, 9, 10
+COLUMNS = 11
 
 
 @inlined
@@ -48,14 +51,15 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
     Args:
         p: (6,) start of the first link's axis and vector to its end [m].
         q: (6,) the same of the second one.
-        diameter: of both [m].
+        diameter: of both, or the sum of two radii [m].
         stiffness: kn [N/m].
         bend_p: whether the first link is a barb, which starts at a hinge.
         bend_q: the same of the second one.
-        out: (ROWS, COLUMNS) written. Rows below POINTS: place [m], normal from the second to the first [1],
-            load of the spring [N], the part of it that friction and dashpot go with [N], share of a whole contact [1];
-            weight 0: none. Further rows: place [m], force on the first link [N].
-            Row ENERGY: E [J].
+        out: (ROWS, COLUMNS) written. Rows below POINTS: place [m], normal from the second to the first [1], load of the
+            spring [N], the part of it that friction and dashpot go with [N], share of a whole contact [1], hardening of
+            the dashpot [1], distance of the axes [m]; weight 0: none. Further rows: place [m], force on the first link
+            [N].
+            Row ENERGY: E [J], and the greatest overlap [m].
 
     Returns:
         0 where the links are apart, otherwise 1 + the number of rows with bare forces.
@@ -107,10 +111,11 @@ def meet_at(
         out: as in `meet`.
     """
     deepest = diameter - distance
-    _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * deepest, 1.0)
+    u, slope, hardening = stretch(deepest, diameter)
+    _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * u * slope, 1.0, hardening)
     out[1, WEIGHT] = out[2, WEIGHT] = 0.0
-    out[ENERGY, 0] = 0.5 * stiffness * deepest * deepest
-    bare = _lie_along(p, q, a, b, d, e, inverse_a, inverse_c, deepest, diameter, stiffness, out)
+    out[ENERGY, 0], out[ENERGY, 1] = 0.5 * stiffness * u * u, deepest
+    bare = _lie_along(p, q, a, b, d, e, inverse_a, inverse_c, deepest, u, slope, diameter, stiffness, out)
     if bend_p:
         bare = _hinge(p, q, diameter, stiffness, True, _clamp(e * inverse_c), -1.0, bare, out)
         if bend_q:
@@ -174,7 +179,7 @@ def _squared(x: float, y: float, z: float) -> float:
 @inlined
 def _note(
     out: Array, k: int, p: Array, q: Array, s: float, t: float,
-    x: float, y: float, z: float, distance: float, load: float, weight: float,
+    x: float, y: float, z: float, distance: float, load: float, weight: float, hardening: float,
 ) -> None:  # fmt: skip
     """Write a point: half way between the two axes."""
     row = out[k]
@@ -184,13 +189,13 @@ def _note(
     inverse = 1 / distance
     row[3], row[4], row[5] = x * inverse, y * inverse, z * inverse
     row[6] = row[7] = load
-    row[8] = weight
+    row[WEIGHT], row[HARDENING], row[DISTANCE] = weight, hardening, distance
 
 
 @inlined
 def _lie_along(
     p: Array, q: Array, a: float, b: float, d: float, e: float, inverse_a: float, inverse_c: float,
-    deepest: float, diameter: float, stiffness: float, out: Array,
+    deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array,
 ) -> int:  # fmt: skip
     """Add what the two ends of the stretch carry over which links lie along each other; the number of bare forces."""
     # Where on the first link, in its lengths, are the second one's ends?
@@ -215,23 +220,24 @@ def _lie_along(
         return 0
     first, second = math.sqrt(first), math.sqrt(second)
     # No deeper than the deepest, whatever the rounding.
-    depth1, depth2 = min(diameter - first, deepest), min(diameter - second, deepest)
+    u1, slope1, hardening1 = stretch(min(diameter - first, deepest), diameter)
+    u2, slope2, hardening2 = stretch(min(diameter - second, deepest), diameter)
     length = math.sqrt(a)
     along = (s2 - s1) * length / diameter
     grown, growth = 1.0, 0.0
     if along < 1.0:
         grown, growth = along * along * (3 - 2 * along), 6 * along * (1 - along) / diameter
-    inverse = 1 / deepest
-    x, y = (depth1 * inverse) ** 2, (depth2 * inverse) ** 2
+    inverse = 1 / u
+    x, y = (u1 * inverse) ** 2, (u2 * inverse) ** 2
     share = 1 - grown * x * y
-    out[0, 6] = out[0, 7] = stiffness * deepest * share
+    out[0, 6] = out[0, 7] = stiffness * u * slope * share
     out[ENERGY, 0] *= 2 - share
     out[0, 8] = share
-    _note(out, 1, p, q, s1, t1, x1, y1, z1, first, stiffness * grown * depth1 * y, grown * y)
-    _note(out, 2, p, q, s2, t2, x2, y2, z2, second, stiffness * grown * depth2 * x, grown * x)
+    _note(out, 1, p, q, s1, t1, x1, y1, z1, first, stiffness * grown * u1 * slope1 * y, grown * y, hardening1)
+    _note(out, 2, p, q, s2, t2, x2, y2, z2, second, stiffness * grown * u2 * slope2 * x, grown * x, hardening2)
     if growth == 0.0:
         return 0
-    bare, push = 0, 0.5 * stiffness * (depth1 * depth2 / deepest) ** 2 * growth / length
+    bare, push = 0, 0.5 * stiffness * (u1 * u2 / u) ** 2 * growth / length
     for upper_end in range(2):
         own, t, sign = (own_upper, t2, 1.0) if upper_end else (own_lower, t1, -1.0)
         if not own:
@@ -255,8 +261,9 @@ def _hinge(
     if squared >= diameter * diameter:
         return bare
     distance = math.sqrt(squared)
-    load = sign * stiffness * (diameter - distance)
-    out[ENERGY, 0] += 0.5 * load * (diameter - distance)
+    u, slope, _ = stretch(diameter - distance, diameter)
+    load = sign * stiffness * u * slope
+    out[ENERGY, 0] += 0.5 * sign * stiffness * u * u
     row = out[POINTS + bare]
     row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
     row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])

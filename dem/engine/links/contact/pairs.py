@@ -7,8 +7,9 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
 from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist
-from dem.engine.links.contact.meeting import BARE, POINTS, meet_at, meets_elsewhere
+from dem.engine.links.contact.meeting import BARE, HARDENING, POINTS, meet_at, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
 
@@ -48,12 +49,12 @@ def push(
 @inlined
 def put_down(
     ledger: Array, rows: tuple[int, int], owners: tuple[int, int],
-    x: float, y: float, z: float, fx: float, fy: float, fz: float, known: float,
+    x: float, y: float, z: float, fx: float, fy: float, fz: float, power: float, gain: float,
 ) -> None:  # fmt: skip
     """Note a force that is not a normal spring's, to work out what it dissipates when velocities after it are known.
 
     Args:
-        ledger: (n, 11); row 0 begins with the number of rows in use.
+        ledger: (n, LEDGER); row 0 begins with the number of rows in use.
         rows: of the two bodies in `Bodies.motion`; -1 for a fixture.
         owners: the two smarticles; -1 for a fixture.
         x: point of contact [m].
@@ -62,18 +63,19 @@ def put_down(
         fx: force on the first one [N].
         fy: the same.
         fz: the same.
-        known: what its work with the velocities before gives, and what its spring took up [J].
+        power: half of its power with the velocities before [W].
+        gain: what its spring took up [J].
     """
     n = int(ledger[0, 0]) + 1
     ledger[0, 0] = n
     row = ledger[n]
     row[0], row[1], row[2], row[3] = rows[0], rows[1], owners[0], owners[1]
-    row[4], row[5], row[6], row[7], row[8], row[9], row[10] = x, y, z, fx, fy, fz, known
+    row[4], row[5], row[6], row[7], row[8], row[9], row[10], row[11] = x, y, z, fx, fy, fz, power, gain
 
 
 @part
 def push_apart(
-    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array
+    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, step: Step, out: Array
 ) -> float:
     """Add the forces of all pairs that touch.
 
@@ -84,55 +86,8 @@ def push_apart(
         pairs: pairs that may touch; `slip` and `used` are brought up to date.
         hinged: None while welded.
         ledger: of forces that dissipate; None where nobody asks.
-        dt: time step [s].
+        step: lengths of time around these forces.
         out: (ROWS, COLUMNS) scratch.
-
-    Returns:
-        Energy of tangential springs whose contacts have ended [J].
-    """
-    # First who touches, without a branch that would be mispredicted, then what they do.
-    count = find_touching(shape, bodies, pairs, 0, pairs.counts[1])
-    return push_touching(shape, law, bodies, pairs, hinged, ledger, dt, out, 0, count)
-
-
-@inlined
-def find_touching(shape: Shape, bodies: Bodies, pairs: Pairs, begin: int, stop: int) -> int:
-    """Write those that touch, or did so in the last step, among some of the near pairs.
-
-    Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
-        pairs: `touching` and `nearest` are written, from `begin` on.
-        begin: place of the first pair in `near`.
-        stop: the one after the last.
-
-    Returns:
-        Their number.
-    """
-    segments, kind, inverses, diameter = bodies.segments, pairs.kind, shape.inverses, 2 * shape.radius
-    reach = diameter * diameter
-    count = begin
-    for k in range(begin, stop):
-        pair = pairs.near[k]
-        p, q = pairs.first[pair], pairs.second[pair]
-        ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
-        vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
-        wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
-        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
-        s, t = nearest(a, b, c, d, e, inverses[kind[p]], inverses[kind[q]])
-        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-        pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
-        count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
-    return count - begin
-
-
-@part
-def push_touching(
-    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, dt: float, out: Array,
-    begin: int, stop: int,
-) -> float:  # fmt: skip
-    """Add the forces of some of the pairs that touch, from place `begin` in `touching` up to `stop`; see `push_apart`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
@@ -141,7 +96,7 @@ def push_touching(
     diameter, inverses = 2 * shape.radius, shape.inverses
     reach = diameter * diameter
     lost = 0.0
-    for k in range(begin, stop):
+    for k in range(_find_touching(shape, bodies, pairs)):
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
         ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
@@ -168,22 +123,25 @@ def push_touching(
             px = 0.5 * (segments[p, 0] + s * ux + segments[q, 0] + t * vx)
             py = 0.5 * (segments[p, 1] + s * uy + segments[q, 1] + t * vy)
             pz = 0.5 * (segments[p, 2] + s * uz + segments[q, 2] + t * vz)
-            inverse, load = 1 / distance, law.stiffness * (diameter - distance)
+            u, slope, hardening = stretch(diameter - distance, diameter)
+            inverse, load = 1 / distance, law.stiffness * u * slope
             nx, ny, nz = x * inverse, y * inverse, z * inverse
             mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
-            slip, twist = pairs.slip[pair, 0], 0.5 * dt * turning
+            slip, twist = pairs.slip[pair, 0], 0.5 * step.past * turning
             stored = slip[3]
-            fx, fy, fz = resist(law, load, 1.0, nx, ny, nz, mx, my, mz, twist, dt, slip)
+            fx, fy, fz = resist(law, load, 1.0, hardening, nx, ny, nz, mx, my, mz, twist, step.past, slip)
             if ledger is not None:
-                known = 0.5 * dt * (fx * mx + fy * my + fz * mz) + slip[3] - stored
-                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, known)
+                power = 0.5 * (fx * mx + fy * my + fz * mz)
+                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, power, slip[3] - stored)
             fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
             push(shape, bodies, i, kind_p, hinged, px, py, pz, fx, fy, fz)
             push(shape, bodies, j, kind_q, hinged, px, py, pz, -fx, -fy, -fz)
             if pairs.used[pair] & ~1:
                 lost += _forget(pairs, pair, pairs.used[pair] & ~1)
             pairs.used[pair] = 1
-            depth = diameter - distance + dt * max(0.0, -(mx * nx + my * ny + mz * nz))
+            closing = -(mx * nx + my * ny + mz * nz)
+            resolve(step, diameter - distance, diameter, closing)
+            depth = diameter - distance
             bodies.deepest[i] = max(bodies.deepest[i], depth)
             bodies.deepest[j] = max(bodies.deepest[j], depth)
             continue
@@ -202,17 +160,32 @@ def push_touching(
             load, carried = out[slot, 6], out[slot, 7]
             mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
             closing = max(closing, -(mx * nx + my * ny + mz * nz))
-            twist = 0.5 * dt * turning
+            twist = 0.5 * step.past * turning
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
             if carried > 0.0:
                 share = weight if carried == load else weight * carried / load
-                fx, fy, fz = resist(law, carried, share, nx, ny, nz, mx, my, mz, twist, dt, pairs.slip[pair, slot])
+                fx, fy, fz = resist(
+                    law,
+                    carried,
+                    share,
+                    out[slot, HARDENING],
+                    nx,
+                    ny,
+                    nz,
+                    mx,
+                    my,
+                    mz,
+                    twist,
+                    step.past,
+                    pairs.slip[pair, slot],
+                )
             else:
                 lost += _forget(pairs, pair, 1 << slot)
             if ledger is not None:
-                known = 0.5 * dt * (fx * mx + fy * my + fz * mz) + pairs.slip[pair, slot, 3] - stored
-                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, known)
+                power = 0.5 * (fx * mx + fy * my + fz * mz)
+                gain = pairs.slip[pair, slot, 3] - stored
+                put_down(ledger, (row_i, row_j), (i, j), px, py, pz, fx, fy, fz, power, gain)
             fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
             push(shape, bodies, i, kind_p, hinged, px, py, pz, fx, fy, fz)
             push(shape, bodies, j, kind_q, hinged, px, py, pz, -fx, -fy, -fz)
@@ -223,11 +196,35 @@ def push_touching(
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
-        # As deep as the step that begins would take it: beyond a diameter the links have passed through each other.
-        depth = diameter - distance + dt * closing
+        resolve(step, diameter - distance, diameter, closing)
+        depth = diameter - distance
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
+
+
+@inlined
+def _find_touching(shape: Shape, bodies: Bodies, pairs: Pairs) -> int:
+    """Write which of the near pairs touch, or did so in the last step, into `touching` and `nearest`; their number.
+
+    Without a branch, which would be mispredicted.
+    """
+    segments, kind, inverses, diameter = bodies.segments, pairs.kind, shape.inverses, 2 * shape.radius
+    reach = diameter * diameter
+    count = 0
+    for k in range(pairs.counts[1]):
+        pair = pairs.near[k]
+        p, q = pairs.first[pair], pairs.second[pair]
+        ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
+        vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
+        wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
+        a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+        d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        s, t = nearest(a, b, c, d, e, inverses[kind[p]], inverses[kind[q]])
+        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+        pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
+        count += (x * x + y * y + z * z < reach) | (pairs.used[pair] != 0)
+    return count
 
 
 @inlined

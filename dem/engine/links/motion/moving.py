@@ -13,6 +13,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
@@ -20,24 +21,20 @@ from dem.engine.links.shape import Shape
 
 
 @part
-def kick(
-    shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float, begin: int, stop: int
-) -> None:
-    """Change momenta of some smarticles by the forces in `load` or `shares`, by weight and by motors.
+def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
+    """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
         shape: what all smarticles have in common.
-        bodies: the smarticles; `velocity`, `momentum`, `deepest` and, while articulated, `load` are written.
+        bodies: the smarticles; `velocity`, `momentum` and, while articulated, `load` are written.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
-        dt: time step [s].
-        begin: the first smarticle.
-        stop: the one after the last.
+        dt: time over which they act [s].
     """
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
-    for i in range(begin, stop):
+    for i in range(velocity.shape[0]):
         if motors is not None:
             for d in range(6):
                 load[i, d] = bodies.shares[3 * i, d] + bodies.shares[3 * i + 1, d] + bodies.shares[3 * i + 2, d]
@@ -47,14 +44,6 @@ def kick(
         momentum[i, 0] += across * dt * load[i, 3]
         momentum[i, 1] += across * dt * load[i, 4]
         momentum[i, 2] += dt * load[i, 5]
-        # Two that move by more than a radius in a step may pass through each other unseen: counted as that deep.
-        squared = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
-        turning = bodies.spin[i, 0] ** 2 + bodies.spin[i, 1] ** 2 + bodies.spin[i, 2] ** 2
-        stride = dt * (math.sqrt(squared) + shape.reach * math.sqrt(turning))
-        if stride > shape.radius:
-            stride = dt * _fastest_end(shape, bodies, i, motors is not None)
-        if stride > shape.radius:
-            bodies.deepest[i] = max(bodies.deepest[i], 2 * stride)
         if motors is not None:
             q1, q2 = contact_torques(shape, bodies, i)
             if motors.law < SLIP:
@@ -76,6 +65,35 @@ def kick(
 
 
 @part
+def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, step: Step) -> None:
+    """Ask for sub-steps where a link would move far in a step, and enter another one too deep at once.
+
+    Args:
+        shape: what all smarticles have in common.
+        bodies: the smarticles, with the loads of this instant.
+        hinged: whether links have velocities of their own.
+        gravity: g, downwards [m/s²].
+        step: `need` is written.
+    """
+    velocity, spin, load, limit = bodies.velocity, bodies.spin, bodies.load, LONGEST * shape.radius
+    per_force, square = step.whole / shape.mass, limit * limit / (3.0 * step.whole * step.whole)
+    for i in range(velocity.shape[0]):
+        fx, fy, fz = load[i, 0], load[i, 1], load[i, 2]
+        if hinged:
+            fx = bodies.shares[3 * i, 0] + bodies.shares[3 * i + 1, 0] + bodies.shares[3 * i + 2, 0]
+            fy = bodies.shares[3 * i, 1] + bodies.shares[3 * i + 1, 1] + bodies.shares[3 * i + 2, 1]
+            fz = bodies.shares[3 * i, 2] + bodies.shares[3 * i + 1, 2] + bodies.shares[3 * i + 2, 2]
+        gain = per_force * per_force * (fx * fx + fy * fy + fz * fz)
+        speed = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
+        turning = shape.reach * shape.reach * (spin[i, 0] ** 2 + spin[i, 1] ** 2 + spin[i, 2] ** 2)
+        # A sum of three is at most the root of three times their squares: most are slow, and need no root.
+        if gain + speed + turning > square:
+            stride = step.whole * (_fastest_end(shape, bodies, i, hinged) + math.sqrt(gain) + step.whole * gravity)
+            if stride > limit:
+                step.need[0] = max(step.need[0], stride / (STRIDE * shape.radius))
+
+
+@part
 def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
     """Greatest speed of an end of a link's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
     links, position, segments, motion = shape.kinds.shape[0], bodies.position, bodies.segments, bodies.motion
@@ -94,8 +112,8 @@ def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
 
 
 @part
-def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array, begin: int, stop: int) -> None:
-    """Move and turn some smarticles by a step.
+def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
+    """Move and turn all smarticles by a step.
 
     Args:
         shape: what all smarticles have in common.
@@ -103,11 +121,9 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array, begi
         motors: None while welded.
         dt: time step [s].
         row: (PLANE,) scratch.
-        begin: the first smarticle.
-        stop: the one after the last.
     """
     position, velocity, turn = bodies.position, bodies.velocity, bodies.turn
-    for i in range(begin, stop):
+    for i in range(position.shape[0]):
         for d in range(3):
             position[i, d] += dt * velocity[i, d]
         if motors is not None:

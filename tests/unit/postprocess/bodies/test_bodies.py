@@ -10,7 +10,7 @@ from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 
 from dem.errors import InputError
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.bodies.fields import fields_of
 from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, solid
 from postprocess.measures.entanglement import link_crossings, link_passages
@@ -21,7 +21,7 @@ TIERS = ((RADIUS, 0.006), (0.018, 0.008), (0.0125, 0.06))  # radius and height
 
 
 def bodies_at(directory, index=-1, kinds=ALL):
-    run, frames = read_run(directory), read_frames(directory)
+    run, frames = open_run(directory), read_frames(directory)
     bodies = Bodies(run, kinds, fields_of(run))
     bodies.hold(frames)
     return bodies.at(frames[index])
@@ -128,7 +128,7 @@ def test_hooks_are_crosses_at_their_heights(hooked):
 
 def test_a_plane_has_two_walls_and_no_floor(tmp_path):
     run = SyntheticRun(frames_per_phase=1, count=2)
-    write_manifest(write_run(tmp_path, run), run, planar=True, channel_width=0.08)
+    write_manifest(write_run(tmp_path, run), run, planar=True, channel_width_m=0.08)
     found = bodies_at(tmp_path)
     assert set(found) == {"smarticles", "wall"}
     assert sorted({round(y, 6) for y in np.asarray(found["wall"].points)[:, 1].tolist()}) == [-0.04, 0.04]
@@ -148,7 +148,7 @@ def test_crossings_are_where_links_pass(tmp_path):
     assert mesh.point_data["direction"] == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
     told = [int(mesh.point_data[name][0]) for name in ("smarticle_id", "passing_id", "passing_link")]
     assert told == [0, 1, 1]
-    arrow = solid("crossings", mesh, read_run(directory))
+    arrow = solid("crossings", mesh, open_run(directory))
     assert arrow.bounds[4:] == pytest.approx((-W / 6, W / 6), rel=1e-3)
 
 

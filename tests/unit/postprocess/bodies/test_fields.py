@@ -9,7 +9,7 @@ from synthetic import RADIUS, SyntheticRun, mesh_of, u_shape, write_manifest, wr
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameWriter, read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, linear
 from postprocess.bodies.fields import BY_NAME, checked_field, fields_of, link_values
 from postprocess.measures.clusters import entanglement_clusters
@@ -23,7 +23,7 @@ def pile(tmp_path):
 
 def values(directory, name):
     frame: Frame = read_frames(directory)[-1]
-    return frame, link_values(BY_NAME[name], frame, read_run(directory))
+    return frame, link_values(BY_NAME[name], frame, open_run(directory))
 
 
 def test_values_are_those_of_the_measures(pile):
@@ -40,7 +40,7 @@ def test_values_are_those_of_the_measures(pile):
 def test_cells_of_local_packing_fill_the_container(pile):
     frame, local = values(pile, "local_packing_fraction")
     assert np.isfinite(local).all()
-    solid = read_run(pile).solid_volume
+    solid = open_run(pile).solid_volume
     top = frame.vertices[..., 2].max() - frame.floor_z
     # The wall is a polygon around the circle, and the lid half a spacing above the highest point.
     assert (solid / local[:, 0]).sum() == pytest.approx(np.pi * RADIUS**2 * top, rel=0.15)
@@ -74,9 +74,9 @@ def test_actuated_frames_tell_angles_per_link(tmp_path):
 
 
 def test_runs_in_a_plane_have_fewer_fields(pile):
-    assert "crossings" in {field.name for field in fields_of(read_run(pile))}
+    assert "crossings" in {field.name for field in fields_of(open_run(pile))}
     write_manifest(pile, SyntheticRun(), planar=True)
-    run = read_run(pile)
+    run = open_run(pile)
     assert "crossings" not in {field.name for field in fields_of(run)}
     assert colour_field(None, run).name == "smarticle_id"
     with pytest.raises(InputError, match="this run has no crossings"):

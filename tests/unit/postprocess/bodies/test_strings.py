@@ -11,7 +11,7 @@ from dem.body.chain import Chain
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
-from dem.record.manifest import read_run
+from dem.record.run import open_run
 from postprocess.bodies.meshes import Bodies
 from postprocess.bodies.surroundings import read_surroundings
 
@@ -28,8 +28,8 @@ def laid_out(directory, count, tied_at):
     state = State.rigid(BOXES, poses.positions, turns, np.zeros((count, 3)), np.zeros((count, 3)))
     made = SyntheticRun(count=count, phases=("relax", "strain"), frames_per_phase=1, packing=(0.1, 0.1))
     write_run(directory, made)
-    size = {"middle_length": W, "barb_length": W, "sphere_diameter": T, "thickness_normal": 0.021}
-    write_manifest(directory, made, planar=True, thickness_in_plane=T, **size)
+    size = {"middle_length_m": W, "barb_length_m": W, "sphere_diameter_m": T, "thickness_normal_m": 0.021}
+    write_manifest(directory, made, planar=True, thickness_in_plane_m=T, **size)
     phases = [
         {"type": "arrange", "gap_m": GAP},
         {"type": "strain", "speed_m_per_s": SPEED, "tied_at": tied_at, "string_length_m": LENGTH},
@@ -57,7 +57,7 @@ def laid_out(directory, count, tied_at):
 @pytest.mark.parametrize("count", [2, 3, 6])
 def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at):
     knots = laid_out(tmp_path, count, tied_at)
-    run, frames = read_run(tmp_path), read_frames(tmp_path)
+    run, frames = open_run(tmp_path), read_frames(tmp_path)
     strings = read_surroundings(run).strings
     assert len(strings.lines(frames[0])) == 0
     first, later = strings.lines(frames[1]), strings.lines(frames[2])
@@ -71,7 +71,7 @@ def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at
 
 def test_strings_are_bodies_and_tubes(tmp_path):
     laid_out(tmp_path, 2, "tip")
-    run, frames = read_run(tmp_path), read_frames(tmp_path)
+    run, frames = open_run(tmp_path), read_frames(tmp_path)
     bodies = Bodies(run, ["strings"])
     assert bodies.at(frames[0]) == {}
     mesh = bodies.at(frames[2])["strings"]

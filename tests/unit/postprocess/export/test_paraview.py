@@ -145,7 +145,7 @@ def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tm
 
 def test_a_chain_in_a_plane(tmp_path, pvpython):
     made = SyntheticRun(count=2, frames_per_phase=1)
-    write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width=0.08)
+    write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width_m=0.08)
     folder = export_run(tmp_path / "run", to="vtp")
     told = shown(pvpython, folder, tmp_path, "--picture", tmp_path / "plane.png")
     assert told["coloured"] == ["CELLS", "smarticle_id"]

@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from dem.errors import InputError
-from postprocess import measure_run
-from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.clusters import (
     contact_clusters,
     entanglement_clusters,
@@ -40,10 +37,6 @@ def test_the_largest_cluster_is_a_share_of_all(shape):
     assert clusters.labels.tolist() == [1, 1, 1, 0, 0, 0, 0, 0, 2, 3]
 
 
-def test_apart_there_is_no_cluster_to_speak_of(shape):
-    assert contact_clusters(row(shape, 2 * D * np.arange(10)), D).largest == 0.1
-
-
 def test_hooked_smarticles_are_entangled_and_touching_ones_need_not_be(shape):
     u = shape(1.0, 0.7)
     # A second U stands across the plane of the first one: its middle link passes between the barbs.
@@ -54,13 +47,6 @@ def test_hooked_smarticles_are_entangled_and_touching_ones_need_not_be(shape):
     assert contact_clusters([u, beside], 0.02).largest == 1
     # Whether the one passed through or the one that passes is asked first does not matter.
     assert entanglement_clusters([across, u, u + np.array([9.0, 0, 0])]).sizes.tolist() == [2, 1]
-
-
-def test_nothing_has_no_cluster(shape):
-    with pytest.raises(UndefinedMeasureError, match="at least 1 smarticle: got 0"):
-        contact_clusters(np.empty((0, 4, 3)), D)
-    with pytest.raises(InputError, match="distance must be above 0 m"):
-        contact_clusters([shape()], 0.0)
 
 
 # -- what they span --------------------------------------------------------------------------------------------------
@@ -114,21 +100,3 @@ def test_a_cluster_spans_the_width_where_no_half_of_the_wall_has_all_its_ends(an
     assert spans_width(clusters, star, diameter=D, wall_radius=0.03) is spans
     # The same star without the wall.
     assert not spans_width(clusters, star, diameter=D, wall_radius=0.032)
-
-
-def test_touching_is_between_what_spheres_sweep_and_not_between_tips(shape):
-    """A sphere at the end of a link stays inside its tip: a tip that points at another link a radius away is apart."""
-    line = shape(0.01, 0.7, (0.0, 0.0))
-    across = line[:, [1, 0, 2]] + [0, 0.012 + 0.9 * D, 0]
-    assert contact_clusters([line, across], D).largest == 1
-    assert touching_clusters([line, across], D).largest == 0.5
-    assert touching_clusters([line, across - [0, 0.45 * D, 0]], D).largest == 1
-
-
-def test_tables_tell_what_the_graphs_span(make_run):
-    table = measure_run(make_run(), costly="every-frame")
-    for name in ("contact", "crossing"):
-        assert table[f"{name} graph largest share [-]"].between(0, 1, inclusive="right").all()
-        assert table[f"{name} graph spans height [-]"].isin([0.0, 1.0]).all()
-    cheap = measure_run(make_run(), costly="never")
-    assert cheap["contact graph spans width [-]"].isna().all()

@@ -1,16 +1,12 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import HINGE_CLEARANCE, Boxes, Particle, SphereChain
-from dem.errors import InputError
-from postprocess import contact_pairs, measure_run, neighbours_in_contact, pairs_in_contact, read_frames, read_run
+from postprocess import contact_pairs, neighbours_in_contact
 from postprocess.geometry import chains
-from postprocess.geometry.links import swept_axes
-from postprocess.measures.contacts import chain_of, pairs_of_spheres, segment_distances, without_support
+from postprocess.measures.contacts import pairs_of_spheres, segment_distances, without_support
 
 
 def oracle_distance(p0, p1, q0, q1):
@@ -24,23 +20,6 @@ def test_segment_distances_match_least_squares():
     ends = np.random.default_rng(0).uniform(-1, 1, (4, 60, 3))
     expected = [oracle_distance(*segment) for segment in ends.swapaxes(0, 1)]
     np.testing.assert_allclose(segment_distances(*ends), expected, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("q0", "q1", "expected"),
-    [
-        ((0.5, 1, -1), (0.5, 1, 1), 1.0),  # across, inside both
-        ((0, 2, 0), (1, 2, 0), 2.0),  # parallel
-        ((3, 0, 0), (4, 0, 0), 2.0),  # in line
-        ((0.5, 0, 0), (2, 0, 0), 0.0),  # overlapping
-        ((2, 1, 0), (2, 1, 0), 2**0.5),  # a point
-        ((2, 1, 0), (3, 5, 0), 2**0.5),  # end to end
-    ],
-)
-def test_segment_distance_by_hand(q0, q1, expected):
-    segments = [np.array([point], dtype=float) for point in ((0, 0, 0), (1, 0, 0), q0, q1)]
-    assert segment_distances(*segments)[0] == pytest.approx(expected)
-    assert segment_distances(*segments[2:], *segments[:2])[0] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("aspect_ratio", [0.0, 0.7])
@@ -64,24 +43,6 @@ def test_pairs_match_brute_force(scene, aspect_ratio):
     np.testing.assert_array_equal(neighbours_in_contact(vertices, limit), counts)
 
 
-def test_touching_chain(shape):
-    row = [shape(1.0) + np.array([0, 0, 0.1 * k]) for k in range(4)]
-    np.testing.assert_array_equal(neighbours_in_contact(row, 0.11), [1, 2, 2, 1])
-    np.testing.assert_array_equal(neighbours_in_contact(row, 0.09), [0, 0, 0, 0])
-    np.testing.assert_array_equal(neighbours_in_contact(row, 0.21), [2, 3, 3, 2])
-
-
-def test_few_smarticles(shape):
-    assert neighbours_in_contact(np.empty((0, 4, 3)), 0.1).shape == (0,)
-    assert neighbours_in_contact([shape()], 0.1).tolist() == [0]
-
-
-@pytest.mark.parametrize("distance", [0, -1, np.nan, np.inf])
-def test_bad_distance(shape, distance):
-    with pytest.raises(InputError, match="distance must be above 0 m"):
-        contact_pairs([shape()], distance)
-
-
 # -- touching nothing ------------------------------------------------------------------------------------------------
 
 
@@ -103,30 +64,6 @@ def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
         False,
         True,
     ]
-
-
-def test_tables_have_the_spread_of_the_contacts_and_the_rattlers(make_run):
-    """The frames of the fixture tell 0 to 5 contacts of six smarticles."""
-    run = make_run()
-    row = measure_run(run, costly="never").iloc[2]
-    assert row["contacts SD [-]"] == pytest.approx(np.std(np.arange(6)))
-    assert row["contacts most [-]"] == 5
-    assert row["without contact [-]"] == pytest.approx(1 / 6)
-    # The one without a contact hangs in the air.
-    assert row["rattlers [-]"] == pytest.approx(1 / 6)
-
-
-def test_swept_axes_end_a_radius_before_the_tips(shape):
-    u = shape(0.01, 0.7)
-    axes = swept_axes(u[None], 1e-3)[0]
-    assert np.linalg.norm(axes[[0, 3]] - u[[0, 3]], axis=1) == pytest.approx(0.5e-3)
-    assert np.linalg.norm(np.diff(axes, axis=0), axis=1) == pytest.approx([6.5e-3, 10e-3, 6.5e-3])
-    # A barb shorter than the radius is inside the sphere at its hinge; a bar without barbs ends before its ends.
-    short = shape(0.01, 0.04)
-    assert np.array_equal(swept_axes(short[None], 1e-3)[0], short[[1, 1, 2, 2]])
-    bar = swept_axes(shape(0.01, 0.0)[None], 1e-3)[0]
-    assert np.ptp(bar[:, 0]) == pytest.approx(9e-3)
-    assert np.ptp(swept_axes(shape(0.01, 0.7, (0.0, 0.0))[None], 1e-3)[0][:, 0]) == pytest.approx(23e-3)
 
 
 # -- what engines see ------------------------------------------------------------------------------------------------
@@ -170,29 +107,3 @@ def test_beads_rest_in_the_gaps_of_the_other_chain():
     # Head to head they do so at one, and spheres of one smarticle do not count.
     assert len(pairs_of_spheres(np.array([beads, beads + np.array([0.0, 0.99, 0.0])]), 1.0).i) == 1
     assert len(pairs_of_spheres(0.5 * beads[None], 1.0).i) == 0
-
-
-def test_strands_side_by_side_are_wider_than_one(shape):
-    """Two strands of 0.5 mm, 1.27 mm wide together: planes of two U touch at 1.27 mm, those of one strand at 0.5 mm."""
-    u = shape(0.01, 0.7)
-    for rows, limit in ((1, 0.5e-3), (2, 1.27e-3)):
-        chain = chains.Chain(diameter=0.5e-3, rows=rows, width=1.27e-3, pitch=0.0)
-        for gap, touch in ((0.99 * limit, True), (1.01 * limit, False)):
-            first, second = chains.strands(np.array([u, u + np.array([0, 0, gap])]), chain)
-            found = contact_pairs(np.concatenate([first, second]), chain.diameter)
-            assert any(i < rows <= j for i, j in zip(found.i, found.j, strict=True)) is touch
-
-
-def test_the_shapes_of_a_run_are_those_of_its_scene(make_run):
-    """YADE's chains have a pitch, the strands of links have none."""
-    run = make_run()
-    (run / "scene.yaml").write_text("fidelity: {rows: 2, pitch: 1.3}\n", encoding="utf-8")
-    manifest = read_run(run)
-    chain = chain_of(manifest)
-    assert (chain.rows, chain.pitch) == (2, pytest.approx(1.3 * manifest.sphere_diameter))
-    assert chain_of(dataclasses.replace(manifest, engine="links")).pitch == 0
-    pairs = pairs_in_contact(read_frames(run)[-1], manifest)
-    assert (pairs.i < pairs.j).all()
-    (run / "scene.yaml").write_text("fidelity: {rows: two}\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"fidelity\.rows must be a finite number above 0: got 'two'"):
-        chain_of(manifest)

@@ -13,7 +13,7 @@ from synthetic.forces import pressed, write_forces
 from dem.errors import InputError
 from dem.record.forces import has_forces, read_forces
 from dem.record.frames import read_frames
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.force_chains import (
     MEASURES,
@@ -51,16 +51,6 @@ def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> Non
     assert not strong_contacts([2.0] * count).any()
 
 
-def test_one_force_alone_participates_for_one_of_all() -> None:
-    assert force_participation([1.0, *[1e-12] * 9]) == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize("wrong", [[1.0, 0.0], [1.0, -2.0], [math.nan], [[1.0]]])
-def test_what_is_no_force_is_refused(wrong: object) -> None:
-    with pytest.raises(InputError, match=r"normal forces must be \(M,\) finite numbers above 0 N"):
-        strong_contacts(wrong)  # type: ignore[arg-type]
-
-
 def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
     with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
         force_participation([])
@@ -71,51 +61,19 @@ def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
 def test_chains_are_joined_by_strong_contacts_alone(run: Path) -> None:
     # 0 - 1 - 2 carry much, 3 - 4 hold 1 up with little; the floor carries all and counts for nothing.
     write_forces(run, pressed([(0, 1), (1, 2), (1, 3), (3, 4), (2, -1)], [5.0, 4.0, 1.0, 1.0, 90.0]))
-    frame, manifest = read_frames(run)[-1], read_run(run)
+    frame, manifest = read_frames(run)[-1], open_run(run)
     chains = force_chains(frame)
     assert chains.sizes.tolist() == [3, 1, 1, 1]
     assert chains.labels.tolist()[:3] == [0, 0, 0]
     values = MEASURE.columns(frame, manifest)
     assert list(values.values()) == pytest.approx([4, 2.75, 0.1, 0.5, 9 / 11, 121 / (4 * 43), 0.5])
-    table = measure_run(run)
+    table = measure_run(Run(run))
     assert float(table["strong share of force [-]"].iloc[-1]) == pytest.approx(9 / 11)
 
 
 def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) -> None:
     assert not has_forces(run)
-    assert not MEASURE.told_of(read_run(run))
-    assert not [name for name in measure_run(run).columns if "force" in name and "chain" in name]
+    assert not MEASURE.told_of(open_run(run))
+    assert not [name for name in measure_run(Run(run)).columns if "force" in name and "chain" in name]
     with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
         read_forces(read_frames(run)[0])
-
-
-def test_nobody_touching_is_no_error(run: Path) -> None:
-    write_forces(run, pressed([], []))
-    frame = read_frames(run)[-1]
-    assert len(read_forces(frame).contacts.normal) == 0
-    contacts, *rest = MEASURE.columns(frame, read_run(run)).values()
-    assert contacts == 0
-    assert np.isnan(rest).all()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("normal_force_N", "normal_force_X", "cell data 'normal_force_N' is missing"),
-        ("</VTKFile>", "", "truncated or not VTK"),
-    ],
-)
-def test_a_damaged_file_is_named(run: Path, old: str, new: str, message: str) -> None:
-    write_forces(run, pressed([(0, 1)], [1.0]))
-    file = run / "forces" / "force_000000.vtu"
-    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    with pytest.raises(InputError, match=message):
-        read_forces(read_frames(run)[0])
-
-
-def test_numbers_of_smarticles_that_there_are_not_are_refused(run: Path) -> None:
-    write_forces(run, pressed([(0, 1)], [1.0]))
-    few = write_run(run.parent / "few", SyntheticRun(count=1, frames_per_phase=1, phases=("relax",)))
-    (run / "forces").rename(few / "forces")
-    with pytest.raises(InputError, match="'first_smarticle' holds numbers of nothing that there is"):
-        read_forces(read_frames(few)[0])

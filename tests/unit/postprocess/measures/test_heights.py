@@ -3,8 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dem.errors import InputError
-from postprocess import UndefinedMeasureError, centres_of_mass, material_height
+from postprocess import centres_of_mass, material_height
 from postprocess.measures.heights import heights
 
 
@@ -45,22 +44,3 @@ def test_material_height_matches_sampled_points(scene):
     total = np.cumsum(weights[order]) / weights.sum()
     expected = samples[order][np.searchsorted(total, 0.95)]
     assert material_height(vertices, percentile=95) == pytest.approx(expected, abs=1e-3)
-
-
-def test_level_links_are_a_step(shape):
-    pair = [shape(1.0), shape(1.0) + np.array([0, 0, 1])]
-    assert material_height(pair, percentile=49) == pytest.approx(0, abs=1e-9)
-    assert material_height(pair, percentile=51) == pytest.approx(1)
-
-
-def test_one_and_no_smarticle(shape):
-    assert np.isnan(heights([shape()]).second_highest_com)
-    for measure in (heights, material_height):
-        with pytest.raises(UndefinedMeasureError, match="at least 1 smarticle"):
-            measure(np.empty((0, 4, 3)))
-
-
-@pytest.mark.parametrize("percentile", [0, -5, 101, np.nan])
-def test_bad_percentile(shape, percentile):
-    with pytest.raises(InputError, match="percentile must be"):
-        material_height([shape()], percentile=percentile)

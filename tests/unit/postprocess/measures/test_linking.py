@@ -7,17 +7,12 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.spatial.transform import Rotation
 
-from dem.errors import InputError
 from postprocess import linking_pairs
 from postprocess.measures.linking import gauss_integral, linking
 
 SQUARE = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]])
 THROUGH = SQUARE[:, [0, 2, 1]] + [1.0, 0, 0]
 MIRROR = np.array([1.0, 1.0, -1.0])
-
-
-# Where to.
-AWAY, JUST_ABOVE = np.array([9.0, 0, 0]), np.array([0, 0, 0.01])
 
 
 def quadrature(first, second):
@@ -38,17 +33,6 @@ def test_two_linked_squares_are_linked_once():
     assert gauss_integral(SQUARE, THROUGH) == pytest.approx(-1, abs=1e-14)
     assert gauss_integral(SQUARE[::-1], THROUGH) == pytest.approx(1, abs=1e-14)
     assert gauss_integral(SQUARE[::-1], THROUGH[::-1]) == pytest.approx(-1, abs=1e-14)
-
-
-def test_far_apart_or_beside_each_other_they_are_not():
-    assert gauss_integral(SQUARE, THROUGH + AWAY) == pytest.approx(0, abs=1e-14)
-    assert gauss_integral(SQUARE, SQUARE + JUST_ABOVE) == pytest.approx(0, abs=1e-12)
-
-
-def test_wound_twice_counts_twice():
-    angle = np.linspace(0, 4 * np.pi, 81)
-    coil = np.stack([1 + 0.5 * np.cos(angle), 0 * angle, 0.5 * np.sin(angle)], axis=1)
-    assert gauss_integral(SQUARE, coil) == pytest.approx(2 * gauss_integral(SQUARE, THROUGH), abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -83,16 +67,6 @@ def test_closed_across_their_mouths_smarticles_have_the_whole_numbers_of_linking
     assert np.array_equal(number[linked].round(), counted.number)
 
 
-def test_of_segments_that_meet_nothing_is_counted():
-    cross = np.array([[[-1.0, 0, 0], [1, 0, 0]], [[0, -1.0, 0], [0, 1, 0]]])
-    assert gauss_integral(cross[0], cross[1]) == 0
-    assert gauss_integral(cross[0], cross[0]) == 0
-    assert gauss_integral(cross[0], cross[1] + AWAY / 30) == 0
-    # Just above and just below it is half of a turn either way.
-    above, below = (gauss_integral(cross[0], cross[1] + [0, 0, side * 1e-9]) for side in (1, -1))
-    assert (above, below) == pytest.approx((-0.5, 0.5), abs=1e-6)
-
-
 def test_all_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
     vertices = scene(60, 3, box=2.0, angles=(90, 90))
     near, every = linking(vertices), linking(vertices, far=True)
@@ -108,10 +82,3 @@ def test_all_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
     assert all(told[i, j] == n for i, j, n in zip(near.i, near.j, near.number, strict=True))
     assert math.isnan(linking(np.empty((0, 4, 3))).mean)
     assert linking(vertices[:1]).mean == 0
-
-
-def test_what_is_no_polygon_is_refused():
-    with pytest.raises(InputError, match=r"2 corners or more: got \(1, 3\)"):
-        gauss_integral(SQUARE[:1], SQUARE)
-    with pytest.raises(InputError, match="polygon"):
-        gauss_integral(SQUARE, SQUARE[:, :2])

@@ -1,19 +1,16 @@
-import json
-
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 
 import postprocess
-from dem.errors import InputError
+from dem.record.run import Run
 from postprocess import (
     link_crossings,
     measure_run,
+    open_run,
     packing_change,
     packing_fraction,
     read_frames,
-    read_run,
     summarise_run,
 )
 from postprocess.measures.packing import COSTLY_DEFINITIONS
@@ -22,34 +19,10 @@ CHEAP = [name for name in postprocess.DEFINITIONS if name not in COSTLY_DEFINITI
 PHI = "phi second-highest-com [-]"
 
 
-def test_no_packing_fraction_where_no_one_cylinder_is_filled(make_run):
-    """After the wall is gone, and in a mould of tiers, the radius says nothing of the pile's volume."""
-    run = make_run([(0, 0.0), (0, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
-    manifest = json.loads((run / "run.json").read_text())
-    assert measure_run(run, costly="never")[PHI][1:].notna().all()
-    manifest["phases"][1]["type"] = "remove-container"
-    (run / "run.json").write_text(json.dumps(manifest))
-    table = measure_run(run, costly="never")
-    assert table["phase"].tolist() == [0, 0, 1, 2, 2]
-    assert table[PHI].notna().tolist() == [False, True, False, False, False]  # the first has one smarticle
-    free = table.columns[table.columns.str.contains("cluster|spread|sloughed|tilt")]
-    assert len(free) == 6
-    assert table.loc[table["phase"] == 0, free].isna().all(axis=None)
-    assert table.loc[table["phase"] > 0, free].notna().all(axis=None)
-    assert (table["spread radius 50 % [m]"] < table["spread radius 95 % [m]"]).sum() == 3
-    manifest |= {"container_tiers": 2}
-    manifest["phases"][1]["type"] = "relax"
-    (run / "run.json").write_text(json.dumps(manifest))
-    table = measure_run(run, costly="never")
-    assert table[PHI].isna().all()
-    # A run that keeps its wall has no columns for a pile without one.
-    assert not table.columns.str.contains("cluster|spread|sloughed|tilt").any()
-
-
 def test_one_row_per_frame_with_every_measure(make_run):
     directory = make_run()
-    table = measure_run(directory)
-    frame, manifest = read_frames(directory)[2], read_run(directory)
+    table = measure_run(Run(directory))
+    frame, manifest = read_frames(directory)[2], open_run(directory)
     row = table.iloc[2]
     assert len(table) == 3
     assert (row["name"], row["seed"], row["phase type"], row["frame"]) == ("pile", 7, "shake", 2)
@@ -61,8 +34,8 @@ def test_one_row_per_frame_with_every_measure(make_run):
     assert row["escaped [-]"] == 0
     expected = packing_fraction(
         frame.vertices,
-        radius=manifest.container_radius,
-        solid_volume=manifest.solid_volume,
+        radius=manifest.manifest.container_radius_m,
+        solid_volume=manifest.manifest.solid_volume_m3,
         floor_z=-0.002,
     )
     assert row[PHI] == expected.value
@@ -85,14 +58,14 @@ def test_columns_of_motors_and_energies_where_there_are_any(make_run):
     with h5py.File(directory / "series.h5", "a") as file:
         for name, (values, unit) in columns.items():
             file.create_dataset(name, data=values).attrs.update({"unit": unit, "description": name})
-    table = measure_run(directory, definitions=CHEAP)
+    table = measure_run(Run(directory), definitions=CHEAP)
     assert table["angle barb 1 [rad]"].tolist() == [1.5, 1.4, 0.1]
     assert table["angle barb 2 [rad]"].tolist() == [1.5, 1.3, 0.2]
     assert table["motor work [J]"].tolist() == [0.0, 1e-6, 3e-6]
     assert table["halted fraction [-]"].tolist()[1:] == [0.5, 0.25]
     assert table["gravitational energy [J]"].iloc[-1] == 3e-4
-    assert "motor work [J]" not in measure_run(make_run(), definitions=CHEAP)
-    summary = summarise_run(directory, definitions=CHEAP)
+    assert "motor work [J]" not in measure_run(Run(make_run()), definitions=CHEAP)
+    summary = summarise_run(Run(directory), definitions=CHEAP)
     assert summary["motor work [J]"].iloc[-1] == 3e-6
     assert np.isnan(summary["halted fraction [-]"][0])
 
@@ -104,7 +77,7 @@ def test_measures_take_any_shape(make_run, scene, write_frame, angles):
     pile = scene(6, 3, box=1.5, width=11.7e-3, angles=angles) - [0.006, 0.006, 0.0]
     path = write_frame(directory, pile, time=0.2, phase=2, floor_z=-0.002)
     path.rename(directory / "frames" / "frame_000002.vtu")
-    row = measure_run(directory).iloc[2]
+    row = measure_run(Run(directory)).iloc[2]
     straight = angles == (0.0, 0.0)
     assert row["planes [-]"] == (0 if straight else 6)
     assert np.isnan(row["crossings mean [-]"]) == straight
@@ -115,32 +88,10 @@ def test_measures_take_any_shape(make_run, scene, write_frame, angles):
     assert row[["phi second-highest-com [-]", "phi top-percentile [-]", "phi voxel [-]"]].notna().all()
 
 
-def test_costly_definitions_only_where_asked_for(make_run):
-    directory = make_run([(0, 0.0), (1, 0.0), (1, 0.0), (2, 0.0), (2, 0.0)])
-    taken = {
-        mode: measure_run(directory, definitions=["voxel"], costly=mode)["phi voxel [-]"].notna()
-        for mode in ("never", "phase-end", "every-frame")
-    }
-    assert taken["never"].tolist() == [False] * 5
-    assert taken["phase-end"].tolist() == [False, False, True, False, True]
-    assert taken["every-frame"].tolist() == [False, True, True, True, True]
-
-
-def test_run_without_series(make_run):
-    table = measure_run(make_run(series=False), definitions=CHEAP)
-    assert len(table) == 3
-    assert "kinetic energy [J]" not in table
-
-
-def test_escaped_smarticles_are_counted(make_run):
-    table = measure_run(make_run([(0, 0.0), (1, -0.1)]), definitions=CHEAP)
-    assert table["escaped [-]"].tolist() == [0, 6]
-
-
 def test_summary_averages_the_last_frames_of_each_phase(make_run):
     plan = [(0, 0.0), (1, 0.0), *((2, 0.001 * k) for k in range(5))]
     directory = make_run(plan)
-    frames, summary = measure_run(directory), summarise_run(directory, last=3)
+    frames, summary = measure_run(Run(directory)), summarise_run(Run(directory), last=3)
     assert summary["phase type"].tolist() == ["deposit", "relax", "shake"]
     assert summary["frames averaged"].tolist() == [1, 1, 3]
     last = frames[frames["phase"] == 2][-3:]
@@ -155,8 +106,8 @@ def test_summary_averages_the_last_frames_of_each_phase(make_run):
 def test_packing_before_and_after_activity(make_run):
     lifts = [(0, 0.0), (0, 0.005), (1, 0.0), (1, 0.001), (2, 0.002), (2, 0.003), (3, 0.009)]
     directory = make_run(lifts)
-    table = measure_run(directory, definitions=CHEAP)
-    change = packing_change(directory, last=20)
+    table = measure_run(Run(directory), definitions=CHEAP)
+    change = packing_change(Run(directory), last=20)
     # Only the relaxation before the shake, and not the one after it.
     assert (change.phase_before, change.phase_after) == (1, 2)
     assert change.before.value == pytest.approx(table[PHI][[2, 3]].mean())
@@ -164,40 +115,5 @@ def test_packing_before_and_after_activity(make_run):
     assert (change.before.count, change.after.count) == (2, 2)
     assert change.definition == "second-highest-com"
     assert change.before.standard_error > 0
-    shorter = packing_change(directory, last=1, definition="top-percentile")
+    shorter = packing_change(Run(directory), last=1, definition="top-percentile")
     assert shorter.after.value == table["phi top-percentile [-]"][5]
-
-
-def test_packing_change_needs_activity(make_run):
-    with pytest.raises(InputError, match=r"no frame of phase 2 \(shake\) yet"):
-        packing_change(make_run([(0, 0.0), (1, 0.0)]))
-    with pytest.raises(InputError, match="no activity with a phase before it"):
-        packing_change(make_run(), activity=["pull"])
-    with pytest.raises(InputError, match="last must be 1 frame or more: got 0"):
-        packing_change(make_run(), last=0)
-
-
-def test_phase_unknown_to_the_manifest(make_run):
-    with pytest.raises(InputError, match=r"phases that run\.json does not have"):
-        measure_run(make_run([(0, 0.0), (9, 0.0)]))
-
-
-def test_unknown_definition_is_refused_before_any_work(tmp_path):
-    with pytest.raises(InputError, match=r"unknown definition .* 'guess'"):
-        measure_run(tmp_path, definitions=["guess"])
-
-
-def test_truncated_frame_stops_the_table(make_run):
-    directory = make_run()
-    path = directory / "frames" / "frame_000001.vtu"
-    path.write_bytes(path.read_bytes()[:300])
-    with pytest.raises(InputError, match="frame_000001"):
-        measure_run(directory)
-
-
-def test_summary_of_chosen_phases_is_that_of_all_of_them(run):
-    every = summarise_run(run, definitions=CHEAP)
-    chosen = summarise_run(run, definitions=CHEAP, phases={1, 2})
-    assert chosen["phase"].tolist() == [1, 2]
-    pd.testing.assert_frame_equal(chosen, every[every["phase"].isin([1, 2])].reset_index(drop=True))
-    assert summarise_run(run, definitions=CHEAP, phases=set()).empty

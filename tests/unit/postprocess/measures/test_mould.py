@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.region import Region
 from postprocess.measures.mould import cast
@@ -87,12 +85,6 @@ def test_a_full_mould_is_full_and_an_empty_tier_is_empty():
     assert lower.material_before.tolist() == [1, 0]
 
 
-def test_a_tier_filled_to_half_its_height_is_half_filled():
-    half = compared(block(0.02, 0.0, 0.005), block(0.02, 0.0, 0.005))
-    assert half.filled_before[0] == pytest.approx(0.5, abs=0.04)
-    assert half.filled_before[1] == 0
-
-
 def test_a_brick_that_moved_overlaps_by_what_is_left():
     size, shift = (0.03, 0.02, 0.015), 0.01
     before = brick(size, (-0.015, -0.01, 0.0))
@@ -112,19 +104,3 @@ def test_what_falls_into_the_tier_below_is_no_longer_in_its_own():
     assert found.material_after.tolist() == [1, 0]
     assert found.kept[1] == pytest.approx(0, abs=0.02)
     assert found.filled_after[0] == pytest.approx((0.013 / 0.02) ** 2, rel=0.05)
-
-
-def test_finer_voxels_say_the_same():
-    pile = block(0.013, 0.0, 0.015)
-    coarse, fine = (compared(pile, pile, pitch=BALL / steps).filled_before for steps in (4, 7))
-    assert fine == pytest.approx(coarse, abs=0.02)
-
-
-def test_bad_sizes_are_refused():
-    pile = block(0.013, 0.0, 0.012)
-    with pytest.raises(InputError, match="ball must be above 0 m: got 0 m"):
-        outlines([pile], thickness=T, ball=0)
-    with pytest.raises(InputError, match="voxels is too large: raise the pitch"):
-        outlines([pile], thickness=T, ball=BALL, pitch=1e-5)
-    with pytest.raises(UndefinedMeasureError, match="at least 1 smarticle: got 0"):
-        outlines([np.empty((0, 4, 3))], thickness=T, ball=BALL)

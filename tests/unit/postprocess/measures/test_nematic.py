@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.nematic import nematic_order
 
 
@@ -17,13 +15,6 @@ def test_parallel_and_antiparallel_directions_have_order_one():
     np.testing.assert_allclose(order.director, axis, atol=1e-12)
     assert math.cos(order.polar_angle) == pytest.approx(2 / 3)
     assert order.upright == pytest.approx((3 * (2 / 3) ** 2 - 1) / 2)
-
-
-def test_half_along_x_and_half_along_y_share_the_plane():
-    order = nematic_order([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
-    assert order.order == pytest.approx(0.25)
-    assert order.upright == pytest.approx(-0.5)
-    assert np.trace(order.tensor) == pytest.approx(0, abs=1e-15)
 
 
 def test_all_level_the_director_is_not_the_vertical():
@@ -47,12 +38,3 @@ def test_a_turned_pile_has_the_same_order_and_a_turned_director():
     before, after = nematic_order(directions), nematic_order(directions[:, [2, 0, 1]])
     assert after.order == pytest.approx(before.order) == pytest.approx(0.5, abs=0.3)
     assert abs(before.director[[2, 0, 1]] @ after.director) == pytest.approx(1)
-
-
-def test_nothing_has_no_order():
-    with pytest.raises(UndefinedMeasureError, match="at least 1 direction"):
-        nematic_order(np.empty((0, 3)))
-    with pytest.raises(InputError, match="direction 1 has no length"):
-        nematic_order([[0, 0, 1.0], [0, 0, 0]])
-    with pytest.raises(InputError, match=r"shape \(3,\)"):
-        nematic_order([0.0, 0, 1])

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess import DEFINITIONS, UndefinedMeasureError, packing_fraction
-from postprocess.geometry.region import Region, inner_region
+from postprocess import DEFINITIONS, packing_fraction
+from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import solid_fraction
 
@@ -67,42 +67,6 @@ def test_every_definition_names_itself_and_finds_the_lattice_density(pile):
         assert result.height == pytest.approx(6 * 0.8, rel=0.1)
 
 
-def test_voxels_find_the_lattice_density(shape):
-    # Cuts a whole number of layers apart, so that it does not matter where they split them, and
-    # an inner radius of many cells.
-    turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
-    pile = lattice(shape, CELL, radius=8.0, layers=5, turn=turn)
-    region = Region(radius=6.5, bottom=1.1, top=1.1 + 2 * CELL[2])
-    value = solid_fraction(pile, region, thickness_normal=T1, thickness_in_plane=T2)
-    assert value == pytest.approx(DENSITY * UNION / SOLID, rel=0.02)
-
-
-def test_definitions_have_one_line_each():
-    for meaning in DEFINITIONS.values():
-        assert meaning
-        assert "\n" not in meaning
-
-
-def test_second_highest_centre_of_mass_by_hand(shape):
-    flat = shape(1.0)
-    vertices = [flat + np.array([0, 0, z]) for z in (1.0, 9.0, 3.0, 2.0)]
-    result = packing_fraction(vertices, radius=2.0, solid_volume=0.1, floor_z=0.5)
-    assert result.definition == "second-highest-com"
-    assert result.height == pytest.approx(2.5)
-    # No factor for the radius: r² as given.
-    assert result.value == pytest.approx(4 * 0.1 / (math.pi * 4 * 2.5))
-
-
-def test_top_percentile_by_hand():
-    bar = np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, 3], [0, 0, 4]])
-    bars = [bar + np.array([x, 0, 0]) for x in (0, 1)]
-    result = packing_fraction(bars, radius=2.0, solid_volume=0.1, definition="top-percentile")
-    assert result.height == pytest.approx(3.8)
-    assert result.value == pytest.approx(0.2 / (math.pi * 4 * 3.8))
-    lower = packing_fraction(bars, radius=2.0, solid_volume=0.1, definition="top-percentile", percentile=50)
-    assert lower.height == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize("rotation", [(0, 0, 0), (0.5, 0.1, 1.3)])
 def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
     turn = Rotation.from_rotvec(rotation).as_matrix()
@@ -117,43 +81,11 @@ def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
     assert value * region.volume == pytest.approx(UNION, rel=0.01)
 
 
-def test_voxels_tell_the_two_thicknesses_apart(shape):
-    # A slab thinner than the box is tall cuts t1 (along z here) but not t2.
-    slab = Region(radius=2.0, bottom=-T2 / 2, top=T2 / 2)
-    sizes = {"thickness_normal": T1, "thickness_in_plane": T2, "pitch": T2 / 8}
-    value = solid_fraction([shape(1.0, 0.7)], slab, **sizes)
-    assert value * slab.volume == pytest.approx(UNION * T2 / T1, rel=0.02)
-
-
-def test_voxels_inside_solid_are_all_full():
-    bar = np.array([[[-2.0, 0, 0], [-1, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    inside = Region(radius=0.4, bottom=-0.4, top=0.4)
-    value = solid_fraction(bar, inside, thickness_normal=1, thickness_in_plane=1, pitch=0.02)
-    assert value == pytest.approx(1.0, rel=0.01)
-
-
 def test_voxels_count_overlaps_once(shape):
     region = Region(radius=2.0, bottom=-2.0, top=2.0)
     sizes = {"thickness_normal": T1, "thickness_in_plane": T2}
     once = solid_fraction([shape(1.0)], region, **sizes)
     assert solid_fraction([shape(1.0), shape(1.0)], region, **sizes) == once
-
-
-def test_voxels_of_bars_without_barbs(shape):
-    region = Region(radius=2.0, bottom=-2.0, top=2.0)
-    bar = [shape(1.0, 0.0)]
-    value = solid_fraction(bar, region, thickness_normal=T1, thickness_in_plane=T2, pitch=T2 / 5)
-    assert value * region.volume == pytest.approx(T1 * T2, rel=0.01)
-
-
-def test_voronoi_cells_of_a_lattice_are_its_cells(pile):
-    # Wall, floor and lid further off than any void of the lattice is wide.
-    container = Region(radius=5.0, bottom=FLOOR - 1, top=FLOOR + 5.8, axis=AXIS)
-    region = inner_region(container, inner=0.4, low=0.4, high=0.6)
-    local = local_packing(pile, container, region, solid_volume=SOLID, spacing=0.25)
-    assert 10 < local.interior.sum() < len(pile) / 4
-    assert local.volumes[local.interior] == pytest.approx(math.prod(CELL), rel=1e-6)
-    assert local.value == pytest.approx(DENSITY, rel=1e-6)
 
 
 def test_voronoi_cells_fill_the_container(scene):
@@ -168,35 +100,6 @@ def test_voronoi_cells_fill_the_container(scene):
     # The wall is a polygon around the circle, so the sum comes out a little high.
     assert local.volumes.sum() == pytest.approx(container.volume, rel=0.05)
     assert local.volumes.sum() >= container.volume
-
-
-def test_denser_pile_packs_denser(pile):
-    floor = np.array([*AXIS, FLOOR])
-    centre = pile.mean(axis=1, keepdims=True) - floor
-    squeezed = pile + centre * np.array([0, 0, -0.2])
-    for definition in DEFINITIONS:
-        ratio = phi(squeezed, definition).value / phi(pile, definition).value
-        assert ratio == pytest.approx(1.25, rel=0.06)
-
-
-@pytest.mark.parametrize("definition", DEFINITIONS)
-def test_too_few_smarticles_have_no_packing_fraction(shape, definition):
-    for vertices in (np.empty((0, 4, 3)), [shape()]):
-        with pytest.raises(UndefinedMeasureError, match="at least 2 smarticles"):
-            phi(vertices, definition)
-
-
-@pytest.mark.parametrize("definition", DEFINITIONS)
-def test_pile_below_its_floor_is_refused(pile, definition):
-    with pytest.raises(UndefinedMeasureError, match="no height above its floor"):
-        phi(pile, definition, floor_z=50.0)
-
-
-@pytest.mark.parametrize("definition", ["voxel", "voronoi"])
-def test_empty_inner_region_is_refused_instead_of_zero(shape, definition):
-    ring = [shape(1.0) + np.array([3, 0, z]) for z in (3.5, 4.0, 5.0)]
-    with pytest.raises(UndefinedMeasureError, match="inner region"):
-        phi(np.array(ring), definition, axis=(0.0, 0.0), inner=0.3)
 
 
 @pytest.mark.parametrize(

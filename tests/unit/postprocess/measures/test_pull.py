@@ -5,25 +5,21 @@ import math
 import h5py
 import numpy as np
 import pytest
-from synthetic import SyntheticRun, write_run
-from synthetic.hooked import AFTER_REST, HELD, INTERVAL, SPEED, weight, write_hooked_run
+from synthetic import SyntheticRun
+from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 
 from dem.errors import InputError
-from dem.record.manifest import read_run
+from dem.record.run import Run, open_run
 from dem.record.series import read_series
 from postprocess.measures.pull import (
-    END,
     FREE,
     WINDOW,
     freed,
-    held_at,
     moving_mean,
     peak,
     read_pull,
-    weight_of_one,
 )
 from postprocess.measures.table import summarise_run
-from smarticles.main import main
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
 DURATION, DISTANCE = 2.0, 2.0 * SPEED
@@ -44,7 +40,7 @@ def pulled(tmp_path):
 
     def make(force):
         directory = write_hooked_run(tmp_path / "run", synthetic(), force)
-        return read_pull(read_run(directory), read_series(directory), 2)
+        return read_pull(open_run(directory), read_series(directory), 2)
 
     return make
 
@@ -61,28 +57,12 @@ def test_a_triangle_has_its_peak_and_its_area(pulled):
     assert pull.raised[[0, -1]] == pytest.approx([0, DISTANCE])
 
 
-def test_what_goes_to_the_lower_hook_is_told_apart(pulled):
-    pull = pulled(triangle)
-    highest = peak(pull)
-    assert held_at(pull, highest.time) == pytest.approx(HELD * highest.force)
-    assert peak(pull.net).force == pytest.approx((1 - HELD) * highest.force)
-    assert pull.net.work == pytest.approx((1 - HELD) * pull.work)
-
-
 def test_the_work_of_a_constant_force_is_force_times_distance(pulled):
     pull = pulled(lambda time: np.full_like(time, HEIGHT))
     assert pull.work == pytest.approx(HEIGHT * DISTANCE, rel=1e-9)
     assert pull.engine_work == pytest.approx(pull.work, rel=1e-9)
     assert pull.left == pytest.approx(HEIGHT)
     assert math.isnan(freed(pull))
-
-
-def test_the_load_before_the_pull_is_not_part_of_it(pulled):
-    pull = pulled(triangle)
-    run = synthetic()
-    assert pull.before == pytest.approx(weight(run))
-    assert pull.force[0] == 0.0
-    assert len(pull.force) == round(DURATION / INTERVAL) == len(pull.edges) - 1
 
 
 def test_a_single_sample_does_not_make_a_peak(pulled):
@@ -112,57 +92,6 @@ def test_a_hook_is_free_when_its_force_is_gone_for_good(pulled):
     assert pull.left == pytest.approx(0, abs=1e-12)
 
 
-def test_a_hook_that_catches_again_is_not_free_before(pulled):
-    again = 1.6
-    pull = pulled(lambda time: triangle(time) + np.where(np.abs(time - again) < 0.1, 0.5 * HEIGHT, 0.0))
-    assert freed(pull) == pytest.approx(again + 0.1, abs=WINDOW)
-
-
-def test_a_hook_that_keeps_a_part_is_not_free(pulled):
-    kept = 1.5 * FREE * HEIGHT
-    pull = pulled(lambda time: np.maximum(triangle(time), kept))
-    assert math.isnan(freed(pull))
-    assert pull.left == pytest.approx(kept)
-
-
-def test_columns_are_over_the_weight_of_all(tmp_path):
-    run = synthetic(count=12)
-    load = 3 * weight(run)  # three of them hang on it
-    directory = write_hooked_run(tmp_path / "run", run, lambda time: np.full_like(time, load))
-    manifest = read_run(directory)
-    assert weight_of_one(manifest) == pytest.approx(weight(run))
-    found = summarise_run(directory).iloc[2]
-    assert found["hook peak force over n W_s [-]"] == pytest.approx(3 / 12)
-    assert found["hook load at the end [smarticles]"] == pytest.approx(3)
-    assert found["hook work [J]"] == pytest.approx(load * DISTANCE)
-
-
-def test_measure_gives_the_pull_with_its_phase(tmp_path):
-    directory = write_hooked_run(tmp_path / "run", synthetic(), triangle)
-    table = summarise_run(directory).set_index("phase type")
-    assert table.loc["pull-hook", "hook work [J]"] == pytest.approx(HEIGHT * BASE * SPEED, rel=1e-4)
-    assert math.isnan(table.loc["relax", "hook work [J]"])
-    assert "upper hook force z [N]" in table.columns
-
-
-def test_the_command_measure_shows_peak_and_work(tmp_path, capsys):
-    directory = write_hooked_run(tmp_path / "run", synthetic(), triangle)
-    assert main(["measure", str(directory)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[-4:] == ["F/nW", "hook", "work", "[mJ]"]
-    (row,) = (line.split() for line in lines if line.startswith("pull-hook"))
-    assert float(row[-1]) == pytest.approx(1e3 * HEIGHT * BASE * SPEED, rel=5e-3)
-    assert any(line.startswith("peak F/nW: largest mean over 0.04 s") for line in lines)
-    plain = write_run(tmp_path / "plain", SyntheticRun(frames_per_phase=1))
-    assert main(["measure", str(plain)]) == 0
-    assert "hook" not in capsys.readouterr().out
-
-
-def test_runs_without_hooks_have_no_such_columns(tmp_path):
-    table = summarise_run(write_run(tmp_path / "run", SyntheticRun(frames_per_phase=2)))
-    assert not [name for name in table.columns if "hook" in name]
-
-
 def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
     directory = write_hooked_run(tmp_path / "run", synthetic(), triangle)
     with h5py.File(directory / "series.h5", "r+") as file:
@@ -173,21 +102,5 @@ def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
             file[name] = values
             file[name].attrs.update(attributes)
     with pytest.raises(InputError, match=r"series\.h5: no force of a hook throughout phase 2 of"):
-        read_pull(read_run(directory), read_series(directory), 2)
-    assert "hook work [J]" not in summarise_run(directory).columns
-
-
-def test_a_run_without_hooks_has_no_force(tmp_path):
-    directory = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=1))
-    with pytest.raises(InputError, match="holds no series 'hook_upper_force_N'"):
-        read_pull(read_run(directory), read_series(directory), 2)
-
-
-def test_a_scene_without_gravity_has_no_weight(tmp_path):
-    directory = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=1))
-    with pytest.raises(InputError, match=r"gravity_m_per_s2 must be a finite number: got None"):
-        weight_of_one(read_run(directory))
-
-
-def test_the_end_is_short_against_the_pull():
-    assert END <= DURATION / 10
+        read_pull(open_run(directory), read_series(directory), 2)
+    assert "hook work [J]" not in summarise_run(Run(directory)).columns

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from synthetic import SyntheticRun, write_run
 
+from dem.record.run import Run
 from postprocess import measure_run, measures, summarise_run
-from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
-from postprocess.measures.registry import frame_measures, registered
+from postprocess.measures.registry import registered
 
 SOURCE = """
 from postprocess.measures.registry import FrameMeasure, Quantity
@@ -20,7 +20,7 @@ MEASURES = (
         name="newest",
         place=53,
         quantities=(Quantity("newest height", "m"), Quantity("{other}", "-")),
-        take=lambda frame, run: (frame.vertices[..., 2].max(), float(run.count)),
+        take=lambda frame, run: (frame.vertices[..., 2].max(), float(run.manifest.count)),
     ),
 )
 """
@@ -42,33 +42,18 @@ def add_measure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_a_new_file_is_a_new_measure_in_every_table(tmp_path: Path, add_measure) -> None:
     run = write_run(tmp_path / "run", SyntheticRun(frames_per_phase=2))
-    before = list(measure_run(run, costly="never").columns)
+    before = list(measure_run(Run(run), costly="never").columns)
     add_measure("newest share")
-    table = measure_run(run, costly="never")
+    table = measure_run(Run(run), costly="never")
     new = ["newest height [m]", "newest share [-]"]
     at = before.index("rattlers [-]") + 1
     assert list(table.columns) == [*before[:at], *new, *before[at:]]
     assert (table["newest share [-]"] == 12).all()
     assert table["newest height [m]"].gt(0).all()
-    assert "newest height SE [m]" in summarise_run(run, costly="never")
+    assert "newest height SE [m]" in summarise_run(Run(run), costly="never")
 
 
 def test_columns_that_are_there_already_are_refused(add_measure) -> None:
     add_measure("contacts mean")
     with pytest.raises(ValueError, match=r"measures share a header: contacts mean \[-\]"):
         registered()
-
-
-def test_every_measure_has_a_name_and_units() -> None:
-    assert len(registered()) > 8
-    for measure in registered():
-        assert measure.name
-        assert measure.quantities
-        assert all(quantity.label and quantity.unit for quantity in measure.quantities)
-
-
-def test_definitions_come_last_in_the_order_asked_for() -> None:
-    names = [measure.name for measure in frame_measures(["voxel", "second-highest-com"])]
-    assert names[-2:] == ["phi voxel", "phi second-highest-com"]
-    costly = {m.definition for m in frame_measures(list(DEFINITIONS)) if m.costly and m.definition}
-    assert costly == set(COSTLY_DEFINITIONS)

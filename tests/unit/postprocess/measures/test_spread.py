@@ -9,8 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
 from postprocess.measures.spread import (
     OUTSIDE,
     centre_of_mass,
@@ -22,7 +20,7 @@ from postprocess.measures.spread import (
 )
 
 W = 0.0117
-RUN = SimpleNamespace(sphere_diameter=1.2e-3, container_radius=0.0234, middle_length=W)
+RUN = SimpleNamespace(manifest=SimpleNamespace(sphere_diameter_m=1.2e-3, container_radius_m=0.0234, middle_length_m=W))
 
 
 def line(start, end):
@@ -44,22 +42,6 @@ def test_the_radius_of_an_even_disc_holds_its_share():
     for share in (0.5, 0.95):
         found = spread_radius(pile, share=share, axis=(0.0, 0.0))
         assert found == pytest.approx(0.02 * math.sqrt(share), rel=0.02)
-
-
-def test_a_level_line_through_the_axis_is_cut_where_the_circle_is():
-    """Of a line from −a to a about its own middle, the share within r is r/a: exact."""
-    pile = np.array([line([-0.03, 0.0, 0.01], [0.03, 0.0, 0.01])])
-    for share in (0.1, 0.5, 0.95, 1.0):
-        assert spread_radius(pile, share=share) == pytest.approx(0.03 * share, rel=1e-9)
-    # Beside the axis: from (b, −a) to (b, a) the share within r is √(r² − b²)/a.
-    beside = pile + np.array([0, 0.01, 0])
-    assert spread_radius(beside, share=0.5, axis=(0.0, 0.0)) == pytest.approx(math.hypot(0.015, 0.01), rel=1e-9)
-
-
-def test_an_upright_line_is_a_point():
-    pile = np.array([line([0.01, 0, 0], [0.01, 0, 0.02])])
-    assert spread_radius(pile, share=0.5, axis=(0.0, 0.0)) == pytest.approx(0.01, rel=1e-9)
-    assert spread_radius(pile, share=0.95) == pytest.approx(0.0, abs=1e-9)
 
 
 @given(seed=st.integers(0, 1000), angle=st.floats(0, 2 * math.pi), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
@@ -98,7 +80,7 @@ def test_a_column_that_fell_over_its_edge_has_toppled_and_one_that_spread_has_no
 
 
 def test_what_lies_beyond_the_former_wall_came_off():
-    edge = RUN.container_radius + OUTSIDE * W
+    edge = RUN.manifest.container_radius_m + OUTSIDE * W
     inside = [line([x, 0, 0], [x, 0, 0.01]) for x in (0.0, 0.01, edge - 1e-4)]
     outside = [line([0, y, 0], [0, y, 0.01]) for y in (edge + 1e-4,)]
     pile = np.array(inside + outside)
@@ -109,14 +91,3 @@ def test_what_lies_beyond_the_former_wall_came_off():
     assert free_pile(pile + np.array([0.1, 0.05, 0.0]), RUN).sloughed == 0.25
     assert (found.touching, found.entangled) == (0.25, 0.25)
     assert found.radius_half < found.radius_most
-
-
-def test_what_has_no_meaning_is_refused():
-    pile = column(0.01, 0.02, count=3)
-    with pytest.raises(InputError, match="share must be above 0 and up to 1 of the material: got 95"):
-        spread_radius(pile, share=95)
-    with pytest.raises(UndefinedMeasureError, match="below the floor; check floor_z"):
-        tilt(pile, floor_z=1.0)
-    for measure in (centre_of_mass, lambda none: spread_radius(none, share=0.5), lambda none: share_outside(none, 1.0)):
-        with pytest.raises(UndefinedMeasureError, match="got 0"):
-            measure(np.empty((0, 4, 3)))

@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from synthetic import SyntheticRun, write_run
-from synthetic.hooked import AFTER_REST, write_hooked_run
-from synthetic.strained import LENGTH, SPEED, write_strained_run
+from synthetic.strained import write_strained_run
 
+from dem.record.run import Run
 from postprocess import measure_run, summarise_run
 from postprocess.measures.strain import AT_PEAK, FRACTURE, PEAK, WIDENING, YIELD
-from smarticles.main import main
 
 HIGHEST = 0.6  # strain up to which the chain below holds
 
@@ -23,86 +21,15 @@ def force(strains: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(strains <= HIGHEST, 3 * strains, 0.0)
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: str | Path) -> list[str]:
-    assert main(["measure", *map(str, words)]) == 0
-    return capsys.readouterr().out.splitlines()
-
-
 def test_a_chain_has_its_force_and_strain(tmp_path: Path) -> None:
-    row = summarise_run(write_strained_run(tmp_path / "a", force)).iloc[0]
+    row = summarise_run(Run(write_strained_run(tmp_path / "a", force))).iloc[0]
     assert row[PEAK] == pytest.approx(3 * HIGHEST, rel=1e-3)
     assert row[AT_PEAK] == row[FRACTURE] == pytest.approx(HIGHEST, rel=1e-3)
     assert np.isnan(row[YIELD])
     assert row[WIDENING] == pytest.approx(0.1 * HIGHEST, rel=1e-3)
 
 
-def test_of_a_chain_that_is_still_pulled_the_fracture_is_not_told(tmp_path: Path) -> None:
-    run = write_strained_run(tmp_path / "a", force)
-    (run / "done.json").unlink()
-    row = summarise_run(run).iloc[0]
-    assert row[PEAK] == pytest.approx(3 * HIGHEST, rel=1e-3)
-    assert np.isnan(row[FRACTURE])
-
-
-def test_a_chain_that_no_string_pulled_yet_has_no_such_columns(tmp_path: Path) -> None:
-    row = summarise_run(write_strained_run(tmp_path / "a", np.zeros_like)).iloc[0]
-    assert PEAK not in row
-
-
 def test_a_plane_has_nothing_that_needs_a_height_or_a_container(tmp_path: Path) -> None:
-    columns = set(measure_run(write_strained_run(tmp_path / "a", force)).columns)
+    columns = set(measure_run(Run(write_strained_run(tmp_path / "a", force))).columns)
     assert {"smarticles [-]", "contacts mean [-]", "pulled string force x [N]", "chain length [m]"} <= columns
     assert not [name for name in columns if any(word in name for word in ("phi", "height", "crossings", "cluster"))]
-
-
-def test_measure_shows_what_a_chain_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = write_strained_run(tmp_path / "a", force)
-    header, name, row, *legend = told(capsys, run)
-    assert [word for word in header.split("  ") if word] == [
-        *("phase", " t [s]", "smarticles", "peak F [N]", "strain at it", "at fracture", "widening")
-    ]
-    assert name == f"{run}:"
-    assert row.split() == ["strain", "3.00", "2", "1.800", "0.600", "0.600", "0.060"]
-    assert any(line.startswith("peak F: largest force of the pulled string") for line in legend)
-    assert not [line for line in legend if "φ" in line or "⟨N⟩" in line]
-
-
-def test_measure_shows_each_frame_of_a_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    header, _, *rows = told(capsys, write_strained_run(tmp_path / "a", force), "--frames")
-    assert header.split("  ")[-3:] == ["F [N]", "length [mm]", "width [mm]"]
-    strain = SPEED * 0.749 / LENGTH
-    assert rows[0].split()[-3:] == [f"{3 * strain:.3f}", f"{1e3 * LENGTH * (1 + strain):.1f}", "63.1"]
-
-
-def test_a_chain_beside_a_pile_leaves_what_it_has_not_blank(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    chain, pile = write_strained_run(tmp_path / "a", force), write_run(tmp_path / "b", SyntheticRun())
-    lines = told(capsys, chain, pile)
-    assert "φ" in lines[0]
-    assert "peak F [N]" in lines[0]
-    assert "-" in lines[2].split()
-    assert any("φ by " in line for line in lines)
-
-
-@pytest.mark.parametrize(("share", "notes"), [(0.0, 1), (1.0, 0)])
-def test_a_hook_that_nothing_touched_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], share: float, notes: int
-) -> None:
-    run = write_hooked_run(
-        tmp_path / "a", SyntheticRun(phases=AFTER_REST), lambda times: share * np.full_like(times, 1e-3)
-    )
-    found = [line for line in told(capsys, run) if line.startswith("note: ")]
-    assert len(found) == notes
-    if notes:
-        assert found == [
-            f"note: {run}: phase 2 (pull-hook): nothing touched the hook while it was raised, its force is 0 N "
-            "throughout; lower hooks.upper_height_m or raise count"
-        ]
-
-
-def test_a_hook_that_its_limit_stopped_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    force = {"limit": 1e-3, "stops": 0.5}
-    held = write_hooked_run(tmp_path / "a", SyntheticRun(phases=AFTER_REST), lambda t: 1e-3 * np.ones_like(t), **force)
-    found = [line for line in told(capsys, held) if line.startswith("note: ")]
-    assert found == [
-        f"note: {held}: phase 2 (pull-hook): force_limit_N stopped the hook after 5.85 mm; its peak is a lower bound"
-    ]

@@ -4,11 +4,12 @@ import pandas as pd
 import pytest
 
 from dem.errors import InputError, RunError
+from dem.record.run import Run
 from postprocess import measure_run, write_table
 
 
 def test_table_comes_back_as_written(tmp_path, make_run):
-    table = measure_run(make_run(), costly="never")
+    table = measure_run(Run(make_run()), costly="never")
     path = write_table(table, tmp_path / "table.csv")
     pd.testing.assert_frame_equal(pd.read_csv(path), table, check_exact=True)
     assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]

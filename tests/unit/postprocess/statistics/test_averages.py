@@ -26,13 +26,6 @@ def test_error_allows_for_correlation():
     assert mean.standard_error == pytest.approx(3 * naive, rel=0.1)
 
 
-def test_mean_of_few_samples():
-    assert mean_with_error([1.0, np.nan]).count == 1
-    assert np.isnan(mean_with_error([1.0]).standard_error)
-    assert np.isnan(mean_with_error([]).value)
-    assert mean_with_error([2.0, 2.0, 2.0]).standard_error == 0
-
-
 @pytest.mark.parametrize(
     ("samples", "value"),
     [([1.0, np.inf, 2.0], np.inf), ([np.inf], np.inf), ([-np.inf, 1.0, np.nan], -np.inf), ([np.inf, -np.inf], np.nan)],

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from postprocess.report.markdown import meaning_lines, table_lines
-from postprocess.statistics.bisection import least_reaching
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.pairs import compared, mean_difference, pairs, told_less
-from postprocess.statistics.points import averaged, marked, ordered, seeds_of, told_means, told_number
-from postprocess.statistics.seeds import mean_over_seeds
+from postprocess.statistics.pairs import mean_difference, pairs
+from postprocess.statistics.points import averaged, seeds_of, told_number
 
 FORCE = "force [N]"
 
@@ -22,10 +18,6 @@ FORCE = "force [N]"
 def group() -> pd.DataFrame:
     """Three seeds, of mean 2 N and standard error 1/√3 N."""
     return pd.DataFrame({SEED: [3, 1, 2], FORCE: [1.0, 2.0, 3.0], "height [m]": [math.nan, 0.1, math.nan]})
-
-
-def test_a_mark_stands_before_the_unit() -> None:
-    assert marked("phi [of it] over [-]", "SE") == "phi [of it] over SE [-]"
 
 
 def test_means_carry_their_errors(group: pd.DataFrame) -> None:
@@ -54,26 +46,6 @@ def test_numbers_are_told_with_what_error_there_is(value: float, form: str, erro
     assert told_number(value, form, error) == told
 
 
-def test_a_table_of_means_is_told(group: pd.DataFrame) -> None:
-    points = pd.DataFrame([{"what": "pulled", **averaged(group, [FORCE])}])
-    header, rows = told_means(points, {"what": lambda point: str(point["what"])}, {FORCE: ("force", ".2f")})
-    assert header == ["what", "force"]
-    assert rows == [["pulled", "2.00 ± 0.58"]]
-    assert table_lines(header, rows) == ["| what | force |", "| --- | --- |", "| pulled | 2.00 ± 0.58 |"]
-    assert meaning_lines("a.csv", {FORCE: "pull"})[-1] == "- `force [N]`: pull"
-
-
-def test_names_have_an_order_of_their_own() -> None:
-    table = pd.DataFrame({"name": ["b", "c", "a", "b"], "x": [2, 1, 3, 1]})
-    assert ordered(table, ["name", "x"], named="name", order="cba").to_numpy().tolist() == [
-        ["c", 1],
-        ["b", 1],
-        ["b", 2],
-        ["a", 3],
-    ]
-    assert ordered(table, ["x", "name"], named="name", order="cba")["name"].tolist() == ["c", "b", "b", "a"]
-
-
 def test_runs_are_compared_pair_by_pair() -> None:
     # What seeds share, 10 and 20, is no scatter of the differences, 1 and 3; the third seed has no partner.
     one = pd.DataFrame({ASPECT: 0.7, SEED: [1, 2, 3], FORCE: [11.0, 23.0, 99.0]})
@@ -81,19 +53,3 @@ def test_runs_are_compared_pair_by_pair() -> None:
     assert pairs(one, other, FORCE)[["one", "other"]].to_numpy().tolist() == [[11, 10], [23, 20]]
     difference = mean_difference(one, other, FORCE)
     assert (difference.value, difference.standard_error, difference.count) == (2.0, pytest.approx(1.0), 2)
-
-
-def test_one_must_be_clearly_beyond_each_of_the_others() -> None:
-    far, near = mean_over_seeds([5.0, 5.1, 4.9]), mean_over_seeds([1.0, -1.0, 0.0])
-    assert compared({"a": far, "b": far}, 1) == (
-        "less a +5 ± 0.0577 (n = 3); less b +5 ± 0.0577 (n = 3)",
-        "found",
-    )
-    assert compared({"a": far}, -1)[1] == "not found"
-    ours, (_, verdict) = told_less({"a": far, "b": near}, ", "), compared({"a": far, "b": near}, 1)
-    assert (", less b" in ours, verdict) == (True, "not resolved")
-
-
-def test_a_level_is_found_to_rounding() -> None:
-    assert least_reaching(lambda x: x**3, 2.0, 0.0, 2.0) == pytest.approx(2 ** (1 / 3), rel=1e-15)
-    assert least_reaching(np.floor, 1.0, 0.0, 3.0) == pytest.approx(1.0, rel=1e-15)

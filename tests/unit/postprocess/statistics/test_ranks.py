@@ -12,11 +12,9 @@ from scipy.stats import spearmanr
 from postprocess.statistics.ranks import (
     common_slopes,
     correlation_within,
-    few_blocks,
     interval,
     rank_correlations,
     resampled,
-    resamples,
 )
 from postprocess.statistics.seeds import slope_within
 
@@ -45,35 +43,11 @@ def test_what_lies_between_strata_does_not_count_within() -> None:
     assert common_slopes(x[:, None], y, strata)[0] > 0 > common_slopes(x[:, None], y, one_stratum(30))[0]
 
 
-def test_a_column_that_is_the_same_throughout_every_stratum_tells_nothing() -> None:
-    strata, y = np.repeat([0, 1], 5), np.arange(10.0)
-    x = np.column_stack([np.repeat([0.1, 0.3], 5), y])
-    assert np.isnan(rank_correlations(x, y, strata)).tolist() == [True, False]
-    assert np.isnan(common_slopes(x, y, strata)).tolist() == [True, False]
-
-
 def test_slopes_are_those_of_blocks_with_levels_of_their_own() -> None:
     random = np.random.default_rng(2)
     x, y, strata = random.normal(size=(30, 2)), random.normal(size=30), np.repeat([0, 1, 2], 10)
     wanted = [slope_within(x[:, k].tolist(), y.tolist(), strata.tolist()).value for k in range(2)]
     assert common_slopes(x, y, strata) == pytest.approx(wanted)
-
-
-def test_whole_blocks_are_drawn_and_every_stratum_keeps_its_number() -> None:
-    blocks, strata = np.array([0, 0, 1, 2, 2, 2, 3]), np.array([0, 0, 0, 1, 1, 1, 1])
-    sizes = np.bincount(blocks)
-    drawn = list(resamples(blocks, strata, count=50, seed=3))
-    for rows in drawn:
-        times = np.bincount(blocks[rows], minlength=4)
-        assert (times % sizes == 0).all()
-        assert (times / sizes)[:2].sum() == (times / sizes)[2:].sum() == 2
-    assert len({tuple(np.sort(rows)) for rows in drawn}) == 9
-    again = list(resamples(blocks, strata, count=50, seed=3))
-    assert all((one == other).all() for one, other in zip(drawn, again, strict=True))
-    assert not all(
-        len(one) == len(other) and (one == other).all()
-        for one, other in zip(drawn, resamples(blocks, strata, count=50, seed=4), strict=True)
-    )
 
 
 def widths(x: Floats, y: Floats, blocks: NDArray[np.int64]) -> tuple[float, float]:
@@ -87,12 +61,12 @@ def test_the_interval_holds_the_true_correlation_as_often_as_it_says() -> None:
     random = np.random.default_rng(6)
     true = 6 / math.pi * math.asin(0.6 / 2)  # Spearman's of normal variables that correlate by 0.6
     held = 0
-    for _ in range(100):
+    for _ in range(40):
         x = random.normal(size=(60, 1))
         y = 0.6 * x[:, 0] + 0.8 * random.normal(size=60)
         low, high = widths(x, y, np.arange(60))
         held += low < true < high
-    assert 88 <= held <= 99
+    assert 34 <= held < 40
 
 
 def test_copies_of_a_run_do_not_make_it_surer() -> None:
@@ -125,17 +99,6 @@ def test_within_blocks_it_is_the_mean_of_spearmans() -> None:
     assert more == told
 
 
-def test_five_blocks_tell_no_error() -> None:
-    """All on one side by chance alone: one time in sixteen."""
-    for count in (5, 6):
-        x, blocks = [0.0, 1.0] * count, np.repeat(np.arange(count), 2).tolist()
-        found = correlation_within(x, x, blocks)
-        assert (found.value, found.count) == (pytest.approx(1), count)
-        assert math.isnan(found.half_width) == (count == 5)
-    # A block in which nothing varies does not count.
-    assert correlation_within([*x, 0, 1], [*x, 3, 3], [*blocks, -1, -1]).count == 6
-
-
 @pytest.mark.parametrize(("count", "size"), [(8, 4), (18, 2), (6, 2)])
 def test_of_nothing_it_is_clear_one_time_in_twenty(count: int, size: int) -> None:
     random = np.random.default_rng(5)
@@ -147,13 +110,3 @@ def test_of_nothing_it_is_clear_one_time_in_twenty(count: int, size: int) -> Non
         clear += abs(found.value) > found.half_width
     # Mean of 20 and its standard deviation of 4.4; a rule without the half-width's t would have twice as many.
     assert clear < 20 + 3 * 4.4
-
-
-def test_an_interval_of_values_that_are_mostly_unknown_has_no_ends() -> None:
-    assert math.isnan(interval(1.0, [1.0, math.nan, 2.0]).low)
-    found = interval(1.5, range(101))
-    assert (found.low, found.high) == pytest.approx((2.5, 97.5))
-    assert interval(1.5, range(1, 101)).clear
-    assert not interval(1.5, range(-50, 51)).clear
-    assert few_blocks(np.array([0, 1, 1, 2, 3, 4]), np.array([0, 0, 0, 1, 1, 1]))
-    assert not few_blocks(np.arange(6), np.repeat([0, 1], 3))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from postprocess.statistics.findings import Finding, Unresolved, all_of, findings_table, judge, told_more
+from postprocess.statistics.findings import Unresolved, judge, told_more
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 
@@ -50,25 +50,3 @@ def test_no_effect_takes_runs_without_end_and_one_run_tells_nothing() -> None:
     assert told_more(nothing) == "an effect of this size would take more than 100 times as many runs"
     assert math.isnan(alone.more)
     assert told_more(alone) == told_more("found") == told_more("not resolved") == ""
-
-
-def test_of_several_the_hardest_counts_and_an_unknown_one_leaves_it_open() -> None:
-    easy, hard = judge(effect(0.5, 1.0, 8)), judge(effect(0.25, 1.0, 8))
-    together = all_of(["found", easy, hard])
-    assert isinstance(together, Unresolved)
-    assert isinstance(hard, Unresolved)
-    assert together.more == hard.more > 3
-    assert not isinstance(all_of([easy, "not resolved"]), Unresolved)
-    assert all_of([easy, "not found"]) == "not found"
-    assert all_of([easy, "no data"]) == "no data"
-    assert all_of(["found", "found"]) == "found"
-
-
-def test_tables_tell_it() -> None:
-    found = [
-        Finding(paper=name, ours="", verdict=verdict, criterion="")
-        for name, verdict in (("a", judge(effect(0.5, 1.0, 8))), ("b", judge(effect(3.0, 1.0, 8))))
-    ]
-    table = findings_table(found)
-    assert table["verdict"].tolist() == ["not resolved", "found"]
-    assert table["needed"].tolist() == ["an effect of this size would take 2.2 times as many runs", ""]

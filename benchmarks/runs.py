@@ -1,0 +1,63 @@
+"""Run scenes in processes of their own: what every benchmark of the simulator times."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from dem.scene.reading import dump_scene, parse_scene
+
+# The pile of the paper's l/w = 0.7 run; other N keep its height.
+PAPER_COUNT, PAPER_RADIUS, PAPER_PER_LAYER = 270, 0.0234, 10
+
+
+def pile(
+    count: int, *phases: dict[str, Any], seed: int = 1, per_layer: int | None = None, **keys: Any
+) -> dict[str, Any]:
+    """Return the data of a scene: a pile as high as the paper's of 270, then some phases."""
+    widening = (count / PAPER_COUNT) ** 0.5
+    per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))
+    return {
+        "schema_version": 1,
+        "seed": seed,
+        "count": count,
+        "container": {"radius_m": PAPER_RADIUS * widening},
+        "phases": [{"type": "deposit", "per_layer": per_layer}, *phases],
+        **keys,
+    }
+
+
+def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_rusage:
+    """Run a scene into `folder/name` on one thread; ends the benchmark if it fails.
+
+    Returns:
+        What the process used, loading of YADE included.
+    """
+    path = folder / f"{name}.yaml"
+    path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")
+    command = [sys.executable, "-m", "smarticles", "run", str(path), "--out", str(folder / name), "--threads", "1"]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(child.pid, 0)
+    if status:
+        sys.exit(f"benchmark run {name} failed with status {os.waitstatus_to_exitcode(status)}")
+    return usage
+
+
+def phase_cost(run: Path, phase: int = -1) -> float:
+    """Return the processor seconds per simulated second of a phase of a finished run."""
+    told = json.loads((run / "done.json").read_text())["phases"][phase]
+    cost: float = told["cpu_s"] / (told["end_s"] - told["start_s"])
+    return cost
+
+
+def folder_of(name: str, out: Path | None) -> Path:
+    """Make the folder of a benchmark, a new one unless it is named."""
+    folder = out or Path("out") / f"{name}-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

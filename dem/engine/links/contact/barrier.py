@@ -1,0 +1,108 @@
+"""The barrier that keeps axes apart, and the sub-steps that resolve it.
+
+A contact's energy is kn/2 u(δ)², u the stretched overlap. Up to a quarter of the room, u = δ: ordinary contacts are
+linear. Beyond it u grows without bound as the overlap fills the room, in which the axes of two links, or an axis and a
+surface, would meet:
+
+    u = δ + room x³ / (1 - x),   x = (δ - room/4) / (3/4 room),
+
+which has two continuous derivatives. The force is kn u u', the stiffness kn h² with h² = u'² + u u''. Dashpots are
+scaled by the hardening h, so that their ratio to critical damping stays, and restitution with it (Tsuji et al., Powder
+Technol. 71, 239 (1992)). No load passes, in the spirit of incremental potential contact (Li et al., ACM Trans. Graph.
+39, 49 (2020)), whose logarithm it replaces by a rational function that joins a linear spring.
+
+Time steps are stable for the linear spring. Where a contact is stiffer, or closes fast, the step is divided.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from dem.engine.links.arrays import Array
+from dem.engine.links.compiler import inlined, part
+
+LINEAR = 0.25  # of the room, up to which a contact is linear
+LAST = 0.95  # x from which on u follows its tangent, so that a pile that is taken over has finite forces
+APPROACH = 0.25  # of the room that is left, which a contact may close in a sub-step
+STRIDE, LONGEST = 0.25, 0.5  # radii that a link moves in a sub-step, and from which on a step is divided
+FINEST = 1024  # sub-steps of a step, a power of two
+SLACK = 1.2  # of what is asked for: a step is a tenth shorter than the stable one
+
+
+class Step(NamedTuple):
+    """Lengths of time around one evaluation of forces [s].
+
+    The forces themselves decide how long the next sub-step is, and so how long they act.
+
+    Args:
+        past: since the last evaluation, over which tangential springs have stretched.
+        whole: an undivided time step.
+        need: (1,) sub-steps per step that contacts and speeds ask for; written.
+    """
+
+    past: float
+    whole: float
+    need: Array
+
+
+@inlined
+def stretch(depth: float, room: float) -> tuple[float, float, float]:
+    """Return the stretched overlap u [m], its slope u' [1] and the hardening h [1].
+
+    Args:
+        depth: overlap δ [m].
+        room: overlap at which axes meet [m].
+    """
+    begin = LINEAR * room
+    u, slope, hardening = depth, 1.0, 1.0
+    if depth > begin:
+        rest = room - begin
+        x = (depth - begin) / rest
+        beyond = 0.0
+        if x > LAST:
+            beyond, x = (x - LAST) * rest, LAST
+        far = 1.0 / (1.0 - x)
+        slope = 1.0 + room / rest * x * x * (3.0 - 2.0 * x) * far * far
+        u = begin + x * rest + room * x * x * x * far + slope * beyond
+        bend = room / (rest * rest) * x * (6.0 - 6.0 * x + 2.0 * x * x) * far * far * far
+        hardening = math.sqrt(slope * slope + u * bend)
+    return u, slope, hardening
+
+
+@part
+def _demand(depth: float, room: float, closing: float, whole: float) -> float:
+    """Sub-steps per step that a contact beyond the linear range asks for."""
+    left = max(room - depth, 1e-6 * room)
+    ahead = min(depth + max(0.0, min(whole * closing, APPROACH * left)), room)
+    _, _, hardening = stretch(ahead, room)
+    # Twice as many as stability needs: where forces are far from linear, energy is kept less well.
+    return max(2.0 * hardening - 1.0, whole * closing / (APPROACH * left))
+
+
+@inlined
+def resolve(step: Step, depth: float, room: float, closing: float) -> None:
+    """Ask for sub-steps where a contact leaves the linear range within a step.
+
+    Args:
+        step: `need` is written.
+        depth: overlap [m].
+        room: overlap at which axes meet [m].
+        closing: rate at which the overlap grows [m/s].
+    """
+    if depth + step.whole * max(0.0, closing) > LINEAR * room:
+        step.need[0] = max(step.need[0], _demand(depth, room, closing, step.whole))
+
+
+@inlined
+def ticks_for(need: float, tick: int) -> int:
+    """Length of the next sub-step in ticks, of which a step has `FINEST`.
+
+    Args:
+        need: sub-steps per step that are asked for.
+        tick: ticks of the step that have passed; sub-steps begin at multiples of their own length.
+    """
+    ticks = FINEST
+    while ticks > 1 and (ticks * need > SLACK * FINEST or tick % ticks != 0):
+        ticks //= 2
+    return ticks

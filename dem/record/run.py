@@ -1,0 +1,252 @@
+"""A run directory as an object: what measures, studies, exports, reports and commands take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, NoReturn
+
+import yaml
+
+from dem.errors import InputError
+from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
+from dem.record.files import cannot_read
+from dem.record.forces import RecordedForces, has_forces, read_forces
+from dem.record.frames import FrameSequence, read_frames
+from dem.record.names import CHECKPOINT, DONE, FAILED, MANIFEST, OF_SWEEP, PROGRESS, SCENE, SERIES
+from dem.record.rundir import in_use
+from dem.record.series import Series, read_series
+
+State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
+"""`interrupted` closed its files when asked to stop; `stopped` was killed; `queued` waits for a job of a cluster."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """How far a run is; None where its files do not say.
+
+    Attributes:
+        state: Where it stands.
+        cause: Why it failed or was interrupted.
+        phase: Type of the phase that it is in.
+        time_s: Simulated time [s].
+        steps: Time steps of a done run.
+        wall_s: Wall time so far [s].
+        cpu_s: Processor time of a done run [s].
+        checkpoint_s: Simulated time of the checkpoint from which it can go on [s].
+    """
+
+    state: State
+    cause: str | None = None
+    phase: str | None = None
+    time_s: float | None = None
+    steps: int | None = None
+    wall_s: float | None = None
+    cpu_s: float | None = None
+    checkpoint_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run directory, finished or not; each part is read when it is first asked for, once.
+
+    Args:
+        path: the directory.
+    """
+
+    path: Path
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", Path(self.path))
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """What made the run.
+
+        Raises:
+            InputError: The directory or its `run.json` is missing, damaged or of another format.
+        """
+        if not (self.path / MANIFEST).is_file():
+            _reject_place(self.path)
+        return Manifest.read(self.path / MANIFEST)
+
+    @cached_property
+    def scene(self) -> SceneData:
+        """The resolved scene, every default written out, as the version that ran it wrote it.
+
+        Raises:
+            InputError: `scene.yaml` is missing or damaged.
+        """
+        path = self.path / SCENE
+        try:
+            content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
+        except (OSError, ValueError, yaml.YAMLError) as error:
+            cannot_read("scene", path, error, REMEDY)
+        if not isinstance(content, dict):
+            cannot_read("scene", path, "it must be a mapping", REMEDY)
+        return SceneData(path, "", content)
+
+    @cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases in order; with times where the run is done.
+
+        Raises:
+            InputError: `run.json` and `done.json` are not of one run.
+        """
+        planned = self.manifest.phases
+        if not (self.path / DONE).exists():
+            return planned
+        done = Done.read(self.path / DONE).phases
+        if [(phase.index, phase.type) for phase in done] != [(phase.index, phase.type) for phase in planned]:
+            cause = f"its phases differ from those of run.json: {[phase.type for phase in done]}"
+            cannot_read("manifest", self.path / DONE, cause, REMEDY)
+        steps = [phase.time_step_s for phase in planned]
+        return tuple(phase.model_copy(update={"time_step_s": step}) for phase, step in zip(done, steps, strict=True))
+
+    @cached_property
+    def frames(self) -> FrameSequence:
+        """The recorded frames in time order, each read when it is asked for.
+
+        Raises:
+            InputError: The run has written none yet, or their list is damaged.
+        """
+        return read_frames(self.path)
+
+    @property
+    def has_series(self) -> bool:
+        """Whether it has recorded time series; a run that failed early has not."""
+        return (self.path / SERIES).exists()
+
+    @cached_property
+    def series(self) -> Series:
+        """The recorded time series as arrays.
+
+        Raises:
+            InputError: There are none yet, or the file is damaged.
+        """
+        return read_series(self.path)
+
+    @cached_property
+    def forces(self) -> ForceSequence | None:
+        """The forces at contacts, one item per frame; None where the scene does not record them."""
+        return ForceSequence(self.frames) if has_forces(self.path) else None
+
+    @property
+    def status(self) -> Status:
+        """How far it is at this moment.
+
+        Raises:
+            InputError: A file that says so is damaged.
+        """
+        if not self.path.is_dir() or not any(self.path.iterdir()):
+            return Status(state="missing")
+        # A resumed run may have left an older failed.json behind.
+        if (self.path / DONE).exists():
+            done = Done.read(self.path / DONE)
+            return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
+        said = self.progress
+        if not (self.path / FAILED).exists():
+            return Status(
+                state="running" if in_use(self.path) else "stopped",
+                phase=said.phase,
+                time_s=said.time_s,
+                wall_s=said.wall_s,
+                checkpoint_s=said.checkpoint_s,
+            )
+        failed = Failed.read(self.path / FAILED)
+        return Status(
+            state=failed.status,
+            cause=failed.cause,
+            phase=said.phase,
+            time_s=failed.time_s,
+            wall_s=said.wall_s,
+            checkpoint_s=failed.checkpoint_s,
+        )
+
+    @property
+    def progress(self) -> Progress:
+        """What it says of itself while it goes on; empty otherwise."""
+        try:
+            return Progress.read(self.path / PROGRESS)
+        except InputError:
+            return Progress()  # none yet, or the run has just ended
+
+    @property
+    def can_resume(self) -> bool:
+        """Whether it was stopped, did not fail, and left a checkpoint to go on from."""
+        return self.status.state in ("interrupted", "stopped") and (self.path / CHECKPOINT).is_file()
+
+    @property
+    def lost_series(self) -> str | None:
+        """Warning about a run that is done and whose series is gone; None otherwise."""
+        if self.has_series or not (self.path / DONE).exists():
+            return None
+        return (
+            f"{self.path / SERIES}: is gone, although the run is done, so that all that was recorded in it is missing "
+            f"from tables; put it back, or run {self.path / SCENE} anew elsewhere"
+        )
+
+
+class SceneData(dict[str, Any]):
+    """A mapping of `scene.yaml`; a missing key is an `InputError` that names the file."""
+
+    def __init__(self, path: Path, place: str, values: dict[str, Any]) -> None:
+        super().__init__({key: _within(path, f"{place}{key}.", value) for key, value in values.items()})
+        self._path, self._place = path, place
+
+    def __missing__(self, key: str) -> Any:
+        cannot_read("scene", self._path, f"{self._place}{key} is missing", REMEDY)
+
+
+def _within(path: Path, place: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return SceneData(path, place, value)
+    if isinstance(value, list):
+        return [_within(path, f"{place}{index}.", item) for index, item in enumerate(value)]
+    return value
+
+
+@dataclass(frozen=True)
+class ForceSequence:
+    """The forces at contacts of a run's frames, each read when it is asked for.
+
+    Args:
+        frames: the frames.
+    """
+
+    frames: FrameSequence
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __getitem__(self, index: int) -> RecordedForces:
+        return read_forces(self.frames[index])
+
+
+def _reject_place(path: Path) -> NoReturn:
+    """Say what is there instead of a run."""
+    remedy = REMEDY
+    if not path.exists():
+        cause = "no such directory"
+    elif not path.is_dir():
+        cause = "it is a file"
+    elif (path / OF_SWEEP).is_file():
+        cause, remedy = "it is a sweep", f"give one of its runs, {path / 'runs' / 'NAME'}"
+    else:
+        cause = f"it holds no {MANIFEST}"
+    cannot_read("run directory", path, cause, remedy)
+
+
+def open_run(path: Path | str) -> Run:
+    """Open a run directory and read its manifest, so that what is none is rejected here.
+
+    Raises:
+        InputError: It is no run directory.
+    """
+    run = Run(Path(path))
+    _ = run.manifest
+    return run

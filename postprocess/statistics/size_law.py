@@ -1,0 +1,163 @@
+"""Fit what a quantity of piles of one shape comes to as they grow: q = q_∞ + a N^(-1/3), surface over volume.
+
+The scatter from seed to seed falls with the size of a pile, and a few seeds of one size hardly know it. It is taken as
+a power of N that all sizes share, fitted to what seeds differ by within sizes alone, so that it knows nothing of the
+law. Where the law leaves more than that scatter explains, errors are larger by the square root of the ratio (Birge,
+Phys. Rev. 40, 207, 1932), and the law is refused beyond 95 %.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc, fdtri, stdtrit
+
+from postprocess.statistics.seeds import CONFIDENCE, Slope
+
+Floats = NDArray[np.float64]
+
+POWER = 1 / 3
+POWERS = np.arange(0.02, 1.501, 0.01)
+"""Powers that are tried; an interval that ends there may be longer."""
+
+_FALLS = np.arange(0.0, 2.01, 0.02)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """Scatter of one run, σ² = c N^(-fall).
+
+    Attributes:
+        variance: c, in the square of the quantity's unit.
+        fall: Power of N that σ² falls with [1].
+        freedom: Degrees of freedom that it is known with.
+    """
+
+    variance: float
+    fall: float
+    freedom: int
+
+    def error(self, count: float, runs: int) -> float:
+        """Half-width of the 95 % interval of a mean over runs of one size; NaN where no scatter is known."""
+        if not self.freedom:
+            return math.nan
+        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) * math.sqrt(self.variance * count**-self.fall / runs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizeLaw:
+    """q = bulk + slope N^(-1/3), fitted to runs.
+
+    Attributes:
+        bulk: q of a pile without end.
+        slope: a.
+        covariance: (2, 2) of the two, enlarged where the law leaves more than scatter; NaN without scatter.
+        scatter: Of one run.
+        excess: Variance that the law leaves of the means of sizes, over what scatter explains; NaN below three sizes.
+        refused: Probability of so much, were the law true [1]; likewise.
+        powers: Best power of N and its 95 % interval [1]; likewise.
+        sizes: How many sizes.
+        runs: How many runs.
+    """
+
+    bulk: float
+    slope: float
+    covariance: Floats
+    scatter: Scatter
+    excess: float
+    refused: float
+    powers: tuple[float, float, float]
+    sizes: int
+    runs: int
+
+    def error(self, bulk: float, slope: float) -> float:
+        """Half-width of the 95 % interval of bulk · q_∞ + slope · a; NaN without scatter."""
+        share = np.array([bulk, slope])
+        return self._quantile * math.sqrt(float(share @ self.covariance @ share))
+
+    def at(self, count: float) -> float:
+        """The quantity of so many smarticles."""
+        return self.bulk + self.slope * math.pow(count, -POWER)
+
+    def bias(self, count: float) -> Slope:
+        """The quantity of so many smarticles less that of a pile without end."""
+        share = math.pow(count, -POWER)
+        half = self.error(0, share)
+        return Slope(value=self.slope * share, standard_error=half / self._quantile, half_width=half, count=self.runs)
+
+    @property
+    def _quantile(self) -> float:
+        return float(stdtrit(max(self.scatter.freedom, 1), (1 + CONFIDENCE) / 2))
+
+
+def scatter_of(counts: Floats, values: Floats) -> Scatter:
+    """Fit the scatter within sizes, by maximum likelihood; arguments as those of `size_law`."""
+    sizes, place = np.unique(counts, return_inverse=True)
+    members = np.bincount(place)
+    squares = np.bincount(place, (values - (np.bincount(place, values) / members)[place]) ** 2)
+    free = members - 1
+    freedom = int(free.sum())
+    if not freedom:
+        return Scatter(variance=math.nan, fall=0.0, freedom=0)
+    variances = np.array([(squares * sizes**fall).sum() for fall in _FALLS]) / freedom
+    if not variances[0]:
+        return Scatter(variance=0.0, fall=0.0, freedom=freedom)
+    unlikely = freedom * np.log(variances) - _FALLS * float(free @ np.log(sizes))
+    best = int(np.argmin(unlikely))
+    return Scatter(variance=float(variances[best]), fall=float(_FALLS[best]), freedom=freedom)
+
+
+def size_law(counts: Floats, values: Floats) -> SizeLaw:
+    """Fit the law to runs of two sizes at least.
+
+    Args:
+        counts: (n,) smarticles of each run.
+        values: (n,) of the quantity, finite.
+    """
+    scatter = scatter_of(counts, values)
+    bulk, slope, left = _fit(counts, values, scatter, POWER)
+    sizes = len(np.unique(counts))
+    excess = refused = math.nan
+    powers = (math.nan, math.nan, math.nan)
+    if sizes > 2 and scatter.freedom and scatter.variance:
+        excess = left / scatter.variance / (sizes - 2)
+        refused = float(fdtrc(sizes - 2, scatter.freedom, excess))
+        powers = _powers(counts, values, scatter)
+    larger = max(excess, 1.0) if math.isfinite(excess) else 1.0
+    matrix = np.stack([np.ones(len(counts)), counts**-POWER], axis=1)
+    inverse: Floats = np.linalg.inv(matrix.T @ (matrix * (counts**scatter.fall)[:, None])).astype(np.float64)
+    return SizeLaw(
+        bulk=bulk,
+        slope=slope,
+        covariance=inverse * scatter.variance * larger,
+        scatter=scatter,
+        excess=excess,
+        refused=refused,
+        powers=powers,
+        sizes=sizes,
+        runs=len(values),
+    )
+
+
+def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tuple[float, float, float]:
+    """Bulk and slope, and the weighted squares that they leave of the means of sizes."""
+    sizes, place = np.unique(counts, return_inverse=True)
+    members = np.bincount(place)
+    means = np.bincount(place, values) / members
+    weights = members * sizes**scatter.fall
+    matrix = np.stack([np.ones(len(sizes)), sizes**-power], axis=1)
+    root = np.sqrt(weights)
+    found, *_ = np.linalg.lstsq(matrix * root[:, None], means * root, rcond=None)
+    return float(found[0]), float(found[1]), float(weights @ (means - matrix @ found) ** 2)
+
+
+def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
+    """The best power, and all that the data do not refuse at 95 %, errors enlarged as those of the law."""
+    left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
+    free = len(np.unique(counts)) - 3
+    larger = max(left.min() / free, 1.0) if free > 0 else 1.0
+    kept = POWERS[(left - left.min()) / larger <= fdtri(1, scatter.freedom, CONFIDENCE)]
+    return float(POWERS[left.argmin()]), float(kept[0]), float(kept[-1])

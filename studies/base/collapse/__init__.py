@@ -1,1 +1,0 @@
-"""How free-standing columns lose their height, and how long that takes."""

@@ -1,0 +1,267 @@
+"""Smarticles of l/w = 0.8 are poured into a mould of three tiers, each narrower than the one below, and activated.
+
+The walls go at once: how well each tier is filled before, and what is kept 1 s later, against Savoie, Tuazon, Bhamla
+and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Casting". Runs of one seed are compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.run import Run
+from postprocess.geometry.outline import BALL
+from postprocess.measures.heights import heights
+from postprocess.measures.mould import cast, read_tiers
+from postprocess.report import figures as style
+from postprocess.statistics.columns import SEED
+from postprocess.statistics.points import marked
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework import plots
+from studies.framework.figures import Analysis, Drawing
+from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
+from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
+from studies.framework.quantities import Key, Quantity
+from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.runs import Row, duration
+from studies.framework.study import Study
+
+AFTER = 1.0  # s after the walls went, as in the paper
+# Of a tier's volume inside the pile. A plain cylinder of r = 1.2 w has 0.74 ± 0.02 by this measure as poured (three
+# seeds, up to 3/4 of its height): the ball dips in between smarticles at the wall.
+FULL = 0.7
+LOST = 0.05  # of the filled volume
+
+TIERS = ("lower", "middle", "upper")
+FILLED, FILLED_AFTER, KEPT, MATERIAL, MATERIAL_AFTER = (
+    {tier: f"{quantity} {tier} [-]" for tier in TIERS}
+    for quantity in ("filled", "filled after", "kept", "material", "material after")
+)
+NECK, WHOLE = "material in the neck [-]", "filled whole [-]"
+WHOLE_AFTER, WHOLE_KEPT = "filled whole after [-]", "kept whole [-]"
+IN_MOULD, OVERLAP = "material in the mould after [-]", "overlap before and after [-]"
+LIKENESS_BEFORE, LIKENESS = "likeness to the mould [-]", "likeness to the mould after [-]"
+HEIGHT, CENTRE = "height of 95 % [m]", "com height over that before [-]"
+
+
+def _by_tier(columns: Mapping[str, str], label: str, meaning: str) -> list[Quantity]:
+    return [
+        Quantity(column=column, label=label and label.format(tier), form=".3f", meaning=meaning.format(tier))
+        for tier, column in columns.items()
+    ]
+
+
+QUANTITIES = (
+    *_by_tier(FILLED, "filled {}", "share of the volume of the {} tier inside the pile before"),
+    *_by_tier(FILLED_AFTER, "{} after", "share of the volume of the {} tier inside the pile after the walls went"),
+    *_by_tier(KEPT, "kept {}", "of what was inside the pile in the {} tier, the share that still is"),
+    *_by_tier(MATERIAL, "", "share of the pile's material in the {} tier before"),
+    *_by_tier(MATERIAL_AFTER, "", "share of the pile's material in the {} tier after"),
+    *(
+        Quantity(column=column, label=label, form=".3f", meaning=meaning)
+        for column, label, meaning in (
+            (NECK, "in the neck", "share of the material above the mould, in the neck it was poured through, before"),
+            (WHOLE, "whole", "share of the volume of the whole mould inside the pile before"),
+            (WHOLE_AFTER, "whole after", "share of the volume of the whole mould inside the pile after"),
+            (WHOLE_KEPT, "kept whole", "of what was inside the pile in the mould, the share that still is"),
+            (IN_MOULD, "", "share of the material where the mould was, after"),
+            (OVERLAP, "overlap", "volume common to the pile before and after over that of both together"),
+            (LIKENESS_BEFORE, "likeness", "volume common to pile and mould over that of both together, before"),
+            (LIKENESS, "likeness after", "volume common to pile and mould over that of both together, after"),
+            (HEIGHT, "", "height below which 95 % of the material lies, before"),
+            (CENTRE, "", "height of the centre of mass after, over that before"),
+        )
+    ),
+)
+
+
+def measure(run: Run) -> Row:
+    """Measure how a mould was filled, and what is left of its shape."""
+    tiers = read_tiers(run)
+    if len(tiers) != len(TIERS) + 1:
+        msg = f"{run.path}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}"
+        raise InputError(msg)
+    tiers = tiers[:-1]  # without the neck that the mould is filled through
+    before, frames = around(run)
+    start = removal(run).start_s or before.time
+    after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
+    one, other = (frame.vertices - np.array([0.0, 0.0, frame.floor_z]) for frame in (before, after))
+    ball = BALL * run.manifest.middle_length_m
+    found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
+    volumes = np.array([tier.volume for tier in tiers])
+    filled = found.filled_before * volumes
+    # Of less than the ball that tells inside from outside, a share says nothing.
+    kept = np.where(filled > 4 / 3 * math.pi * ball**3, found.kept, math.nan)
+    row = named_columns(run)
+    for k, tier in enumerate(TIERS):
+        row |= {
+            FILLED[tier]: found.filled_before[k],
+            FILLED_AFTER[tier]: found.filled_after[k],
+            KEPT[tier]: kept[k],
+            MATERIAL[tier]: found.material_before[k],
+            MATERIAL_AFTER[tier]: found.material_after[k],
+        }
+    levels = heights(one), heights(other)
+    return row | {
+        NECK: 1 - found.material_before.sum(),
+        WHOLE: filled.sum() / volumes.sum(),
+        WHOLE_AFTER: found.filled_after @ volumes / volumes.sum(),
+        WHOLE_KEPT: np.nansum(found.kept * filled) / filled.sum(),
+        IN_MOULD: found.material_after.sum(),
+        OVERLAP: found.overlap,
+        LIKENESS_BEFORE: found.likeness_before,
+        LIKENESS: found.likeness,
+        HEIGHT: levels[0].top,
+        CENTRE: levels[1].mean_com / levels[0].mean_com,
+        "time after [s]": after.time - start,
+        "time without the wall [s]": duration(removal(run)),
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
+    }
+
+
+def _note(*quantities: str) -> Callable[[pd.DataFrame], str]:
+    return lambda runs: "; ".join(f"{name} {means_by(runs, name, PROCEDURE, '.3f')}" for name in quantities)
+
+
+def _pour_fills(runs: pd.DataFrame) -> Outcome:
+    part = of_procedure(runs, STATIC)
+    effects = [
+        Effect(label=f"filled as poured, {tier},", value=mean_over_seeds(part[column]), threshold=FULL)
+        for tier, column in FILLED.items()
+    ]
+    return Outcome(effects=effects, note=_note(NECK)(part))
+
+
+def _fills_less(runs: pd.DataFrame) -> list[Effect]:
+    filled, height = (partial(paired, runs, quantity, SHAPE) for quantity in (FILLED["lower"], HEIGHT))
+    return [
+        Effect(label="filled share of the lower tier less internal", value=filled(INTERNAL), sign=-1),
+        Effect(label="height of 95 % less internal", value=height(INTERNAL), unit=" m"),
+        Effect(label="filled less static", value=filled(STATIC), sign=0),
+        Effect(label="height less static", value=height(STATIC), sign=0, unit=" m"),
+    ]
+
+
+FINDINGS = (
+    Finding(
+        id="pour-fills",
+        says="The mould is filled by pouring (shown in a picture)",
+        outcome=_pour_fills,
+        found_if=f"more than {FULL:g} of each tier is inside the pile as poured",
+    ),
+    # A pile that packs denser sinks, and leaves the upper tier; the lower one is where it has enough to fill with.
+    above(
+        "internal-fills",
+        "Internal oscillation fills the mould more completely, like a fluid",
+        FILLED["lower"],
+        INTERNAL,
+        (STATIC, SHAPE),
+        of=of_procedure,
+        note=_note(FILLED["lower"], WHOLE),
+        found_if="the filled share of the lower tier above that of static and of shape change, paired by seed",
+    ),
+    Finding(
+        id="shape-change-fills-less",
+        says="Shape change grows inward and upward rather than outward: it does not fill the mould",
+        outcome=_fills_less,
+        found_if="filled share of the lower tier below and height above those of internal oscillation, paired by seed",
+    ),
+    mean(
+        "internal-falls-apart",
+        "Internal oscillation: without the walls the overhangs fall apart",
+        lambda runs: 1 - runs[WHOLE_KEPT],
+        "lost of what was filled",
+        rows=lambda runs: of_procedure(runs, INTERNAL),
+        threshold=LOST,
+        note=_note(*KEPT.values()),
+        found_if=f"more than {LOST:g} of the filled volume of the mould is lost in 1 s",
+    ),
+    above(
+        "shape-change-keeps",
+        "Shape change keeps its shape better, as a hardened structure",
+        OVERLAP,
+        SHAPE,
+        (INTERNAL,),
+        of=of_procedure,
+        note=_note(OVERLAP, WHOLE_KEPT),
+        found_if="overlap of the pile before and after above that of internal oscillation, paired by seed",
+    ),
+    above(
+        "internal-sculpts",
+        "Internal oscillation sculpts to the mould more easily than shape change",
+        LIKENESS_BEFORE,
+        INTERNAL,
+        (SHAPE,),
+        of=of_procedure,
+        note=_note(LIKENESS_BEFORE, LIKENESS, IN_MOULD),
+        found_if="likeness of pile and mould before the walls go above that of shape change, paired by seed",
+    ),
+)
+
+_LABELS = {STATIC: "static", INTERNAL: r"internal oscillation, $\theta$ = 10°", SHAPE: "shape change"}
+_PLACES = [*TIERS, "whole"]
+
+
+def _draw(path: Path, analysis: Analysis, panels: Mapping[str, Sequence[str]], places: Sequence[str]) -> list[Path]:
+    """Draw columns of the points side by side, a panel for each label."""
+    figure = style.blank_figure(style.COLUMN_WIDTH * min(len(panels), 2), 2.6)
+    grid = figure.subplots(1, len(panels), squeeze=False)[0]
+    for axes, (label, columns) in zip(grid, panels.items(), strict=True):
+        for k, (procedure, name) in enumerate(_LABELS.items()):
+            for _, point in of_procedure(analysis.points, procedure).iterrows():
+                x = np.arange(len(columns)) + 0.16 * (k - 1)  # error bars side by side
+                look = {**plots.procedure_marker(procedure), "linestyle": "none"}
+                errors = [float(point[marked(column, "95 %")]) for column in columns]
+                plots.draw_means(axes, x, [float(point[column]) for column in columns], errors, look=look, label=name)
+        # Error bars of a share may reach beyond 0 and 1; they are shown whole.
+        axes.set_ylim(min(1.05 * axes.dataLim.y0, 0.0), max(1.02 * axes.dataLim.y1, 1.05))
+        axes.set_xticks(range(len(columns)), labels=places)
+        axes.set_ylabel(label)
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return plots.finished(figure, path, (), analysis.footer)
+
+
+STUDY = Study(
+    name="casting",
+    title="Casts of smarticles",
+    measure=measure,
+    keys=(Key(column=PROCEDURE, label="procedure", order=ORDER),),
+    quantities=QUANTITIES,
+    findings=FINDINGS,
+    figures=(
+        Drawing(
+            name="tiers",
+            of=partial(
+                _draw,
+                panels={
+                    "inside the pile before\n[share of the tier]": [*FILLED.values(), WHOLE],
+                    f"inside the pile {AFTER:g} s after\n[share of the tier]": [*FILLED_AFTER.values(), WHOLE_AFTER],
+                    "kept of what was filled\n[-]": [*KEPT.values(), WHOLE_KEPT],
+                },
+                places=_PLACES,
+            ),
+        ),
+        Drawing(
+            name="overlap",
+            of=partial(
+                _draw,
+                panels={"common volume over that of both [-]": [LIKENESS_BEFORE, LIKENESS, OVERLAP]},
+                places=["pile and mould,\nbefore", "pile and mould,\nafter", "pile before\nand after"],
+            ),
+        ),
+        Pictures(labels=_LABELS, after=AFTER),
+    ),
+    order=(SEED, PROCEDURE),
+    remarks=(
+        f"Inside the pile is what a ball of radius {BALL:g} w that rolls around links and floor cannot reach. The "
+        "paper gives no sizes of the tiers: radii of 2w, 1.6w and 1.2w, each w high, are assumed.",
+    ),
+    pictured={"procedure": INTERNAL},
+)

@@ -1,0 +1,342 @@
+"""Strain test of a chain of two or six robots between two walls: force, yield, width and fracture against confinement.
+
+Against Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical
+experiment", and what friction, servos and strings matter, which the paper does not tell. In `chain-bodies` robots have
+bodies 2.1 cm thick. Runs of one seed have the same servos. --quick takes minutes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.run import Run
+from postprocess.measures.strain import (
+    AT_PEAK,
+    BEND,
+    CARRIES,
+    DROP,
+    FRACTURE,
+    LOSS,
+    PEAK,
+    SLIP_WIDENING,
+    STIFFNESS,
+    STRAIN,
+    WALL,
+    WIDENING,
+    YIELD,
+    measured,
+    read_strain_test,
+)
+from postprocess.measures.strain import QUANTITIES as MEANINGS
+from postprocess.report import figures as style
+from postprocess.statistics.columns import SEED, SEEDS
+from postprocess.statistics.points import averaged
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
+from studies.framework import plots
+from studies.framework.figures import Analysis, Drawing, Histories, Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import Row
+from studies.framework.study import Study
+
+RANGE = (0.52, 0.65)  # h/H of the paper
+YIELDS = {2: 0.2, 6: 0.4}  # strains at which the paper's single trials yield, by number of robots
+NEAR = 0.1  # of strain: how near a yield strain must be to the paper's, which is read off a sentence
+STRAIGHT = 0.25  # how far the second slope may be from the first, relative, to count as a straight line
+BASELINE = "baseline"
+VARIANT, COUNT, CONFINEMENT, SPEED = "variant", "smarticles [-]", "h/H [-]", "speed [m/s]"
+START = "width at the start [m]"
+
+# h of the paper [m]. Links of one thickness are chosen such that a chain is as wide. With bodies of their own it is no
+# chain's outer width, and h/H only says where walls are: where the paper's are.
+PAPER_WIDTH = 0.062
+
+_SHOWN = {
+    PEAK: ("peak force [N]", ".3f"),
+    AT_PEAK: ("strain at the peak", ".3f"),
+    FRACTURE: ("strain at fracture", ".3f"),
+    YIELD: ("strain at the yield drop", ".3f"),
+    STIFFNESS: ("stiffness [N]", ".2f"),
+    WIDENING: ("widening", ".3f"),
+    WALL: ("wall force [N]", ".2f"),
+}
+QUANTITIES = {
+    column: Quantity(column=column, meaning=meaning, label=label, form=form)
+    for column, meaning in MEANINGS.items()
+    for label, form in [_SHOWN.get(column, ("", ".3g"))]
+}
+
+
+def measure(run: Run) -> Row:
+    """Measure force, strain and width of the chain."""
+    strained = [phase for phase in run.scene["phases"] if phase["type"] == STRAIN]
+    if len(strained) != 1:
+        msg = f"{run.path}: {len(strained)} phases that strain a chain; give runs of the study chain"
+        raise InputError(msg)
+    pull = read_strain_test(run)
+    width = float(pull.widths[0]) if run.manifest.middle_thickness_in_plane_m is None else PAPER_WIDTH
+    return {
+        VARIANT: run.manifest.name,
+        COUNT: run.manifest.count,
+        CONFINEMENT: round(width / run.manifest.channel_width_m, 3) if run.manifest.channel_width_m else 0.0,
+        SEED: run.manifest.seed,
+        SPEED: strained[0]["speed_m_per_s"],
+        START: float(pull.widths[0]),
+        **measured(pull),
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
+    }
+
+
+def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Make `points`, means over trials, and `sensitivity`, changes against the baseline's trials."""
+    keys = [VARIANT, COUNT, CONFINEMENT, SPEED]
+    points = [
+        dict(zip(keys, place, strict=True))
+        | {SEEDS: len(group), "yielded [-]": int(group[YIELD].notna().sum()), **averaged(group, QUANTITIES)}
+        for place, group in runs.groupby(keys)
+    ]
+    trial = [COUNT, CONFINEMENT, SEED]
+    base = runs[runs[VARIANT] == BASELINE].set_index(trial)
+    rows = []
+    for variant, group in runs[runs[VARIANT] != BASELINE].groupby(VARIANT, sort=False):
+        for quantity in (PEAK, FRACTURE, AT_PEAK, STIFFNESS):
+            own = group.set_index(trial)[quantity]
+            change = mean_over_seeds((100 * (own / base[quantity] - 1)).dropna().tolist())
+            rows.append([variant, quantity, own.mean(), change.value, change.half_width, change.count])
+    columns = [VARIANT, "quantity", "value", "change [%]", "change 95 % [%]", "trials [-]"]
+    return {"points": pd.DataFrame(points), "sensitivity": pd.DataFrame(rows, columns=columns)}
+
+
+def baseline(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the runs of the baseline."""
+    return runs[runs[VARIANT] == BASELINE]
+
+
+def in_range(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the runs of the baseline at the paper's h/H."""
+    return baseline(runs)[baseline(runs)[CONFINEMENT].between(*RANGE)]
+
+
+def by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
+    """Average over seeds means over h/H: before they touch a wall, runs with the same servos are the same run."""
+    return mean_over_seeds(part.groupby(SEED)[quantity].mean().tolist())
+
+
+def _within(label: str, value: SeedMean, centre: float, margin: float) -> list[Effect]:
+    return [
+        Effect(label=label, value=value, threshold=centre - margin),
+        Effect(
+            label=f"which is to be within {margin:g} of",
+            value=value,
+            sign=-1,
+            threshold=centre + margin,
+            text=f"{centre:g}",
+        ),
+    ]
+
+
+def _straight(base: pd.DataFrame) -> list[Effect]:
+    effects = []
+    for count in YIELDS:
+        own = base[base[COUNT] == count]
+        ratio = by_trial(own.assign(**{BEND: own[BEND] - 1}), BEND)
+        effects += _within(f"n = {count}: second over first slope, less 1,", ratio, 0, STRAIGHT)
+        effects.append(Effect(label="slope", value=by_trial(own, STIFFNESS), sign=0, unit=" N"))
+    return effects
+
+
+def yields(count: int) -> Finding:
+    """Make the finding that a chain has a yield drop near the paper's strain."""
+    expected = YIELDS[count]
+
+    def outcome(base: pd.DataFrame) -> Outcome:
+        part = base[base[COUNT] == count]
+        yielded = part[part[YIELD].notna()]
+        slip = Effect(label="others part at", value=by_trial(part[part[YIELD].isna()], AT_PEAK), sign=0)
+        note = f"{len(yielded)} of {len(part)} runs have one; {slip}"
+        strain = by_trial(yielded, YIELD)
+        if strain.count < 2:
+            return Outcome(note=note, verdict=Verdict.NO_DATA if part.empty else Verdict.NOT_FOUND)
+        loss = Effect(label="loss, of the force,", value=by_trial(yielded, DROP), sign=0)
+        return Outcome(effects=[*_within("yield drop at", strain, expected, NEAR), loss], note=note)
+
+    return Finding(
+        id=f"yields-{count}",
+        says=f"A yield drop near a strain of {expected:g}, n = {count}",
+        outcome=outcome,
+        rows=baseline,
+        found_if=f"mean strain of the yield drop within {NEAR:g} of it; not found without drops",
+    )
+
+
+def _widens(base: pd.DataFrame) -> list[Effect]:
+    effects = []
+    for count in YIELDS:
+        own = base[base[COUNT] == count]
+        effects.append(Effect(label=f"n = {count}: widening before the fracture", value=by_trial(own, WIDENING)))
+        effects.append(Effect(label="up to the first maximum", value=by_trial(own, SLIP_WIDENING), sign=0))
+    return effects
+
+
+def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
+    """Make the finding that a quantity rises with confinement."""
+
+    def outcome(part: pd.DataFrame) -> Outcome:
+        effects, untouched = [], False
+        for count in YIELDS:
+            own = part[part[COUNT] == count]
+            slope = slope_within(own[CONFINEMENT].tolist(), own[quantity].tolist(), own[SEED].tolist())
+            walls = f" per unit of h/H, force on the walls up to {own[WALL].max():.2g} N"
+            effects.append(Effect(label=f"n = {count}:", value=slope, note=walls))
+            # A slope of nothing at all has no scatter: walls that are never touched change no bit.
+            untouched |= slope.count > 1 and slope.value <= 0 and not slope.half_width > 0
+        return Outcome(effects=effects, verdict=Verdict.NOT_FOUND if untouched else None)
+
+    return Finding(
+        id=name,
+        says=says,
+        outcome=outcome,
+        rows=rows,
+        found_if="slope against h/H > 0, trials with the same seed compared with each other",
+    )
+
+
+def _more(base: pd.DataFrame) -> list[Effect]:
+    effects = []
+    for name, quantity, sign in (("force", PEAK, 1), ("strain at fracture", FRACTURE, -1)):
+        table = base.pivot_table(index=[CONFINEMENT, SEED], columns=COUNT, values=quantity).reindex(columns=[2, 6])
+        value = by_trial((table[6] - table[2]).dropna().rename(quantity).reset_index(), quantity)
+        effects.append(Effect(label=f"{name} of n = 6 less n = 2", value=value, sign=sign))
+    return effects
+
+
+_INSIDE = f"rises about linearly with confinement, h/H {RANGE[0]:g} to {RANGE[1]:g} as in the paper"
+_OVER = "rises with confinement, linearly or not, over our range"
+FINDINGS = (
+    Finding(
+        id="force-linear",
+        says="Force starts linear in strain",
+        outcome=_straight,
+        rows=baseline,
+        found_if=f"the slopes of the lower and the upper half of the first rise differ by less than {STRAIGHT:.0%}",
+    ),
+    *map(yields, YIELDS),
+    Finding(
+        id="widens",
+        says="The chain widens while strained (auxetic)",
+        outcome=_widens,
+        rows=baseline,
+        found_if="largest width before the fracture over that at the start > 1, for n = 2 and 6",
+    ),
+    rises("peak-rises-in-range", f"Peak force {_INSIDE}", PEAK, in_range),
+    rises("fracture-rises-in-range", f"Strain at fracture {_INSIDE}", FRACTURE, in_range),
+    rises("peak-rises", f"Peak force {_OVER}", PEAK, baseline),
+    rises("fracture-rises", f"Strain at fracture {_OVER}", FRACTURE, baseline),
+    Finding(
+        id="more-robots",
+        says="As n increases, force increases but elongation decreases",
+        outcome=_more,
+        rows=baseline,
+        found_if="peak force of n = 6 above, strain at fracture below that of n = 2, paired by h/H and seed, means "
+        "over h/H of each seed",
+    ),
+)
+
+
+def force_history(run: Run) -> plots.History:
+    """Read the force of the pulled string against strain, up to the fracture."""
+    pull = read_strain_test(run)
+    end = pull.fracture + 1
+    return plots.History(times=np.maximum.accumulate(pull.strains[:end]), values=pull.forces[:end], active=0.0)
+
+
+def width_history(run: Run) -> plots.History:
+    """Read the width over that at the start against strain, up to the fracture."""
+    pull = read_strain_test(run)
+    end = pull.fracture + 1
+    widths = pull.widths[:end] / pull.widths[0]
+    return plots.History(times=np.maximum.accumulate(pull.strains[:end]), values=widths, active=0.0)
+
+
+_HISTORIES = (
+    ("force_strain", force_history, "force of the pulled string [N]"),
+    ("width_strain", width_history, "width over that at the start [-]"),
+)
+
+
+def _draw_sensitivity(path: Path, analysis: Analysis) -> list[Path]:
+    """Draw what each variant changes in peak force and strain at fracture."""
+    changes = analysis.tables["sensitivity"]
+    if changes.empty:
+        return []
+    names = list(dict.fromkeys(changes[VARIANT]))
+    figure, axes = style.new_figure(width=2 * style.COLUMN_WIDTH, height=1.8 + 0.27 * len(names))
+    for shift, quantity, colour in ((0.14, PEAK, style.BLUE), (-0.14, FRACTURE, style.ORANGE)):
+        part = changes[changes["quantity"] == quantity].set_index(VARIANT).loc[names]
+        look = {**plots.marker("o", colour, colour), "linestyle": "none"}
+        rows, bars, label = -np.arange(len(names)) + shift, part["change 95 % [%]"], quantity.rpartition(" [")[0]
+        plots.draw_means(axes, part["change [%]"], rows, None, across=bars, look=look, label=label)
+    axes.axvline(0, color=style.GREY, linewidth=0.6)
+    axes.set_yticks(-np.arange(len(names)), names)
+    axes.set_xlabel("change against the baseline [%]")
+    axes.legend(loc="best")
+    return plots.finished(figure, path, ["Means over pairs of runs with the same servos, n = 2."], analysis.footer)
+
+
+STUDY = Study(
+    name="chain",
+    title="The strain test of a chain of robots against the findings of Savoie et al.",
+    measure=measure,
+    keys=(
+        Key(column=VARIANT, label="variant"),
+        Key(column=COUNT, label="n", form="g"),
+        Key(column=CONFINEMENT, label="h/H", form="g"),
+        Key(column=SPEED, label="mm/s", form="g", scale=1e3),
+    ),
+    quantities=tuple(QUANTITIES.values()),
+    findings=FINDINGS,
+    figures=(
+        *(
+            Histories(
+                name=name,
+                history=history,
+                rows=baseline,
+                split=one_by_one(CONFINEMENT, "h/H = {:g}".format),
+                panels=COUNT,
+                panel="n = {:g}",
+                width=0.005,
+                unit="of strain",
+                x_label="strain [-]",
+                y_label=label,
+                told=["Up to the first fracture."],
+            )
+            for name, history, label in _HISTORIES
+        ),
+        Means(
+            name="confinement",
+            quantities=[QUANTITIES[PEAK], QUANTITIES[FRACTURE]],
+            x=CONFINEMENT,
+            x_label="confinement h/H [-]",
+            split=lambda points: one_by_one(COUNT, "n = {:g}".format)(baseline(points)),
+            marks=RANGE,
+            told=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
+        ),
+        Drawing(name="sensitivity", of=_draw_sensitivity),
+    ),
+    extra=tabulate,
+    same_count=(COUNT,),
+    order=(VARIANT, COUNT, CONFINEMENT, SEED),
+    one_engine=True,
+    remarks=(
+        "Force: of the pulled string, means over 1 ms. Strain: of the distance along x between the strings' ties. A "
+        f"chain holds while it carries {CARRIES:.0%} of its peak force. A yield drop loses {LOSS:.0%} of the force or "
+        "more. Trials differ in the strength of their servos, ±10 %. h is that of the chain; of robots with bodies of "
+        f"their own it is the paper's {1e3 * PAPER_WIDTH:g} mm, so that walls are where the paper's are.",
+    ),
+    pictured={"variant": BASELINE, "count": 2},
+)

@@ -1,0 +1,256 @@
+"""Friction between smarticles, friction at the container and restitution: which of them decides how a pile packs?
+
+All combinations of two values of each at three l/w, shaken as by Gravish et al. The effect of a factor is the mean of
+paired differences, second level less first, all else alike; those of one l/w and seed are averaged first, so that a
+seed counts once.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dem.record.run import Run
+from postprocess.geometry.links import centres_of_mass
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.factorial import paired_differences
+from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds
+from studies.framework.figures import Combinations
+from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
+from studies.framework.provenance import DIGITISING_ERROR, GRAVISH, read_reference, reference_at
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import DEFINITION, Row
+from studies.framework.shaken import FRICTION, WHEN, WINDOW, contact_of, phi, timed_row
+from studies.framework.study import Study
+
+MARGIN = 5.0  # % from Gravish's points
+WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
+FACTORS: dict[str, tuple[float, float]] = {FRICTION: (0.4, 0.8), WALL: (0.4, 0.8), RESTITUTION: (0.7, 0.3)}
+"""From the paper's values to others."""
+
+CALLED = {
+    FRICTION: "friction between smarticles",
+    WALL: "friction at the container",
+    RESTITUTION: "restitution",
+}
+RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
+PHI_0, PHI_F, PHI_RELAXED = (phi(stage) for stage in ("phi_0", "phi_f", "phi_f relaxed"))
+QUANTITIES = {
+    column: Quantity(column=column, label=label, form=form, axis=axis, meaning=meaning)
+    for column, label, form, axis, meaning in (
+        (PHI_0, "phi_0", ".4f", "", "packing fraction before shaking"),
+        (PHI_F, "phi_f", ".4f", "", "packing fraction at the end of shaking"),
+        (PHI_RELAXED, "phi_f at rest again", ".4f", "", "packing fraction after the rest that follows"),
+        (CROSSED, "N after shaking", ".2f", "", "links through a smarticle's plane at the end of shaking"),
+        (
+            RISEN,
+            "the rise of the lowest tenth [w]",
+            ".3f",
+            "rise of the lowest tenth [w]",
+            "mean height of the centres of mass of the lowest tenth of all smarticles: after shaking less before",
+        ),
+    )
+}
+TOGETHER, EVERYWHERE = "both frictions together", "all"
+QUANTITY, FACTOR, EFFECT, SHARE = "quantity", "factor", "effect [unit of the quantity]", "effect over the mean [%]"
+DEVIATION = "deviation of phi_f from Gravish [%]"
+
+
+def measure(run: Run) -> Row:
+    """Measure φ before, in the course of and after shaking, and by how much the lowest smarticles rose."""
+    contact = contact_of(run)
+    known = {
+        FRICTION: contact["friction_smarticle"],
+        WALL: contact["friction_wall"],
+        RESTITUTION: contact["restitution"],
+        RISEN: risen(run),
+    }
+    return timed_row(run, known)
+
+
+def risen(run: Run) -> float:
+    """Measure by how much the lowest tenth of all smarticles rose while the pile was shaken [w].
+
+    A pile that packs lets it sink; one that climbs its container as a whole leaves a gap below. Heights are means over
+    the last `WINDOW` of the phase before shaking and of shaking.
+    """
+    frames, heights = run.frames, []
+    shaken = next(phase.index for phase in run.phases if phase.type == "shake")
+    for phase in (shaken - 1, shaken):
+        part = frames.in_phase(phase)
+        late = part.after(part.times[-1] - WINDOW)
+        lowest = [_lowest_tenth(centres_of_mass(one.vertices)[:, 2] - one.floor_z) for one in late]
+        heights.append(float(np.mean(lowest)))
+    return (heights[1] - heights[0]) / run.manifest.middle_length_m
+
+
+def _lowest_tenth(heights: NDArray[np.float64]) -> float:
+    count = max(round(len(heights) / 10), 1)
+    return float(np.partition(heights, count - 1)[:count].mean())
+
+
+def points(runs: pd.DataFrame) -> pd.DataFrame:
+    """Average over seeds, and set φ_f against Gravish's, errors of both included."""
+    reference, rows = read_reference(), []
+    for key, group in runs.groupby([*FACTORS, ASPECT], sort=True):
+        combination = dict(zip((*FACTORS, ASPECT), key, strict=True))
+        row = {**combination, **seeds_of(group), **averaged(group, QUANTITIES)}
+        value = reference_at(reference, float(combination[ASPECT]), "phi_f")
+        row[DEVIATION] = 100 * (row[PHI_F] / value - 1)
+        row[marked(DEVIATION, "95 %")] = 100 * math.hypot(row[marked(PHI_F, "95 %")], DIGITISING_ERROR) / value
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
+    """Take what a quantity does when a factor changes, by l/w and seed; of two factors their interaction."""
+    table, left = runs, [*FACTORS, ASPECT, SEED]
+    for factor in changed:
+        left = [name for name in left if name != factor]
+        table = paired_differences(table, quantity, factor, FACTORS[factor], left)
+    return table.groupby([ASPECT, SEED], as_index=False)[quantity].mean()
+
+
+def effects(runs: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate the effect of each factor on each quantity by l/w, the last row of all l/w together."""
+    rows = []
+    for quantity, declared in QUANTITIES.items():
+        for factor, changed in {**{CALLED[name]: (name,) for name in FACTORS}, TOGETHER: (FRICTION, WALL)}.items():
+            table = by_seed(runs, quantity, *changed)
+            for place, group in [*((f"{ratio:g}", part) for ratio, part in table.groupby(ASPECT)), (EVERYWHERE, table)]:
+                effect = mean_over_seeds(group[quantity])
+                mean = float(runs[runs[ASPECT].isin(group[ASPECT])][quantity].mean())
+                row = {QUANTITY: declared.label, FACTOR: factor, ASPECT: place, SEEDS: effect.count}
+                row |= mean_columns(EFFECT, effect)
+                rows.append(row | {SHARE: 100 * effect.value / mean if mean else math.nan})
+    return pd.DataFrame(rows)
+
+
+def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1) -> Finding:
+    """Make the finding that changing factors lowers (sign −1) or raises a quantity."""
+    return _judged(name, says, quantity, lambda runs: by_seed(runs, quantity, *changed), sign)
+
+
+def _judged(name: str, says: str, quantity: str, differences: Rows, sign: int = -1) -> Finding:
+    form = QUANTITIES[quantity].form
+
+    def text(mean: SeedMean) -> str:
+        return told_number(mean.value, f"+{form}", mean.half_width)
+
+    def outcome(runs: pd.DataFrame) -> Outcome:
+        table = differences(runs)
+        value = mean_over_seeds(table[quantity])
+        groups = table.groupby(ASPECT)[quantity]
+        places = ", ".join(f"{ratio:g}: {text(mean_over_seeds(group))}" for ratio, group in groups)
+        effect = Effect(label="effect, ± 95 %,", value=value, sign=sign, text=f"{text(value)} (n = {value.count})")
+        return Outcome(effects=[effect], note=f"by l/w {places}")
+
+    found_if = f"mean of paired differences {'<' if sign < 0 else '>'} 0"
+    return Finding(id=name, says=says, outcome=outcome, found_if=found_if)
+
+
+def _friction_less_wall(runs: pd.DataFrame) -> pd.DataFrame:
+    both = by_seed(runs, PHI_F, FRICTION).merge(by_seed(runs, PHI_F, WALL), on=[ASPECT, SEED], suffixes=("", " wall"))
+    return both.assign(**{PHI_F: both[PHI_F] - both[f"{PHI_F} wall"]})
+
+
+def _near_gravish(means: pd.DataFrame) -> Outcome:
+    """Find a combination within the margin at every l/w, where errors leave no doubt."""
+    known = means[means[DEVIATION].notna()]
+    if known.empty:
+        return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
+    off, error = known[DEVIATION].abs(), known[marked(DEVIATION, "95 %")]
+    told = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
+    each = told.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
+    each.columns = pd.Index(["inside", "outside", "off", "places"])
+    # A combination that lacks an aspect ratio can be refused by another one, and not accepted.
+    whole = each[each["places"] == each["places"].max()]
+    verdict = Verdict.NOT_FOUND if each["outside"].all() else Verdict.NOT_RESOLVED
+    best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
+    rows = told[np.all([told[name] == best[name] for name in FACTORS], axis=0)]
+    places = ", ".join(
+        f"{row[ASPECT]:g}: {told_number(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"
+        for _, row in rows.iterrows()
+    )
+    verdict = Verdict.FOUND if whole["inside"].any() else verdict
+    return Outcome(note=f"nearest: {named(best)}; by l/w {places}", verdict=verdict)
+
+
+def named(row: pd.Series) -> str:
+    """Name a combination."""
+    return f"μ = {row[FRICTION]:g}, container {row[WALL]:g}, e = {row[RESTITUTION]:g}"
+
+
+FINDINGS = (
+    *(
+        lowers(
+            f"{stage}-{factor}",
+            f"{QUANTITIES[quantity].label} falls when {CALLED[column]} goes from {low:g} to {high:g}",
+            quantity,
+            column,
+        )
+        for stage, quantity in (("phi-0", PHI_0), ("phi-f", PHI_F), ("phi-f-relaxed", PHI_RELAXED))
+        for factor, (column, (low, high)) in zip(("friction", "container", "restitution"), FACTORS.items(), strict=True)
+    ),
+    _judged(
+        "friction-more-than-container",
+        "Friction between smarticles lowers phi_f more than friction at the container",
+        PHI_F,
+        _friction_less_wall,
+    ),
+    lowers(
+        "frictions-together",
+        "Friction at the container lowers phi_f more where that between smarticles is 0.8",
+        PHI_F,
+        FRICTION,
+        WALL,
+    ),
+    lowers(
+        "container-raises-lowest",
+        "The lowest smarticles rise more when friction at the container goes from 0.4 to 0.8",
+        RISEN,
+        WALL,
+        sign=1,
+    ),
+    Finding(
+        id="near-gravish",
+        says=f"A combination brings phi_f within {MARGIN:g} % of Gravish's at every l/w measured",
+        outcome=_near_gravish,
+        tables=("points",),
+        found_if="at 95 %, errors of reading Gravish's points included",
+    ),
+)
+
+STUDY = Study(
+    name="contacts",
+    title="Friction between smarticles, friction at the container, restitution",
+    measure=measure,
+    keys=(
+        *(Key(column=name, label=called, form="g") for name, called in CALLED.items()),
+        Key(column=ASPECT, label="l/w", form="g"),
+    ),
+    quantities=tuple(QUANTITIES.values()),
+    findings=FINDINGS,
+    figures=(
+        Combinations(
+            name="contacts",
+            quantities=[
+                Quantity(column=DEVIATION, meaning="", axis=r"$\phi_\mathrm{f}$ less Gravish's [%]"),
+                QUANTITIES[RISEN],
+            ],
+            factors=FACTORS,
+            row=named,
+        ),
+    ),
+    extra=lambda runs: {"points": points(runs), "effects": effects(runs)},
+    order=(*FACTORS, ASPECT, SEED),
+    one_engine=True,
+    from_tables=True,
+    remarks=(f"φ by {DEFINITION}; {WHEN}. Heights of the lowest tenth are means over {WINDOW:g} s.",),
+    reference=GRAVISH,
+    pictured={"l_over_w": 0.7, "friction": 0.8, "friction_wall": 0.4, "restitution": 0.7},
+)

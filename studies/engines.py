@@ -1,0 +1,337 @@
+"""The same seeds on both engines: each difference with its 95 % confidence interval against a margin chosen beforehand.
+
+Both engines pour the same seeds from the same poses. Two engines are equivalent in a quantity where the interval of the
+relative difference lies within the margin, different where it lies beyond it, and otherwise not resolved: a difference
+that is not significant proves nothing. (Two one-sided tests at 5 % would take the 90 % interval; ours is the stricter.)
+And YADE's chains of spheres ever finer: pitch 1.3, 1.0, 0.5, 0.25, links being the limit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.run import Run
+from postprocess.measures import strain
+from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
+from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
+from postprocess.report import figures as style
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import mean_columns
+from postprocess.statistics.seeds import difference, mean_over_seeds
+from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
+from studies.framework.figures import Analysis, Drawing
+from studies.framework.findings import Finding, Outcome, Verdict, within
+from studies.framework.plots import draw_means, finished, marker
+from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
+from studies.framework.provenance import Reference
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import ENGINE, Row
+from studies.framework.study import Study
+
+CASE, VARIANT, PITCH = "case", "variant", "pitch [-]"
+LINKS, YADE = "links", "yade"
+HOOK, COLLAPSE, CHAIN = "hook", "collapse", "chain"
+ACTIVE = (EXTERNAL, SHAPE, INTERNAL)
+
+PHI_0, CROSSINGS_0 = f"{STATIC} {PHI}", f"{STATIC} {CROSSINGS}"
+PEAK, TAU, FORCE = "peak force over n W_s [-]", "tau [s]", "peak force [N]"
+QUANTITIES = (
+    Quantity(column=PHI_0, label="φ_0", meaning="packing fraction at rest after the pour"),
+    Quantity(column=CROSSINGS_0, label="⟨N⟩_0", meaning="⟨N⟩ at rest after the pour"),
+    Quantity(column=PHI_ACTIVE, label="φ_f", meaning="packing fraction at the end of the activity, in motion"),
+    Quantity(column=PHI, meaning="packing fraction at rest after the activity"),
+    Quantity(column=CROSSINGS, label="⟨N⟩", meaning="⟨N⟩ at rest after the activity"),
+    Quantity(column=HEIGHT, label="h/h0", meaning="height of the centre of mass after the activity, over that before"),
+    Quantity(column=ENERGY, meaning="work of the motors, or of the shaken container, on the smarticles"),
+    Quantity(column=PEAK, label="hook", meaning="largest force that raises the hook, over the weight of all"),
+    Quantity(
+        column=TAU,
+        label="τ [s]",
+        meaning="time in which a free column on a shaking floor collapses, by those that remain; empty where it stood",
+    ),
+    Quantity(column=FORCE, label="chain [N]", meaning="largest force of the string that pulls the chain"),
+)
+"""What is measured; a case leaves empty what it does not have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """A quantity that both engines give.
+
+    Attributes:
+        label: What it is called.
+        cases: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once.
+        column: Of the table of runs.
+        margin: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run.
+        why: Why that much.
+    """
+
+    label: str
+    cases: tuple[str, ...]
+    column: str
+    margin: float
+    why: str
+
+
+_PHI_WHY = "half of the 10 % within which the study gravish calls φ near Gravish's"
+_CROSSINGS_WHY = "⟨N⟩ of procedures differ by tens of per cent; it is a count of few"
+_ENERGY_WHY = "the paper compares energies by factors, and the account closes within 1 %"
+
+COMPARED: tuple[Compared, ...] = (
+    Compared(label="φ_0", cases=ACTIVE, column=PHI_0, margin=5.0, why=_PHI_WHY),
+    Compared(label="⟨N⟩ as poured", cases=ACTIVE, column=CROSSINGS_0, margin=10.0, why=_CROSSINGS_WHY),
+    *(
+        Compared(label=f"{label}, {case}", cases=(case,), column=column, margin=margin, why=why)
+        for case in ACTIVE
+        for label, column, margin, why in (
+            ("φ_f in motion", PHI_ACTIVE, 5.0, _PHI_WHY),
+            ("φ_f at rest", PHI, 5.0, _PHI_WHY),
+            ("⟨N⟩", CROSSINGS, 10.0, _CROSSINGS_WHY),
+            ("h/h0", HEIGHT, 5.0, "as for φ, which goes as 1/h"),
+            ("energy", ENERGY, 10.0, _ENERGY_WHY),
+        )
+    ),
+    Compared(
+        label="hook force",
+        cases=(HOOK,),
+        column=PEAK,
+        margin=20.0,
+        why="a largest value, which scatters by a third between seeds; the paper's procedures differ by factors",
+    ),
+    Compared(
+        label="collapse time",
+        cases=(COLLAPSE,),
+        column=TAU,
+        margin=30.0,
+        why="τ = exp(Δ/Γ)/f: at Γ = 2.5, 30 % of τ are 0.66 of Δ, 5 % of Gravish's 15",
+    ),
+    Compared(
+        label="chain force",
+        cases=(CHAIN,),
+        column=FORCE,
+        margin=10.0,
+        why="the servos of a chain differ from each other by 10 %",
+    ),
+)
+"""What is compared, in the order of tables and figures."""
+
+REFINED = tuple(
+    one
+    for one in COMPARED
+    if one.cases == ACTIVE or (one.cases == (EXTERNAL,) and one.column in (PHI_ACTIVE, PHI, CROSSINGS))
+)
+"""What is followed to ever finer chains."""
+
+_WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
+
+
+def measure(run: Run) -> Row:
+    """Measure a few numbers, as the study measures them that the run is a small scene of."""
+    case, slash, variant = run.manifest.name.partition("/")
+    if not slash or case not in (*ACTIVE, HOOK, COLLAPSE, CHAIN):
+        msg = f"{run.path}: the scene's name is {run.manifest.name!r}, not CASE/VARIANT; give runs of the study engines"
+        raise InputError(msg)
+    return {
+        CASE: case,
+        VARIANT: variant,
+        ENGINE: run.manifest.engine,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
+        **dict.fromkeys((one.column for one in QUANTITIES), math.nan),
+        **_measured(run, case),
+        "processor time [s]": sum(phase.cpu_s or math.nan for phase in run.phases),
+        "simulated [s]": run.status.time_s,
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
+    }
+
+
+def _measured(run: Run, case: str) -> dict[str, float]:
+    if case == CHAIN:
+        return {FORCE: strain.measured(strain.read_strain_test(run))[strain.PEAK]}
+    if case == COLLAPSE:
+        shaken = vibration(run)
+        return {TAU: collapse_of(column_history(run, REMAINING, shaken), REMAINING, shaken).time}
+    if case == HOOK:
+        pulled = run.phases[-1]
+        if pulled.type != PULL:
+            msg = f"{run.path}: ends with {pulled.type}, not {PULL}; give runs of the study engines"
+            raise InputError(msg)
+        force = peak(read_pull(run, run.series, pulled.index)).force
+        return {PEAK: force / run.manifest.count / weight_of_one(run)}
+    row = procedure_row(run)
+    return {name: float(str(row[name])) for name in (PHI_0, CROSSINGS_0, PHI_ACTIVE, PHI, CROSSINGS, HEIGHT, ENERGY)}
+
+
+def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
+    """Average a quantity by seed over cases that begin alike; seeds without one are left out."""
+    chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
+    means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
+    return means
+
+
+def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
+    """Compare the engines in each quantity that a run of either gives, paired by seed."""
+    rows = []
+    for one in COMPARED:
+        links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))
+        if links.empty and yade.empty:
+            continue
+        seeds = links.index.intersection(yade.index)
+        links, yade = links[seeds], yade[seeds]
+        effect = mean_over_seeds((links - yade).to_numpy())
+        base = float(yade.mean()) if len(seeds) else math.nan
+        scale = 100 / abs(base) if base else math.nan
+        apart = difference(mean_over_seeds(links.to_numpy()), mean_over_seeds(yade.to_numpy()))
+        verdict = within(scale * effect.value, scale * effect.half_width, one.margin)
+        rows.append(
+            {
+                "quantity": one.label,
+                "pairs [-]": len(seeds),
+                "links": float(links.mean()) if len(seeds) else math.nan,
+                "yade": base,
+                "difference [%]": scale * effect.value,
+                "difference 95 % [%]": scale * effect.half_width,
+                "difference 95 % unpaired [%]": scale * apart.half_width,
+                "margin [%]": one.margin,
+                "verdict": _WORDS.get(verdict, str(verdict)),
+                "why this margin": one.why,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def pitch_of(variant: str) -> float:
+    """Give the pitch that a variant stands for [-]: links are the limit 0, YADE as it is 1; NaN for neither."""
+    if variant in (LINKS, YADE):
+        return 0.0 if variant == LINKS else 1.0
+    return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan
+
+
+def refinement(runs: pd.DataFrame) -> pd.DataFrame:
+    """Average the shaken pile by pitch of YADE's spheres, links as pitch 0, with differences to links, paired by seed.
+
+    Only the shaken runs count, so that every pitch has the same ones.
+    """
+    shaken = runs[runs[CASE] == EXTERNAL]
+    rows: list[dict[str, object]] = []
+    for one in REFINED:
+        limit = by_seed(shaken, one, LINKS)
+        base = abs(float(limit.mean())) if len(limit) else 0.0
+        scale = 100 / base if base else math.nan
+        for variant in sorted(set(shaken[VARIANT]), key=pitch_of):
+            values = by_seed(shaken, one, str(variant))
+            effect = mean_over_seeds([] if variant == LINKS else (values - limit).dropna().tolist())
+            rows.append(
+                {
+                    "quantity": one.label,
+                    VARIANT: variant,
+                    PITCH: pitch_of(str(variant)),
+                    "seeds [-]": len(values),
+                    **mean_columns("mean [-]", mean_over_seeds(values.to_numpy())),
+                    "less links [%]": scale * effect.value,
+                    "less links 95 % [%]": scale * effect.half_width,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _outcome(table: pd.DataFrame, one: Compared) -> Outcome:
+    row = table[table["quantity"] == one.label] if len(table) else table
+    if row.empty:
+        return Outcome(verdict=Verdict.NO_DATA)
+    percent, half_width, pairs = row[["difference [%]", "difference 95 % [%]", "pairs [-]"]].iloc[0]
+    note = f"links less YADE {percent:+.1f} ± {half_width:.1f} % at 95 % ({pairs:.0f} pairs)"
+    return Outcome(note=note, verdict=within(percent, half_width, one.margin))
+
+
+def _finding(one: Compared) -> Finding:
+    return Finding(
+        id=one.label.replace(" ", "-").replace(",", ""),
+        says=f"(ours) {one.label} is alike on both engines",
+        found_if=f"95 % interval of the difference, paired by seed, within ±{one.margin:g} %: {one.why}",
+        outcome=partial(_outcome, one=one),
+        tables=["equivalence"],
+    )
+
+
+def _draw_differences(path: Path, analysis: Analysis) -> list[Path]:
+    """Draw a row per quantity: the difference with its error over the band of its margin."""
+    table = analysis.tables["equivalence"]
+    shown = table[table["pairs [-]"] > 0] if len(table) else table
+    colours = {"equivalent": style.GREEN, "different": style.ORANGE}
+    figure, axes = style.new_figure(height=0.8 + 0.19 * len(shown))
+    for place, (_, row) in enumerate(shown.iterrows()):
+        margin, colour = row["margin [%]"], colours.get(row["verdict"], style.GREY)
+        axes.barh(place, 2 * margin, left=-margin, height=0.62, color=style.SKY, alpha=0.3, linewidth=0)
+        look = {**marker("o", colour, colour), "linestyle": "none"}
+        across = [row["difference 95 % [%]"]]
+        draw_means(axes, [row["difference [%]"]], [place], None, across=across, look=look, label="_nolegend_")
+    for verdict in shown["verdict"].unique() if len(shown) else ():
+        axes.plot([], [], "o", color=colours.get(verdict, style.GREY), markersize=3.4, label=verdict)
+    axes.axvline(0.0, color=style.BLACK, linewidth=0.6)
+    axes.set_yticks(range(len(shown)), shown["quantity"] if len(shown) else [])
+    axes.set_ylim(len(shown) - 0.4, -0.6)
+    axes.set_xlabel("links less YADE over YADE [%]")
+    if len(shown):
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
+    return finished(figure, path, ["Bands: margins, chosen beforehand."], analysis.footer)
+
+
+def _draw_pitch(path: Path, analysis: Analysis) -> list[Path]:
+    """Draw means against pitch over those of links, which stand at 0."""
+    figure, axes = style.new_figure(height=2.6)
+    table = analysis.tables["pitch"]
+    colours = style.sequence(len(REFINED), last=0.85)
+    for place, (one, shape, colour) in enumerate(zip(REFINED, "oDs^v", colours, strict=True)):
+        part = table[(table["quantity"] == one.label) & table["mean [-]"].notna()] if len(table) else table
+        if part.empty or not (part[PITCH] == 0).any():
+            continue
+        part = part.sort_values(PITCH)
+        limit = float(part["mean [-]"].iloc[0])
+        x, values, errors = part[PITCH] + 0.012 * (place - 2), part["mean [-]"] / limit, part["mean 95 % [-]"] / limit
+        draw_means(axes, x, values, errors.to_numpy(), look=marker(shape, colour, colour), label=one.label)
+    axes.axhline(1.0, color=style.GREY, linewidth=0.6)
+    axes.set_xlabel("pitch over sphere diameter; links at 0 [-]")
+    axes.set_ylabel("mean over that of links [-]")
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
+    return finished(
+        figure, path, ["Set apart sideways; the error bar of links' own mean stands at 0."], analysis.footer
+    )
+
+
+STUDY: Study = Study(
+    name="engines",
+    title="Two engines, the same seeds",
+    measure=measure,
+    keys=(
+        Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)),
+        Key(column=VARIANT, label="variant"),
+    ),
+    quantities=QUANTITIES,
+    findings=tuple(map(_finding, COMPARED)),
+    figures=(Drawing(name="differences", of=_draw_differences), Drawing(name="pitch", of=_draw_pitch)),
+    extra=lambda runs: {
+        "points": STUDY.points(runs),
+        "equivalence": equivalence(runs),
+        "pitch": refinement(runs),
+    },
+    order=(CASE, VARIANT, SEED),
+    same_count=(CASE,),
+    remarks=(
+        "Alike where the 95 % interval (Student's t, paired by seed) of the difference lies within the margin, which "
+        "was chosen before the first run; not alike where it lies beyond the margin; else not resolved. One true "
+        "difference in twenty lies outside its interval by chance.",
+    ),
+    reference=Reference(statement="chains of spheres on YADE, the same seeds", facts={"what": "engine yade"}),
+    pictured={"case": "external", "variant": "links"},
+)

@@ -1,0 +1,318 @@
+"""A hook is pulled out of piles that were prepared by each procedure, of several amplitudes θ and several l/w.
+
+Force against time, peak force, work, and how they go with entanglement, against Savoie, Tuazon, Bhamla and Goldman,
+"Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and fracture". Runs of one l/w and seed
+were poured alike and are compared seed by seed; a pile that held fast has a peak of at least the limit of the hook.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from dem.errors import InputError
+from dem.record.run import Run
+from postprocess.geometry.links import centres_of_mass
+from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
+from postprocess.measures.table import summarise_run
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.framework.figures import Histories, Means, Scatter, Series, Split, by_procedure, one_by_one
+from studies.framework.findings import Effect, Finding, Rows, above, ranks
+from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, THETA_LABEL, History, procedure_marker
+from studies.framework.procedures import (
+    ACTIVE,
+    AMPLITUDE,
+    BY_RANKS,
+    CROSSINGS,
+    EXTERNAL,
+    INTERNAL,
+    PHI,
+    PROCEDURE,
+    SHAPE,
+    STATIC,
+    THETA,
+    of_procedure,
+    paired,
+    prepared_by,
+)
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import DEFINITION, Row, duration
+from studies.framework.study import Study
+from studies.strength import ABOVE, BEFORE, HELD_FAST, LIMIT, PEAK, RAISED, WORK, harder_but_brittle, other_order
+
+SHOWN_ASPECT = 0.7  # at which procedures and amplitudes are compared, as in the paper
+
+PEAK_TIME = "time of the peak [s]"
+WINDOWS = {
+    window: f"peak force over n W_s, window {window:g} s [-]"
+    for window in (WINDOW / 4, WINDOW / 2, 2 * WINDOW, 4 * WINDOW)
+}
+HELD, NET = "lower hook force at the peak over n W_s [-]", "peak force less lower hook's over n W_s [-]"
+LEFT = "load at the end over n W_s [-]"
+CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
+ACCOUNT = "work less that of the engine's account [-]"
+
+_FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where it held"
+_TOLD = {
+    PEAK: ("peak", ".3f", 1.0, _FORCE),
+    HELD_FAST: ("held fast", ".2f", 1.0, "1 where the hook was stopped by its force limit, 0 where it arrived"),
+    **{column: ("", ".3f", 1.0, f"largest mean over {window:g} s") for window, column in WINDOWS.items()},
+    HELD: ("lower hook at it", ".3f", 1.0, "upwards on the lower hook at the peak: what goes from hook to hook"),
+    NET: ("peak less lower hook", ".3f", 1.0, "largest mean of the force on the upper hook less that on the lower"),
+    PEAK_TIME: ("", ".3g", 1.0, "time since the pull began at which the peak is"),
+    RAISED: ("raised at it [mm]", ".1f", 1e3, "how far the hook had been raised then"),
+    WORK: ("work / n W_s w", ".3f", 1.0, "∫ F dz over the whole pull"),
+    CAME_FREE: ("came free", ".2f", 1.0, f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
+    FREE_TIME: ("", ".3g", 1.0, "when it did so, since the pull began; empty where it did not"),
+    LEFT: ("load at the end", ".3f", 1.0, f"mean force over the last {END:g} s of the pull"),
+    BEFORE: ("", ".3g", 1.0, f"mean force on the hook over the last {END:g} s before the pull"),
+    ABOVE: ("above the hook", ".2f", 1.0, "share with the centre of mass above the hook before the pull"),
+    CROSSINGS: ("⟨N⟩", ".2f", 1.0, "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
+    PHI: ("", ".3g", 1.0, "packing fraction at rest before the pull"),
+}
+_AXES = {PEAK: r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]", CROSSINGS: CROSSINGS_LABEL}
+QUANTITIES = {
+    column: Quantity(column=column, label=label, form=form, scale=scale, meaning=meaning, axis=_AXES.get(column, ""))
+    for column, (label, form, scale, meaning) in _TOLD.items()
+}
+
+
+def measure(run: Run) -> Row:
+    """Measure the pile before the pull, and the forces on the hooks."""
+    procedure, pulled = prepared_by(run, PULL), run.phases[-1]
+    rest, settings = pulled.index - 1, run.scene["phases"]
+    asked, series = settings[pulled.index], run.series
+    table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
+    if rest not in table.index:
+        msg = f"{run.path}: no frame of the rest before the pull; run it again"
+        raise InputError(msg)
+    before = table.loc[rest]
+    frame = run.frames.in_phase(rest)[-1]
+    hook = float(series["hook_upper_z_m"][series.nearest(frame.time)])
+    pull, one = read_pull(run, series, pulled.index), weight_of_one(run)
+    total, highest, free = run.manifest.count * one, peak(pull), freed(pull)
+    unlimited = asked.get("force_limit_N") is None
+    return {
+        PROCEDURE: procedure,
+        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
+        ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
+        PHI: before[PHI],
+        CROSSINGS: before["crossings mean [-]"],
+        ABOVE: int((centres_of_mass(frame.vertices)[:, 2] > hook).sum()) / run.manifest.count,
+        PEAK: highest.force / total,
+        **{column: peak(pull, window).force / total for window, column in WINDOWS.items()},
+        HELD: held_at(pull, highest.time) / total,
+        NET: peak(pull.net).force / total,
+        PEAK_TIME: highest.time,
+        RAISED: highest.raised,
+        WORK: pull.work / total / run.manifest.middle_length_m,
+        CAME_FREE: float(math.isfinite(free)),
+        FREE_TIME: free,
+        LEFT: pull.left / total,
+        BEFORE: pull.before / total,
+        ACCOUNT: pull.work / pull.engine_work - 1 if pull.engine_work else math.nan,
+        HELD_FAST: float(held_fast(pull, asked)),
+        LIMIT: math.inf if unlimited else asked["force_limit_N"] / run.manifest.count / one,
+        "escaped at the end [-]": table["escaped [-]"].iloc[-1],
+        "frames averaged [-]": int(before["frames averaged"]),
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
+    }
+
+
+def force_history(run: Run, *, net: bool = False) -> History:
+    """Read the force over n W_s against the time since the pull began; net of that on the lower hook."""
+    pull = read_pull(run, run.series, run.phases[-1].index)
+    force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
+    return History(times=pull.times, values=force, active=0.0)
+
+
+def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
+    """Select what is at the aspect ratio at which procedures are compared."""
+    return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
+
+
+def compared(table: pd.DataFrame) -> pd.DataFrame:
+    """Select what is compared: one l/w, of the internal oscillation one θ."""
+    part = at_shown_aspect(table)
+    return pd.concat([of_procedure(part, name) for name in part[PROCEDURE].unique()]) if len(part) else part
+
+
+def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
+    """Select the internal oscillation at the shown l/w, where there are several θ."""
+    part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
+    return part if part[THETA].nunique() > 1 else part.iloc[:0]
+
+
+def aspects(table: pd.DataFrame) -> pd.DataFrame:
+    """Select the internal oscillation at the θ that is compared, where there are several l/w."""
+    part = of_procedure(table, INTERNAL)
+    return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
+
+
+def _net(runs: pd.DataFrame) -> str:
+    held = ", ".join(
+        f"{name} {int(part[HELD_FAST].sum())} of {len(part)}" for name, part in runs.groupby(PROCEDURE, sort=False)
+    )
+    others = [name for name in (EXTERNAL, INTERNAL, STATIC) if len(of_procedure(runs, name))]
+    less = [str(Effect(label=f"less {name}", value=paired(runs, NET, SHAPE, name), sign=0)) for name in others]
+    return f"peak less the lower hook's force, of shape-change, {', '.join(less)}; held fast: {held}"
+
+
+FINDINGS = (
+    above(
+        "shape-change-strongest",
+        f"Shape change has the highest peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
+        PEAK,
+        SHAPE,
+        (EXTERNAL, INTERNAL),
+        of=of_procedure,
+        beside=(STATIC,),
+        bounds=HELD_FAST,
+        rows=compared,
+        label="peak",
+        note=_net,
+        found_if=f"peak force above those of external and of internal oscillation at θ = {AMPLITUDE:g}°, seed by seed",
+    ),
+    above(
+        "internal-weakest",
+        f"Internal oscillation has the least peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
+        PEAK,
+        INTERNAL,
+        (EXTERNAL, SHAPE),
+        of=of_procedure,
+        sign=-1,
+        beside=(STATIC,),
+        bounds=HELD_FAST,
+        rows=compared,
+        label="peak",
+        found_if=f"peak force at θ = {AMPLITUDE:g}° below that of external oscillation and of shape change, by seed",
+    ),
+    Finding(
+        id="other-order-than-crossings",
+        says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
+        outcome=other_order,
+        rows=compared,
+        found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
+        "clearly in the same sense",
+    ),
+    ranks(
+        "strength-with-crossings-over-theta",
+        "Internal oscillation: over θ, the peak force goes with ⟨N⟩",
+        CROSSINGS,
+        PEAK,
+        within=(SEED,),
+        bounds=HELD_FAST,
+        rows=lambda table: at_shown_aspect(table[table[PROCEDURE] == INTERNAL]),
+        unit="n W_s per link",
+        found_if=f"over θ within seeds, l/w = {SHOWN_ASPECT:g}: {BY_RANKS}",
+    ),
+    ranks(
+        "strength-with-crossings",
+        "Tensile strength and number of entanglements are connected",
+        CROSSINGS,
+        PEAK,
+        within=(ASPECT, SEED),
+        bounds=HELD_FAST,
+        unit="n W_s per link",
+        found_if=f"over all procedures and θ, within runs of one l/w and seed: {BY_RANKS}",
+    ),
+    Finding(
+        id="harder-but-brittle",
+        says="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
+        "oscillation",
+        outcome=harder_but_brittle,
+        rows=compared,
+        found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
+        "that its fracture tests support this, not by which measure",
+    ),
+)
+
+_LABELS = {
+    SHAPE: "shape change",
+    EXTERNAL: "external",
+    INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
+    STATIC: "static",
+}
+_BY_THETA = one_by_one(THETA, lambda theta: rf"$\theta$ = {theta:g}°")
+_BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
+
+
+def _line(rows: Rows) -> Split:
+    """Make one series of the internal oscillation."""
+    look = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
+    return lambda points: [Series(rows=rows(points), label="internal oscillation", look=look)]
+
+
+def _all_points(table: pd.DataFrame) -> list[Series]:
+    """Make series of the procedures, and of the internal oscillation at each other θ and l/w."""
+    others = amplitudes(table), aspects(table)
+    return [
+        *by_procedure(_LABELS, line=False)(at_shown_aspect(table)),
+        *_BY_THETA(others[0][others[0][THETA] != AMPLITUDE]),
+        *_BY_ASPECT(others[1][others[1][ASPECT] != SHOWN_ASPECT]),
+    ]
+
+
+def _forces(name: str, rows: Rows, split: Split, told: str, *, net: bool = False) -> Histories:
+    return Histories(
+        name=name,
+        history=partial(force_history, net=net),
+        rows=rows,
+        split=split,
+        width=WINDOW,
+        level=1.0,
+        x_label="time since the hook began to rise [s]",
+        y_label=r"upper less lower hook, $F/(n W_\mathrm{s})$ [-]"
+        if net
+        else r"force on the hook $F/(n W_\mathrm{s})$ [-]",
+        told=[f"{told} Level: weight of all smarticles."],
+    )
+
+
+def _peaks(name: str, x: str, x_label: str, split: Split, told: str) -> Means:
+    return Means(name=name, quantities=[QUANTITIES[PEAK]], x=x, x_label=x_label, split=split, told=[told])
+
+
+_AT_ASPECT, _AT_THETA = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
+FIGURES = (
+    _forces("force_time", at_shown_aspect, by_procedure(_LABELS), _AT_ASPECT),
+    _forces("net_time", at_shown_aspect, by_procedure(_LABELS), _AT_ASPECT, net=True),
+    _forces("force_time_theta", amplitudes, _BY_THETA, f"Internal oscillation, {_AT_ASPECT}"),
+    _peaks("peak_theta", THETA, THETA_LABEL, _line(amplitudes), _AT_ASPECT),
+    _forces("force_time_aspect", aspects, _BY_ASPECT, f"Internal oscillation, {_AT_THETA}"),
+    _peaks("peak_aspect", ASPECT, ASPECT_LABEL, _line(aspects), _AT_THETA),
+    Scatter(name="peak_crossings", x=QUANTITIES[CROSSINGS], y=QUANTITIES[PEAK], split=_all_points, bounds=HELD_FAST),
+)
+
+STUDY = Study(
+    name="fracture",
+    title="A hook pulled out of a pile, against the findings of Savoie et al.",
+    measure=measure,
+    keys=(
+        Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, SHAPE, INTERNAL)),
+        Key(column=THETA, label="θ", form="g", unit="°"),
+        Key(column=ASPECT, label="l/w", form="g"),
+    ),
+    quantities=tuple(QUANTITIES.values()),
+    findings=FINDINGS,
+    figures=FIGURES,
+    order=(PROCEDURE, ASPECT, THETA, SEED),
+    constant={ACTIVE: (PROCEDURE,)},
+    bounds=(HELD_FAST, "held fast"),
+    count_values=True,
+    remarks=(
+        "Of how the force depends on θ or on l/w by itself the paper's text says nothing; it has figures.",
+        "What goes from hook to hook shows on the lower one, where a smarticle may be hooked into both; the peak less "
+        "that is what pile and container take.",
+        f"`{ACCOUNT}` of `runs.csv`: ∫ F dz from the series over the work that the engine added up, less 1.",
+    ),
+    pictured={"procedure": SHAPE, "l_over_w": SHOWN_ASPECT},
+)

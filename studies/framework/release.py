@@ -1,0 +1,109 @@
+"""Piles whose container is taken away: a pour, one activity or none, a rest, and `remove-container`, which is last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dem.errors import InputError
+from dem.record.document import Phase
+from dem.record.frame import Frame
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
+from postprocess.measures.table import PASSIVE_PHASES
+from postprocess.pictures import strip
+from postprocess.statistics.columns import ASPECT, SEED
+from studies.framework.figures import Analysis
+from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
+
+ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
+"""Procedures in the order of tables and pictures."""
+
+_REMOVAL = "remove-container"
+
+
+def removal(run: Run) -> Phase:
+    """Find the phase that takes the wall away.
+
+    Raises:
+        InputError: It is not the last one, or no rest goes before it.
+    """
+    last = run.phases[-1]
+    if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
+        types = ", ".join(phase.type for phase in run.phases)
+        msg = f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}"
+        raise InputError(msg)
+    return last
+
+
+def around(run: Run) -> tuple[Frame, FrameSequence]:
+    """Read the last frame with the wall, and all those since it began to go.
+
+    Raises:
+        InputError: There are none.
+    """
+    phase, frames = removal(run), run.frames
+    rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
+    if not rest or not after:
+        msg = f"{run.path}: no frame of the rest before {_REMOVAL} or of that phase; run it again"
+        raise InputError(msg)
+    return rest[len(rest) - 1], after
+
+
+def named_columns(run: Run) -> dict[str, object]:
+    """Cells of the columns that tell a run from others.
+
+    Raises:
+        InputError: The run has more than one activity, or an unknown one.
+    """
+    active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
+    if len(active) > 1 or not set(active) <= set(PROCEDURES):
+        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
+        raise InputError(msg)
+    return {
+        PROCEDURE: PROCEDURES[active[0]] if active else STATIC,
+        ASPECT: round(run.manifest.aspect_ratio, 6),
+        SEED: run.manifest.seed,
+        "smarticles [-]": run.manifest.count,
+        "fidelity": run.manifest.fidelity,
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pictures:
+    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later.
+
+    Attributes:
+        labels: Labels by procedure.
+        after: When the last picture is, after the wall began to go [s]; None: at the end.
+        select: Selects the runs; the first one of each procedure is drawn.
+        name: Of the file.
+    """
+
+    labels: Mapping[str, str]
+    after: float | None = None
+    select: Sequence[str] = ()
+    name: str = "pictures"
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw the runs whose directories are there."""
+        runs, rows = analysis.runs, []
+        if self.select:
+            runs = runs[(runs[list(self.select)] == 0).all(axis=1)]
+        runs = runs.assign(apart=(runs[ASPECT] - 0.7).abs()).sort_values(["apart", SEED])
+        for procedure, label in self.labels.items():
+            names = [name for name in runs.loc[runs[PROCEDURE] == procedure, "run"] if name in analysis.manifests]
+            if not names:
+                continue
+            run = analysis.manifests[names[0]]
+            start, end = removal(run).start_s, run.status.time_s
+            if start is not None and end is not None:
+                last = end if self.after is None else start + self.after
+                rows.append(strip.Row(directory=run.path, label=label, times=(around(run)[0].time, start + 0.1, last)))
+        if not rows:
+            return []
+        columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")
+        told = "Each smarticle has a colour of its own, the same in all pictures of a row; first seed."
+        output = path.with_suffix(".png")
+        return [strip.draw_strip(rows, output, columns=columns, footer=[told, *analysis.footer])]

@@ -1,0 +1,538 @@
+"""Which coefficient of friction μ, from 0.2 to 0.8, gives Gravish's packing fractions, and is it that of steel?
+
+U-shapes of three l/w, poured and shaken for the 20 s of Gravish, Franklin, Hu and Goldman, "Entangled granular media",
+Phys. Rev. Lett. 108, 208001 (2012); smarticles and walls have the same friction. φ is interpolated linearly between the
+coefficients, Gravish's points never. Errors are 95 % by Student's t; scatter over seeds is relative to the mean, pooled
+over all points of a stage.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
+
+from dem.record.run import Run
+from postprocess.report import figures as style
+from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import marked, seeds_of, told_number
+from postprocess.statistics.seeds import CONFIDENCE as LEVEL
+from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
+from studies.framework import plots
+from studies.framework.figures import Analysis, Drawing, Histories, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict
+from studies.framework.provenance import (
+    DIGITISING_ERROR,
+    GRAVISH,
+    SHAKE_TIME,
+    read_reference,
+    reference_at,
+    told_reference,
+)
+from studies.framework.quantities import Key, Quantity
+from studies.framework.runs import DEFINITION, Row
+from studies.framework.shaken import (
+    FRICTION,
+    STAGES,
+    TIMES,
+    WHEN,
+    WINDOW,
+    at_time,
+    common_friction,
+    phi,
+    timed_row,
+    while_shaken,
+)
+from studies.framework.study import Study
+
+Array = NDArray[np.float64]
+
+PAPERS = 0.4  # coefficient of friction of Savoie et al.
+MARGIN = 5.0  # % from Gravish's points
+SURE = 0.95  # confidence from which a verdict is given, either way
+STEP = 0.001  # of friction, in which intervals and the best friction are found
+ROUNDING = 1e-12  # of φ, where a curve is Gravish's to the last digit and has no error
+
+# Published static coefficients of dry steel on steel, lowest and highest. As it comes: 0.12 to 0.60 (Lust, Engineering
+# Guide CDA3000, table 7.21), 0.15 to 0.30 (Gieck, Technical Formulae), 0.27 with a thick film of oxide, 0.31 AISI 1032
+# on itself (Davis, Concise Metals Data Handbook); clean: 0.78, 0.74 mild steel (Lawrence Berkeley National Laboratory,
+# A. J. DeMello, Coefficient of Friction). Tabulated ones mislead where films and loads are ignored (Blau, Tribology
+# International 34 (2001) 585); what Gravish's staples are coated with is unknown.
+STEEL = {"dry steel as it comes": (0.12, 0.60), "clean, dry steel": (0.74, 0.78)}
+
+COMPARED = {
+    "phi_0": "phi_0",
+    "phi 5 s": "phi_f",
+    "phi 10 s": "phi_f",
+    "phi_f": "phi_f",
+    "phi_f relaxed": "phi_f relaxed",
+}
+"""What is set against Gravish, and as which of their stages: φ after 5 and 10 s as if they had shaken no longer."""
+
+# What is to be near Gravish's at the same friction.
+JUDGED: dict[str, Sequence[str]] = {
+    "phi_0": ("phi_0",),
+    "phi_f": ("phi_f",),
+    "phi_f relaxed": ("phi_f relaxed",),
+    "phi_0 and phi_f": ("phi_0", "phi_f"),
+    "phi_0 and phi_f relaxed": ("phi_0", "phi_f relaxed"),
+}
+
+STAGE, PHI, REFERENCE, DEVIATION = "stage", "phi [-]", "phi Gravish [-]", "deviation [%]"
+CONFIDENCE, LEAST = "confidence [%]", "confidence of the worst point [%]"
+LARGEST, MEAN, SIGNED = "largest deviation [%]", "mean absolute deviation [%]", "mean [%]"
+VERDICT, WHAT, COUNTED = "within 5 %", "what", "points compared [-]"
+LOW, HIGH, FIRST, LAST = "from [-]", "to [-]", "measured from [-]", "measured to [-]"
+GROWTHS = tuple(f"growth from {one:g} to {other:g} s [%]" for one, other in itertools.pairwise(TIMES))
+_VERDICTS = {"yes": Verdict.FOUND, "no": Verdict.NOT_FOUND, "undetermined": Verdict.NOT_RESOLVED}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """φ against friction at one l/w and stage, with what it is compared with.
+
+    Attributes:
+        friction: (n,) coefficients, ascending [-].
+        packing: (n,) means of φ [-].
+        half_widths: (n,) of their 95 % intervals [-]; NaN where unknown.
+        reference: Gravish's φ [-], read to `DIGITISING_ERROR`.
+        scatter: Relative, of the stage.
+    """
+
+    friction: Array
+    packing: Array
+    half_widths: Array
+    reference: float
+    scatter: Scatter
+
+    def deviation(self, friction: Array) -> Array:
+        """Interpolate φ less Gravish's [-]."""
+        return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
+
+    def error(self, friction: Array) -> Array:
+        """Compute the 95 % half-width of the deviation: the errors of both neighbours and of the reading [-]."""
+        if len(self.friction) == 1:
+            return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
+        right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
+        low, high = self.friction[right - 1], self.friction[right]
+        part = (friction - low) / (high - low)
+        of_mean = np.hypot((1 - part) * self.half_widths[right - 1], part * self.half_widths[right])
+        return np.asarray(np.hypot(of_mean, DIGITISING_ERROR), dtype=np.float64)
+
+    def grid(self) -> Array:
+        """List the measured points, and steps between them [-]."""
+        steps = np.arange(self.friction[0], self.friction[-1] + STEP / 2, STEP)
+        return np.unique(np.concatenate([np.clip(steps, None, self.friction[-1]), self.friction]))
+
+    def crossing(self) -> tuple[float, float, float, str]:
+        """Find the friction at which φ is Gravish's, its 95 % interval, and where it lies.
+
+        Where scatter makes φ cross it more than once: the middle between the first crossing and the last. The interval
+        has all friction at which φ is not clearly another than Gravish's; ±inf beyond what was measured.
+        """
+        off, found = self.packing - self.reference, []
+        for left in range(len(off)):
+            if off[left] == 0:
+                found.append(float(self.friction[left]))
+            elif left + 1 < len(off) and off[left] * off[left + 1] < 0:
+                part = off[left] / (off[left] - off[left + 1])
+                found.append(float(self.friction[left] + part * (self.friction[left + 1] - self.friction[left])))
+        above = bool(off[0] > 0)
+        place = "within the range" if found else "above the range" if above else "below the range"
+        value = (found[0] + found[-1]) / 2 if found else math.inf if above else -math.inf
+        grid = np.unique(np.concatenate([self.grid(), found]))
+        errors = self.error(grid)
+        if not np.isfinite(errors).all():
+            return value, math.nan, math.nan, place
+        near = grid[np.abs(self.deviation(grid)) <= errors + ROUNDING]
+        first, last = float(grid[0]), float(grid[-1])
+        if not len(near):  # nothing near, so it is clearly beyond
+            return (value, last, math.inf, place) if above else (value, -math.inf, first, place)
+        low = -math.inf if near[0] == first or place == "below the range" else float(near[0])
+        high = math.inf if near[-1] == last or place == "above the range" else float(near[-1])
+        return value, low, high, place
+
+    def within(self, margin: float, friction: float) -> float:
+        """Compute the confidence that φ differs by no more than a margin from Gravish's; NaN without errors."""
+        at = np.array([friction])
+        deviation, error = float(self.deviation(at)[0]), float(self.error(at)[0]) / _per_error(self.scatter)
+        if not math.isfinite(error):
+            return math.nan
+        upper, lower = (stdtr(self.scatter.freedom, (side * margin - deviation) / error) for side in (1, -1))
+        return float(upper - lower)
+
+
+Curves = Mapping[tuple[str, float], Curve]
+"""By stage and l/w; those that Gravish has a point of."""
+
+
+def measure(run: Run) -> Row:
+    """Measure φ before, in the course of, at the end of and after shaking."""
+    return timed_row(run, {FRICTION: common_friction(run)})
+
+
+def _per_error(scatter: Scatter) -> float:
+    """Compute the 95 % half-width over the standard error; NaN without a degree of freedom."""
+    return float(stdtrit(scatter.freedom, (1 + LEVEL) / 2)) if scatter.freedom else math.nan
+
+
+def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Make all tables of the table of runs."""
+    scatters = {}
+    for name in (stage for stage in COMPARED if phi(stage) in runs):
+        groups = [group[phi(name)].dropna() for _, group in runs.groupby([ASPECT, FRICTION])]
+        scatters[name] = pooled_scatter([(group / group.mean()).tolist() for group in groups])
+    means = points(runs, scatters)
+    found = curves(means, scatters)
+    rows = [(stage, 100 * one.value, one.freedom) for stage, one in scatters.items()]
+    return {
+        "points": means,
+        "crossings": crossings(found),
+        "verdicts": verdicts(found),
+        "nearest": nearest(found),
+        "growth": growth(runs),
+        "scatter": pd.DataFrame(rows, columns=[STAGE, "relative scatter [%]", "degrees of freedom [-]"]),
+    }
+
+
+def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
+    """Average φ by stage, l/w and friction, and set it against Gravish's, whose reading error counts as well."""
+    reference, rows = read_reference(), []
+    for stage, scatter in scatters.items():
+        for (aspect, friction), group in runs.groupby([ASPECT, FRICTION]):
+            known = group[group[phi(stage)].notna()]
+            if known.empty:
+                continue
+            mean = float(known[phi(stage)].mean())
+            half_width = _per_error(scatter) * scatter.value * mean / math.sqrt(len(known))
+            value = reference_at(reference, aspect, COMPARED[stage])
+            row = {STAGE: stage, ASPECT: aspect, FRICTION: friction, **seeds_of(known), PHI: mean}
+            row |= {marked(PHI, "95 %"): half_width, REFERENCE: value, DEVIATION: 100 * (mean / value - 1)}
+            rows.append(row | {marked(DEVIATION, "95 %"): 100 * math.hypot(half_width, DIGITISING_ERROR) / value})
+    return pd.DataFrame(rows)
+
+
+def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
+    """Make curves of φ against friction, where Gravish has a point."""
+    found = {}
+    for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
+        rows = group.sort_values(FRICTION)
+        found[str(stage), float(aspect)] = Curve(
+            friction=rows[FRICTION].to_numpy(),
+            packing=rows[PHI].to_numpy(),
+            half_widths=rows[marked(PHI, "95 %")].to_numpy(),
+            reference=float(rows[REFERENCE].iloc[0]),
+            scatter=scatters[str(stage)],
+        )
+    return found
+
+
+def crossings(found: Curves) -> pd.DataFrame:
+    """Tabulate the friction at which each curve is Gravish's."""
+    columns = [STAGE, ASPECT, REFERENCE, FRICTION, LOW, HIGH, "lies", FIRST, LAST]
+    rows = [
+        (stage, aspect, curve.reference, *curve.crossing(), curve.friction[0], curve.friction[-1])
+        for (stage, aspect), curve in found.items()
+    ]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
+    """Measure how near φ comes to Gravish's at a friction, and the confidence that all points are within `MARGIN`."""
+    at = np.array([friction])
+    deviations = {
+        f"{stage} at l/w = {aspect:g}": 100 * float(curve.deviation(at)[0]) / curve.reference
+        for (stage, aspect), curve in found.items()
+    }
+    worst = max(deviations, key=lambda name: abs(deviations[name]))
+    sure = [curve.within(MARGIN / 100 * curve.reference, friction) for curve in found.values()]
+    values = np.array(list(deviations.values()))
+    return {
+        COUNTED: len(deviations),
+        MEAN: float(np.abs(values).mean()),
+        SIGNED: float(values.mean()),
+        LARGEST: deviations[worst],
+        "largest at": worst,
+        CONFIDENCE: 100 * math.prod(sure),
+        LEAST: 100 * min(sure, default=math.nan),
+    }
+
+
+def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
+    """Tell whether all points are near Gravish's.
+
+    Yes: the confidence that all are, errors taken as independent, is at least `SURE`, and all points are there. No: a
+    point is surely farther off, by Bonferroni's rule for as many points as were compared.
+    """
+    confidence, least, count = (float(near[name]) for name in (CONFIDENCE, LEAST, COUNTED))
+    if confidence >= 100 * SURE and whole:
+        return "yes"
+    return "no" if least * count <= 100 * (1 - SURE) else "undetermined"
+
+
+def verdicts(found: Curves) -> pd.DataFrame:
+    """Tabulate, for each friction that was measured and what is to be near Gravish's, how near it comes."""
+    rows = []
+    for what, stages in JUDGED.items():
+        wanted = {key: curve for key, curve in found.items() if key[0] in stages}
+        for friction in sorted({float(friction) for curve in wanted.values() for friction in curve.friction}):
+            measured = {key: curve for key, curve in wanted.items() if friction in curve.friction}
+            near = nearness(measured, friction)
+            row = {WHAT: what, FRICTION: friction, **near, "points wanted [-]": len(wanted)}
+            rows.append({**row, VERDICT: verdict(near, whole=len(measured) == len(wanted))})
+    return pd.DataFrame(rows)
+
+
+def nearest(found: Curves) -> pd.DataFrame:
+    """Find the friction whose worst point is best, also between those measured."""
+    rows = []
+    for what, stages in JUDGED.items():
+        wanted = {key: curve for key, curve in found.items() if key[0] in stages}
+        grids = [curve.grid() for curve in wanted.values()]
+        if not grids:
+            continue
+        grid = np.unique(np.concatenate(grids))
+        grid = grid[(grid >= max(one[0] for one in grids)) & (grid <= min(one[-1] for one in grids))]
+        if not len(grid):
+            continue
+        worst = np.max([np.abs(curve.deviation(grid)) / curve.reference for curve in wanted.values()], axis=0)
+        friction = float(grid[np.argmin(worst)])
+        near = nearness(wanted, friction)
+        rows.append({WHAT: what, FRICTION: friction, **near, VERDICT: verdict(near, whole=True)})
+    return pd.DataFrame(rows)
+
+
+def growth(runs: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate by how much φ grew from time to time, run by run; the scatter is common to all points."""
+    names = [phi(at_time(time)) for time in TIMES]
+    grown = runs.reindex(columns=[*runs.columns, *(set(names) - set(runs.columns))])
+    for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
+        grown[name] = 100 * (grown[other] / grown[one] - 1)
+    groups = grown.groupby([ASPECT, FRICTION])
+    widths = {}
+    for name in GROWTHS:
+        scatter = pooled_scatter([group[name].tolist() for _, group in groups])
+        widths[name] = _per_error(scatter) * scatter.value
+    rows = []
+    for (aspect, friction), group in groups:
+        row = {ASPECT: aspect, FRICTION: friction, SEEDS: len(group)}
+        row |= {f"{at_time(time)} [-]": float(group[name].mean()) for time, name in zip(TIMES, names, strict=True)}
+        for name in GROWTHS:
+            count = int(group[name].notna().sum())
+            row[name] = float(group[name].mean())
+            row[marked(name, "95 %")] = widths[name] / math.sqrt(count) if count else math.nan
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def told_crossing(row: pd.Series) -> str:
+    """Format `0.61 (0.52 to 0.74)`, `above 0.8 (from 0.71)`, `below 0.2 (clearly)`: with the 95 % interval."""
+    value, low, high = float(row[FRICTION]), float(row[LOW]), float(row[HIGH])
+    ends = "no error" if math.isnan(low) else f"{low:.2f} to {high:.2f}"
+    if math.isinf(low):
+        ends = "anything measured" if math.isinf(high) else f"up to {high:.2f}"
+    elif math.isinf(high):
+        ends = f"from {low:.2f}"
+    if math.isinf(value):
+        if low == row[LAST] or high == row[FIRST]:
+            ends = "clearly"
+        return f"{'above' if value > 0 else 'below'} {row[LAST if value > 0 else FIRST]:g} ({ends})"
+    return f"{value:.2f} ({ends})"
+
+
+def _told_all(found: pd.DataFrame) -> str:
+    return "; ".join(f"{row[STAGE]} at l/w = {row[ASPECT]:g}: {told_crossing(row)}" for _, row in found.iterrows())
+
+
+def _of(table: pd.DataFrame, what: str) -> pd.DataFrame:
+    return table[table[WHAT] == what] if len(table) else table
+
+
+def one_friction(what: str) -> Finding:
+    """Make the finding that one friction brings φ near Gravish's at every l/w."""
+
+    def outcome(tried: pd.DataFrame, best: pd.DataFrame) -> Outcome:
+        tried, best = _of(tried, what), _of(best, what)
+        if tried.empty or best.empty:
+            return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
+        one, found = best.iloc[0], Verdict.NOT_RESOLVED
+        if (tried[VERDICT] == "yes").any():
+            found = Verdict.FOUND
+        elif (tried[VERDICT] == "no").all() and one[VERDICT] == "no":
+            found = Verdict.NOT_FOUND
+        note = f"nearest at {one[FRICTION]:.2f} (between measured points): {one[MEAN]:.1f} % on average over "
+        note += f"{one[COUNTED]} points, at most {one[LARGEST]:+.1f} %, {one['largest at']}; confidence that all are "
+        note += f"within {MARGIN:g} %: {told_number(one[CONFIDENCE], '.0f')} %"
+        return Outcome(note=note, verdict=found)
+
+    return Finding(
+        id=f"one-friction-{what.replace(' ', '-').replace('_', '-')}",
+        says=f"One friction brings {what} within {MARGIN:g} % of Gravish's at every l/w measured",
+        outcome=outcome,
+        tables=("verdicts", "nearest"),
+        found_if=f"confidence of {SURE:.0%} that all points are; not found where a point is surely farther off",
+    )
+
+
+def _papers(tried: pd.DataFrame) -> Outcome:
+    found = _of(tried, "phi_f")
+    found = found[found[FRICTION] == PAPERS] if len(found) else found
+    if found.empty:
+        return Outcome(note="no runs at it", verdict=Verdict.NOT_RESOLVED)
+    row = found.iloc[0]
+    note = f"{row[MEAN]:.1f} % off on average over {row[COUNTED]} points, at most {row[LARGEST]:+.1f} %"
+    return Outcome(note=note, verdict=_VERDICTS[str(row[VERDICT])])
+
+
+def _common(found: pd.DataFrame) -> Outcome:
+    found = found[found[STAGE].isin(["phi_0", "phi_f"])]
+    if found.empty or found[[LOW, HIGH]].isna().any(axis=None):
+        return Outcome(note="no errors", verdict=Verdict.NOT_RESOLVED)
+    low, high = float(found[LOW].max()), float(found[HIGH].min())
+    common = low <= high
+    note = f"from {low:.2f} to {high:.2f}; " if common else ""
+    return Outcome(note=note + _told_all(found), verdict=Verdict.FOUND if common else Verdict.NOT_FOUND)
+
+
+def of_steel(surface: str) -> Finding:
+    """Make the finding that the friction that φ_f asks for is that of steel."""
+    least, most = STEEL[surface]
+
+    def outcome(found: pd.DataFrame) -> Outcome:
+        found, judged = found[found[STAGE] == "phi_f"], Verdict.NOT_RESOLVED
+        if len(found) and found[[LOW, HIGH]].notna().all(axis=None):
+            if ((found[LOW] >= least) & (found[HIGH] <= most)).all():
+                judged = Verdict.FOUND
+            elif ((found[LOW] > most) | (found[HIGH] < least)).any():
+                judged = Verdict.NOT_FOUND
+        return Outcome(note=_told_all(found), verdict=judged)
+
+    return Finding(
+        id=f"{surface.replace(',', '').replace(' ', '-')}",
+        says=f"The friction that phi_f asks for is that of {surface} (static, as published: {least:g} to {most:g})",
+        outcome=outcome,
+        tables=("crossings",),
+        found_if="its 95 % intervals lie within what is published; not found where one lies beyond",
+    )
+
+
+def _grows(grown: pd.DataFrame) -> list[Effect]:
+    late = grown[GROWTHS[-1]].dropna()
+    mean = mean_over_seeds(late.tolist())
+    text = f"{told_number(mean.value, '+.1f', mean.half_width)} % over {mean.count} points"
+    return [Effect(label="growth, ± 95 %,", value=mean, text=text)]
+
+
+def _grows_more(grown: pd.DataFrame) -> list[Effect]:
+    known = grown[grown[GROWTHS[-1]].notna()]
+    columns = (known[name].tolist() for name in (FRICTION, GROWTHS[-1], ASPECT))
+    slope = slope_within(*columns)
+    text = f"{told_number(slope.value / 10, '+.2f', slope.half_width / 10)} %"
+    return [Effect(label="per 0.1 of friction, ± 95 %,", value=slope, text=text)]
+
+
+def _growing(name: str, says: str, outcome: Callable[[pd.DataFrame], list[Effect]]) -> Finding:
+    return Finding(id=name, says=says, outcome=outcome, tables=("growth",), found_if="beyond the scatter over points")
+
+
+_LATE = f"between {TIMES[-2]:g} and {TIMES[-1]:g} s"
+FINDINGS = (
+    *map(one_friction, JUDGED),
+    Finding(
+        id="papers-friction",
+        says=f"The paper's friction, {PAPERS:g}, brings phi_f within {MARGIN:g} % of Gravish's at every l/w measured",
+        outcome=_papers,
+        tables=("verdicts",),
+        found_if=f"confidence of {SURE:.0%} that all points are; not found where a point is surely farther off",
+    ),
+    Finding(
+        id="common-friction",
+        says="There is a friction that neither phi_0 nor phi_f excludes at 95 % at any l/w",
+        outcome=_common,
+        tables=("crossings",),
+        found_if="the 95 % intervals of all crossings overlap",
+    ),
+    *map(of_steel, STEEL),
+    _growing("still-grows", f"phi still grows {_LATE} of shaking", _grows),
+    _growing("grows-more-with-friction", f"phi grows more {_LATE} where friction is stronger", _grows_more),
+)
+
+
+def _draw(path: Path, analysis: Analysis) -> list[Path]:
+    """Draw φ against friction, a panel for each l/w, with Gravish's values."""
+    means, found, reference = analysis.points, analysis.tables["crossings"], read_reference()
+    ratios = sorted(means[ASPECT].unique())
+    figure = style.blank_figure(max(2.05 * len(ratios) + 0.4, 4.8), 2.75)
+    panels = figure.subplots(1, len(ratios), sharey=True, squeeze=False)[0]
+    shapes = {"phi_0": ("D", style.BLUE, "white"), "phi_f relaxed": ("^", style.SKY, style.SKY)}
+    shapes["phi_f"] = ("D", style.BLUE, style.BLUE)
+    for axes, ratio in zip(panels, ratios, strict=True):
+        for stage, shape in shapes.items():
+            part = means[(means[ASPECT] == ratio) & (means[STAGE] == stage)]
+            look = {**plots.marker(*shape), "linestyle": "-"}
+            label = f"{stage} {STAGES[stage].replace(' that follows shaking', '')}"
+            plots.draw_means(axes, part[FRICTION], part[PHI], part[marked(PHI, "95 %")], look=look, label=label)
+        for stage, line in (("phi_0", (0, (4, 2))), ("phi_f", "solid")):
+            value = reference_at(reference, ratio, stage)
+            if math.isfinite(value):
+                edges = value - DIGITISING_ERROR, value + DIGITISING_ERROR
+                axes.axhspan(*edges, color=style.ORANGE, alpha=0.18, linewidth=0)
+                axes.axhline(value, color=style.ORANGE, linewidth=0.9, linestyle=line, label=f"Gravish, {stage}")
+        for _, row in found[(found[ASPECT] == ratio) & found[STAGE].isin(["phi_0", "phi_f"])].iterrows():
+            if math.isfinite(row[FRICTION]):
+                ends = np.clip([row[LOW], row[HIGH]], row[FIRST], row[LAST])
+                axes.plot(ends, [row[REFERENCE]] * 2, color=style.BLACK, linewidth=0.8, zorder=4)
+                axes.plot(row[FRICTION], row[REFERENCE], "x", color=style.BLACK, markersize=4.5, zorder=5)
+        axes.set_title(f"$l/w = {ratio:g}$", fontsize=8)
+        axes.set_xlabel(r"coefficient of friction $\mu$ [-]")
+    panels[0].set_ylabel(r"packing fraction $\phi$ [-]")
+    panels[0].set_ylim(bottom=0)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    told = "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured."
+    below = [told, told_reference(ratios, ("phi_0", "phi_f"))]
+    return plots.finished(figure, path, below, analysis.footer, pooled=True)
+
+
+STUDY = Study(
+    name="friction",
+    title="Friction that packs smarticles as Gravish et al. 2012 found",
+    measure=measure,
+    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=FRICTION, label="friction", form="g")),
+    quantities=(
+        Quantity(column=PHI, label="φ_f", form=".4f", meaning="packing fraction at a stage"),
+        Quantity(column=DEVIATION, label="from Gravish [%]", form="+.1f", meaning="less Gravish's, over it"),
+    ),
+    findings=FINDINGS,
+    figures=(
+        Drawing(name="phi_friction", of=_draw),
+        Histories(
+            name="phi_time",
+            history=while_shaken,
+            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
+            panels=ASPECT,
+            panel="l/w = {:g}",
+            width=WINDOW,
+            log=True,
+            x_label="time since shaking began [s]",
+            y_label=r"packing fraction $\phi$ [-]",
+        ),
+    ),
+    extra=tabulate,
+    shown=lambda means: means[means[STAGE] == "phi_f"],
+    order=(ASPECT, FRICTION, SEED),
+    one_engine=True,
+    from_tables=True,
+    remarks=(
+        f"φ by {DEFINITION}; {WHEN}; in the course of shaking a mean over {WINDOW:g} s. Gravish et al. shook for "
+        f"{SHAKE_TIME:g} s. The scatter behind errors is relative to the mean, pooled over all points of a stage.",
+    ),
+    reference=GRAVISH,
+    pictured={"l_over_w": 0.7, "friction": 0.65},
+)

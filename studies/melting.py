@@ -1,0 +1,305 @@
+"""The container's wall is taken away, at once or lifted, after shape change, internal or external oscillation or none.
+
+What holds together, spreads, comes off or falls over within 2 s, against Savoie, Tuazon, Bhamla and Goldman, "Amorphous
+Entangled Active Matter", Soft Matter 2023, section "Melting behavior". Runs of one l/w and seed were poured alike and
+are compared pair by pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from dem.record.run import Run
+from postprocess.measures.heights import heights
+from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile, has_toppled
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.pairs import mean_difference, pairs
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework.figures import Times, by_procedure
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, mean, means_by
+from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
+from studies.framework.quantities import Key, Quantity
+from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.runs import MeasuredRun, duration
+from studies.framework.study import Study
+
+WHOLE = 0.95  # of the smarticles in one cluster: of 60, no more than 2 apart
+SAME_WIDTH = 0.05  # of a pile's radius; smarticles are 0.5 of it long
+
+LIFT, SINCE = "lift speed [m/s]", "time since the wall began to go [s]"
+BASE, TOP, CENTRE = "radius of 95 % before [m]", "height of 95 % before [m]", "com height before [m]"
+CONTACT, ENTANGLED = "largest cluster by contact [-]", "largest cluster by crossings [-]"
+HEIGHT, TOP_KEPT = "com height over that before [-]", "height of 95 % over that before [-]"
+SPREAD, SLOUGHED = "radius of 95 % over that before [-]", "sloughed [-]"
+TILT, OFFSET, TOPPLED = "tilt [degree]", "com offset over the base's radius [-]", "toppled [-]"
+
+QUANTITIES = tuple(
+    Quantity(column=column, label=label, form=form, meaning=meaning)
+    for column, label, form, meaning in (
+        (
+            BASE,
+            "radius before [m]",
+            ".4f",
+            "radius about the centre of mass that holds 95 % of it, with the wall",
+        ),
+        (TOP, "height before [m]", ".4f", "height below which 95 % of the material lies, with the wall"),
+        (CENTRE, "", "", "height of the centre of mass, with the wall"),
+        (CONTACT, "cluster by contact", ".3f", "share of the smarticles in the largest cluster joined by contact"),
+        (ENTANGLED, "by crossings", ".3f", "share in the largest cluster joined by links that pass through planes"),
+        (HEIGHT, "h/h0", ".3f", "height of the centre of mass over that with the wall"),
+        (TOP_KEPT, "", "", "height below which 95 % of the material lies, over that with the wall"),
+        (SPREAD, "radius / before", ".2f", "radius that holds 95 % of the material, over that with the wall"),
+        (
+            SLOUGHED,
+            "sloughed",
+            ".3f",
+            "share whose centre of mass is farther from the middle than the wall was by w/2",
+        ),
+        (TILT, "tilt [deg]", ".1f", "angle from the vertical of the line from the foot to the centre of mass"),
+        (OFFSET, "", "", "how far the centre of mass moved sideways, over the radius of 95 % before"),
+        (TOPPLED, "toppled", ".2f", "1 where the centre of mass ends beyond the radius of 95 % before, 0 otherwise"),
+    )
+)
+
+
+def measure(run: Run) -> MeasuredRun:
+    """Measure the pile before its wall went, in the end, and of every frame between them."""
+    before, after = around(run)
+    phase = removal(run)
+    settings = run.scene["phases"][phase.index]
+    lift = 0.0 if settings.get("speed_m_per_s") is None else settings["speed_m_per_s"]
+    centre = centre_of_mass(before.vertices)
+    foot = (float(centre[0]), float(centre[1]))
+    levels = heights(before.vertices, floor_z=before.floor_z)
+    base = free_pile(before.vertices, run, floor_z=before.floor_z, foot=foot).radius_most
+    rows = []
+    for frame in (before, *after):
+        pile = free_pile(frame.vertices, run, floor_z=frame.floor_z, foot=foot)
+        level = heights(frame.vertices, floor_z=frame.floor_z)
+        rows.append(
+            {
+                CONTACT: pile.touching,
+                ENTANGLED: pile.entangled,
+                HEIGHT: level.mean_com / levels.mean_com,
+                TOP_KEPT: level.top / levels.top,
+                SPREAD: pile.radius_most / base,
+                SLOUGHED: pile.sloughed,
+                TILT: pile.tilt,
+                OFFSET: pile.offset / base,
+            }
+        )
+    start = before.time if phase.start_s is None else phase.start_s
+    row: dict[str, object] = {
+        **named_columns(run),
+        LIFT: lift,
+        "time without the wall [s]": duration(phase),
+        BASE: base,
+        TOP: levels.top,
+        CENTRE: levels.mean_com,
+        **rows[-1],
+        TOPPLED: float(has_toppled(rows[-1][OFFSET] * base, base)),
+        "scene_sha256": run.manifest.scene_sha256,
+        "run": run.path.name,
+    }
+    history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
+    return MeasuredRun(
+        manifest=run, rows=[row], history=history | {name: np.array([one[name] for one in rows]) for name in rows[0]}
+    )
+
+
+def at_once(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the runs whose wall goes at once."""
+    return runs[runs[LIFT] == 0]
+
+
+def _note(*quantities: str, form: str = ".3f") -> Callable[[pd.DataFrame], str]:
+    """Make the note with the means of each procedure."""
+    return lambda runs: "; ".join(means_by(runs, quantity, PROCEDURE, form) for quantity in quantities)
+
+
+def _narrow_and_high(runs: pd.DataFrame) -> list[Effect]:
+    return [
+        Effect(label="radius of 95 % less static", value=paired(runs, BASE, SHAPE, STATIC), sign=-1, unit=" m"),
+        Effect(label="height of 95 % less static", value=paired(runs, TOP, SHAPE, STATIC), unit=" m"),
+    ]
+
+
+def _low_and_wide(runs: pd.DataFrame) -> list[Effect]:
+    both = pairs(of_procedure(runs, INTERNAL), of_procedure(runs, STATIC), BASE)
+    width = mean_over_seeds(both["one"] / both["other"] - 1)
+    return [
+        Effect(label="com height less static", value=paired(runs, CENTRE, INTERNAL, STATIC), sign=-1, unit=" m"),
+        Effect(label="radius of 95 % over that of static, less 1,", value=width, threshold=-SAME_WIDTH),
+        Effect(label="the same", value=width, sign=-1, threshold=SAME_WIDTH),
+    ]
+
+
+def _topples(runs: pd.DataFrame) -> Outcome:
+    part = of_procedure(runs, SHAPE)
+    fallen, total = int(part[TOPPLED].sum()), len(part)
+    if not total:
+        return Outcome(note="no runs", verdict=Verdict.NO_DATA)
+    # One-sided: the largest share with which none of n falls in one out of twenty.
+    most = "" if fallen else f", so at most {1 - 0.05 ** (1 / total):.0%} of such piles do, at 95 %"
+    offsets = means_by(runs, OFFSET, PROCEDURE, ".3f")
+    return Outcome(
+        note=f"{fallen} of {total} fell over{most}; com offset over the base's radius {offsets}",
+        verdict=Verdict.FOUND if fallen else Verdict.NOT_RESOLVED,
+    )
+
+
+def _lifted(runs: pd.DataFrame) -> Outcome:
+    effects = [
+        Effect(
+            label=f"{name} {label}, lifted less at once,",
+            value=mean_difference(part[part[LIFT] > 0], part[part[LIFT] == 0], quantity),
+        )
+        for name in (INTERNAL, SHAPE)
+        for part in [of_procedure(runs, name)]
+        for quantity, label in ((HEIGHT, "com height kept"), (SLOUGHED, "sloughed"))
+    ]
+    # Either sign is a difference.
+    clear = any(effect.verdict in (Verdict.FOUND, Verdict.NOT_FOUND) for effect in effects)
+    return Outcome(effects=effects, verdict=Verdict.FOUND if clear else None)
+
+
+FINDINGS = (
+    mean(
+        "holds-together",
+        "Shape change: the pile does not break apart",
+        lambda runs: of_procedure(runs, SHAPE)[CONTACT],
+        "largest cluster by contact in the end, after shape change,",
+        rows=at_once,
+        threshold=WHOLE,
+        note=_note(CONTACT),
+    ),
+    above(
+        "entangled",
+        "Shape change holds together by entanglement, more than internal oscillation",
+        ENTANGLED,
+        SHAPE,
+        (INTERNAL, STATIC),
+        of=of_procedure,
+        rows=at_once,
+        note=_note(ENTANGLED),
+        found_if="share in one cluster by crossings in the end above that of each, paired by l/w and seed",
+    ),
+    above(
+        "keeps-its-edge",
+        "Shape change: smarticles at the edge do not come off, unlike after internal oscillation",
+        SLOUGHED,
+        SHAPE,
+        (INTERNAL,),
+        of=of_procedure,
+        sign=-1,
+        rows=at_once,
+        note=_note(SLOUGHED),
+        found_if="the sloughed share is below that after internal oscillation, paired by l/w and seed",
+    ),
+    Finding(
+        id="narrow-and-high",
+        says="Shape change narrows the base and raises the pile",
+        outcome=_narrow_and_high,
+        rows=at_once,
+        found_if="radius < and height > those of static before the wall goes, paired by l/w and seed",
+    ),
+    Finding(
+        id="topples",
+        says="Shape change: the pile may fall onto its side (one example is shown)",
+        outcome=_topples,
+        rows=at_once,
+        found_if="the centre of mass of at least one pile ends beyond its base",
+    ),
+    mean(
+        "sloughs",
+        "Internal oscillation: some smarticles slough off the outer edge",
+        lambda runs: of_procedure(runs, INTERNAL)[SLOUGHED],
+        "sloughed share",
+        rows=at_once,
+    ),
+    Finding(
+        id="low-and-wide",
+        says="Internal oscillation lowers the pile and keeps its width",
+        outcome=_low_and_wide,
+        rows=at_once,
+        found_if=f"com height below that of static, radius within {SAME_WIDTH:.0%} of it, paired by l/w and seed",
+    ),
+    above(
+        "more-stable",
+        "Internal oscillation makes the pile more stable than it was as poured",
+        HEIGHT,
+        INTERNAL,
+        (STATIC,),
+        of=of_procedure,
+        rows=at_once,
+        note=_note(HEIGHT),
+        found_if="share of the com height kept in the end above that of static, paired by l/w and seed",
+    ),
+    Finding(
+        id="lifting-differs",
+        says="(ours, not the paper's) lifting the wall differs from taking it away at once",
+        outcome=_lifted,
+        found_if="a difference in height kept or in the sloughed share, of either procedure, paired by l/w and seed",
+    ),
+)
+
+_LABELS = {
+    STATIC: "static",
+    EXTERNAL: "external oscillation",
+    INTERNAL: r"internal oscillation, $\theta$ = 10°",
+    SHAPE: "shape change",
+}
+
+
+def _against_time(aspect: float, lift: float) -> Times:
+    return Times(
+        name=f"time_lw{aspect:.2f}" + ("_lifted" if lift else ""),
+        quantities={
+            CONTACT: "largest cluster\nby contact [-]",
+            ENTANGLED: "largest cluster\nby crossings [-]",
+            HEIGHT: "height of the centre\nof mass $h/h_0$ [-]",
+            SPREAD: "radius of 95 %\nover that before [-]",
+            SLOUGHED: "sloughed\nshare [-]",
+            TILT: "tilt [degree]",
+        },
+        x=SINCE,
+        x_label="time since the wall went [s]",
+        rows=lambda runs: runs[(runs[ASPECT] == aspect) & (runs[LIFT] == lift)],
+        split=by_procedure(_LABELS),
+        spans={
+            CONTACT: (0.8, 1.02),
+            ENTANGLED: (0.8, 1.02),
+            HEIGHT: (0.8, 1.02),
+            SPREAD: (0.98, 1.2),
+            SLOUGHED: (-0.002, 0.1),
+            TILT: (0.0, 10.0),
+        },
+        told=[f"l/w = {aspect:g}, wall {f'lifted at {lift:g} m/s' if lift else 'gone at once'}."],
+    )
+
+
+STUDY = Study(
+    name="melting",
+    title="Piles whose wall is taken away",
+    measure=measure,
+    keys=(
+        Key(column=LIFT, label="lift [m/s]", form="g"),
+        Key(column=ASPECT, label="l/w", form="g"),
+        Key(column=PROCEDURE, label="procedure", order=ORDER),
+    ),
+    quantities=QUANTITIES,
+    findings=FINDINGS,
+    figures=(
+        *(_against_time(*point) for point in ((0.7, 0.0), (0.7, 0.1), (0.4, 0.0), (1.0, 0.0))),
+        Pictures(labels=_LABELS, select=(LIFT,)),
+    ),
+    order=(LIFT, ASPECT, SEED, PROCEDURE),
+    remarks=(
+        f"Clusters: centrelines within {TOUCHING:g} sphere diameters, or links through planes. Sloughed: farther from "
+        f"the pile's middle (median) than the wall was, by {OUTSIDE:g} w. Numbers are those at the end of the run.",
+    ),
+    pictured={"procedure": SHAPE, "lift_m_per_s": 0, "l_over_w": 0.7},
+)

@@ -1,0 +1,275 @@
+"""The study of accuracy: verdicts from made-up numbers, published tables, and an analysis of made-up runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from synthetic import SyntheticRun, write_run
+from synthetic.hooked import weight, write_hooked_run
+
+from dem.errors import InputError
+from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import marked
+from studies.accuracy import (
+    ACTIVITY,
+    COMPARED,
+    COST,
+    COUNT,
+    EXPECTED,
+    GAP,
+    RESIDUAL,
+    SPHERES,
+    TIME_STEP,
+    VARIANT,
+    WALL,
+    advise,
+    study,
+    work_precision,
+)
+from studies.framework.findings import Outcome
+from studies.framework.runs import ENGINE
+from studies.framework.study import Report, read_runs
+from studies.ladder import Rung
+
+RESULTS = Path(__file__).resolve().parents[2] / "results"
+STEPS = [
+    Rung(knob="time-step", value="0.9", unit="", setting="base"),
+    Rung(knob="time-step", value="0.45", unit="", setting="half"),
+    Rung(knob="time-step", value="0.225", unit="", setting="quarter"),
+]
+RESTITUTIONS = [
+    Rung(knob="restitution", value="0.2", unit="", setting="bouncy"),
+    Rung(knob="restitution", value="0.7", unit="", setting="base"),
+]
+COSTS = {"base": 1.0, "half": 2.0, "quarter": 4.0, "bouncy": 3.0}
+NARROW = np.array([-0.0005, 0, 0.0005])
+
+
+def table_of(
+    phi_f: Mapping[str, Sequence[float] | np.ndarray],
+    rungs: Sequence[Rung] = STEPS,
+    *,
+    phi_0: Mapping[str, float] | None = None,
+) -> pd.DataFrame:
+    """The table of runs whose φ_f is given by setting, one value per seed; costs rise by 1 % from seed to seed."""
+    rows = [
+        {
+            **{VARIANT: setting, SEED: seed, ASPECT: 0.7, COUNT: 60, ACTIVITY: "shake", TIME_STEP: 1e-5, SPHERES: 18},
+            ENGINE: "yade",
+            **{COST: COSTS[setting] * (1 + 0.01 * seed), WALL: 10.0, EXPECTED: 1.0, RESIDUAL: math.nan, GAP: math.nan},
+            **{COMPARED["phi_0"]: (phi_0 or {}).get(setting, 0.1) + 1e-3 * seed, COMPARED["phi_f"]: value},
+            COMPARED["height"]: 3e-3 + 1e-4 * seed,
+            COMPARED["crossings"]: 3.0 + 0.1 * seed,
+            COMPARED["hook_force"]: math.nan,
+        }
+        for setting, values in phi_f.items()
+        for seed, value in enumerate(values, start=1)
+    ]
+    return work_precision(pd.DataFrame(rows), rungs)
+
+
+def verdicts(table: pd.DataFrame) -> dict[str, str]:
+    return dict(zip(table[VARIANT], table["verdict"], strict=True))
+
+
+def advice(table: pd.DataFrame, knob: str = "time-step") -> tuple[str, str]:
+    found: Outcome = advise(table, knob)
+    return str(found.verdict), found.note
+
+
+@pytest.mark.parametrize("name", ["accuracy", "accuracy/reference", "accuracy/oscillation", "accuracy-links"])
+def test_published_tables_follow_from_their_runs(name: str) -> None:
+    folder = RESULTS / name
+    published = pd.read_csv(folder / "work_precision.csv", comment="#", keep_default_na=False, dtype=str)
+    rungs = [
+        Rung(knob=row["knob"], value=row["value"], unit=row["unit"], setting=row["variant"])
+        for _, row in published.iterrows()
+    ]
+    runs = read_runs(folder).assign(**dict.fromkeys({ENGINE, *COMPARED.values()} - set(read_runs(folder)), math.nan))
+    made = work_precision(runs, rungs)
+    assert made["verdict"].tolist() == published["verdict"].tolist()
+    for column in (one for one in published if "error" in one):
+        wanted = pd.to_numeric(published[column]).to_numpy()
+        assert made[column].to_numpy() == pytest.approx(wanted, rel=1e-3, abs=1e-3, nan_ok=True), column
+
+
+def test_errors_and_bands_are_those_put_in() -> None:
+    table = table_of({"base": [0.132, 0.133, 0.134], "quarter": [0.120, 0.121, 0.122]}).set_index(VARIANT)
+    assert table.loc["base", "phi_f error [%]"] == pytest.approx(100 * (0.133 / 0.121 - 1))
+    # Two means of standard error 0.001/√3 each; t(0.975; 4).
+    band = 100 / 0.121 * 2.776445 * 0.001 / math.sqrt(3)
+    assert table.loc["base", "phi_f error 95 % [%]"] == pytest.approx(band * math.sqrt(2), rel=1e-6)
+    assert table.loc["quarter", "phi_f error [%]"] == 0
+    assert table.loc["quarter", "phi_f error 95 % [%]"] == pytest.approx(band)
+    assert table.loc["base", marked(COMPARED["phi_f"], "SE")] == pytest.approx(0.001 / math.sqrt(3))
+    # Three seeds 1 % apart; t(0.975; 2).
+    assert table.loc["base", marked(COST, "95 %")] == pytest.approx(0.01 / math.sqrt(3) * 4.302653)
+    assert table.loc["half", "seeds [-]"] == 0
+    assert math.isnan(table.loc["half", "phi_f error [%]"])
+
+
+def test_pure_scatter_is_not_resolved() -> None:
+    # Null case: every setting has the same distribution. Of many draws at most a few per cent may be resolved in φ_f.
+    draw = np.random.default_rng(0)
+    resolved = 0
+    for _ in range(100):
+        values = {name: 0.12 + 0.004 * draw.standard_normal(3) for name in ("base", "half", "quarter")}
+        resolved += int(table_of(values)["phi_f resolved"].sum())
+    assert 1 <= resolved <= 0.1 * 200
+    table = table_of({name: [0.118, 0.120, 0.122] for name in ("base", "half", "quarter")})
+    assert verdicts(table) == {"base": "not resolved", "half": "not resolved", "quarter": "reference"}
+    verdict, note = advice(table)
+    assert verdict == "found"
+    assert note.startswith("use 0.9, 4 times as fast as 0.225: ")
+    # t(0.975; 6) · 0.002 · √(2/3) / 0.120
+    assert note.endswith("are not resolved with 3 seeds, and 3.3 % in φ cannot be excluded")
+
+
+def test_a_clear_trend_is_resolved() -> None:
+    table = table_of({"base": 0.132 + NARROW, "half": 0.126 + NARROW, "quarter": 0.120 + NARROW})
+    assert verdicts(table) == {"base": "resolved", "half": "resolved", "quarter": "reference"}
+    verdict, note = advice(table)
+    assert verdict == "not found"
+    # All three settings tell the scatter: t(0.975; 6) · 0.0005 · √(2/3) / 0.120 = 0.83 %.
+    assert note.startswith("use 0.225. Cheaper: 0.9: ")
+    assert "φ_f +5.0 ± 0.8 %" in note
+
+
+def test_the_cheapest_unresolved_rung_is_named_and_a_finer_resolved_one_with_it() -> None:
+    table = table_of({"base": 0.126 + NARROW, "half": 0.120 + NARROW, "quarter": 0.120 + NARROW})
+    assert advice(table)[1].startswith("use 0.45, ")
+    odd = table_of({"base": 0.120 + NARROW, "half": 0.126 + NARROW, "quarter": 0.120 + NARROW})
+    assert advice(odd)[1].startswith("use 0.9, ")
+    assert advice(odd)[1].endswith("but errors of a finer rung are resolved: 0.45")
+
+
+def test_another_measure_can_resolve_what_phi_f_does_not() -> None:
+    same = [0.118, 0.120, 0.122]
+    table = table_of({"base": same, "quarter": same}, phi_0={"base": 0.11})
+    assert verdicts(table)["base"] == "resolved"
+    assert table.loc[0, ["phi_0 resolved", "phi_f resolved", "crossings resolved"]].tolist() == [True, False, False]
+
+
+def test_one_seed_resolves_nothing_however_large_the_error() -> None:
+    table = table_of({"base": [0.2], "half": [0.15], "quarter": [0.1]})
+    assert verdicts(table) == {"base": "unknown", "half": "unknown", "quarter": "reference"}
+    assert advice(table)[0] == "no data"
+
+
+def test_the_finest_rung_with_runs_stands_in_for_one_without() -> None:
+    table = table_of({"base": 0.126 + NARROW, "half": 0.120 + NARROW, "quarter": [0.1]})
+    assert set(table["reference"]) == {"half"}
+    assert verdicts(table) == {"base": "resolved", "half": "reference", "quarter": "resolved"}
+
+
+def test_a_sensitivity_is_compared_with_the_scene_itself_and_recommends_nothing() -> None:
+    table = table_of({"base": 0.120 + NARROW, "bouncy": 0.132 + NARROW}, RESTITUTIONS)
+    assert verdicts(table) == {"bouncy": "resolved", "base": "reference"}
+    verdict, note = advice(table, "restitution")
+    assert verdict == "found"
+    assert "against 0.7 resolved: 0.2 (" in note
+    # No finer rung stands in for the scene itself.
+    missing = table_of({"bouncy": 0.132 + NARROW}, RESTITUTIONS)
+    assert set(missing["verdict"]) == {"unknown"}
+
+
+# Whole analyses
+
+ORIGIN = {"note": "knobs time-step of scene.yaml", "command": "smarticles accuracy scene.yaml --out 'my ladder'"}
+
+
+def run(**changes: Any) -> SyntheticRun:
+    keys: dict[str, Any] = {
+        "phases": ("deposit", "relax", "shake", "relax"),
+        "shake_time": 2.0,
+        "frames_per_phase": 2,
+    }
+    return SyntheticRun(**{**keys, **changes})
+
+
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Report]:
+    """Four settings with three seeds each, of which one failed and one was not started."""
+    root = tmp_path_factory.mktemp("ladder")
+    directories = []
+    for setting, level in {"base": 0.130, "half": 0.120, "quarter": 0.120, "bouncy": 0.121}.items():
+        for seed, factor in {1: 0.999, 2: 1.0, 3: 1.001}.items():
+            directories.append(root / f"{setting}_seed{seed}")
+            if (setting, seed) == ("half", 3):
+                continue
+            made = run(
+                seed=seed,
+                packing=(0.1, 0.1 * factor, level * factor, 0.2),
+                wall_s=COSTS[setting] * 2.0,
+                fidelity="standard" if setting == "quarter" else "draft",
+                status="failed" if (setting, seed) == ("bouncy", 1) else "done",
+                more=(("energy_residual_J", -2e-6), ("dissipated_energy_J", 1e-3), ("joint_gap_m", 3e-6)),
+            )
+            write_run(directories[-1], made)
+    expected = {path.name: 4.0 for path in directories}
+    return directories, study(STEPS + RESTITUTIONS, expected).analyse(directories, root / "out", **ORIGIN)
+
+
+def test_runs_are_measured(ladder: tuple[list[Path], Report]) -> None:
+    runs = ladder[1].tables["runs"].set_index("run")
+    row = runs.loc["base_seed2"]
+    assert row[COST] == pytest.approx(1.0)  # 2 s for 2 s of shaking
+    assert row[WALL] == pytest.approx(8.0)  # four phases
+    assert row[EXPECTED] == pytest.approx(2.0)
+    assert row[COMPARED["phi_f"]] == pytest.approx(0.130, rel=1e-4)  # of the shake, not of the relaxation after it
+    assert row[COMPARED["phi_0"]] == pytest.approx(0.1, rel=1e-4)
+    assert (row[RESIDUAL], row[GAP]) == pytest.approx((2e-3, 3e-6))
+    assert len(runs) == 10
+
+
+def test_the_report_advises(ladder: tuple[list[Path], Report]) -> None:
+    _, report = ladder
+    table = report.tables["work_precision"].set_index(["knob", VARIANT])
+    assert table.loc[("time-step", "base"), "phi_f error [%]"] == pytest.approx(100 * (0.13 / 0.12 - 1), rel=1e-3)
+    assert table.loc[("time-step", "half"), "seeds [-]"] == 2
+    assert report.judged[0].ours.startswith("use 0.45, ")
+    assert {"work_precision.csv", "findings.md", "accuracy.png"} <= set(report.files)
+    assert len(report.rows) == 5
+    assert any("10 of 12 runs, 2 missing" in line for line in report.footer)
+
+
+def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path: Path) -> None:
+    # In units of the weight of one smarticle: constant forces, so that the peak is known.
+    phases = ("deposit", "relax", "shake", "pull-hook")
+    directories = []
+    for setting, load in {"base": 3.0, "quarter": 2.0}.items():
+        for seed in (1, 2):
+            made = run(phases=phases, seed=seed, packing=(0.1,) * 4)
+            force = weight(made) * (load + 0.1 * seed)
+            directory = tmp_path / f"{setting}_seed{seed}"
+            directories.append(write_hooked_run(directory, made, lambda time, force=force: np.full_like(time, force)))
+    report = study(STEPS).analyse(directories, tmp_path / "out", **ORIGIN)
+    table = report.tables["work_precision"].set_index(VARIANT)
+    assert table.loc["base", COMPARED["hook_force"]] == pytest.approx(3.15 / run().count)
+    assert table.loc["base", "hook_force error [%]"] == pytest.approx(100 * (3.15 / 2.15 - 1))
+    assert table.loc["base", "hook_force resolved"]
+
+
+@pytest.mark.parametrize(
+    ("name", "made", "message"),
+    [
+        ("x_seed1", {"aspect_ratio": 0.5}, "different aspect ratio .* must not be averaged"),
+        ("x_seed1", {"count": 9}, "different count must not be averaged"),
+        ("a/base_seed1", {}, "setting base with seed 1 is given twice"),
+        ("base_seed9", {}, "none of 1 runs is done; .*not named SETTING_seed1, as runs of a ladder are"),
+        ("base_seed1", {"phases": ("deposit", "relax")}, "no activity after another phase: its phases are deposit,"),
+    ],
+)
+def test_runs_that_cannot_be_compared_are_rejected(
+    ladder: tuple[list[Path], Report], tmp_path: Path, name: str, made: dict[str, Any], message: str
+) -> None:
+    other = write_run(tmp_path / name, run(**made))
+    first = [ladder[0][0]] if "done" not in message and "activity" not in message else []
+    with pytest.raises(InputError, match=message):
+        study(STEPS).analyse([*first, other], tmp_path / "out", **ORIGIN)

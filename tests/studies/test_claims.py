@@ -1,0 +1,149 @@
+"""The list of claims: what it takes from the studies, what it makes of two protocols, and the one that is shipped."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dem.errors import InputError
+from studies.claims.__main__ import main, text
+from studies.claims.verdicts import CLAIMS, Claim, claims
+
+RESULTS = Path(__file__).parents[2] / "results"
+MOST, HIGHEST = "shape change entangles most", "shape-change-most-entangled"
+
+
+def written(folder: Path, verdicts: dict[tuple[str, str], str]) -> Path:
+    """Results of all studies that the list names; every finding is found but those that `verdicts` has."""
+    named = defaultdict(list)
+    for part in yaml.safe_load(CLAIMS.read_text(encoding="utf-8")):
+        for entry in part["claims"]:
+            for key in ("text", "code", "text_instead", "code_instead"):
+                if key in entry and entry[key][1] not in named[entry[key][0]]:
+                    named[entry[key][0]].append(entry[key][1])
+    for study, findings in named.items():
+        (folder / study).mkdir(parents=True)
+        with (folder / study / "findings.csv").open("w", encoding="utf-8", newline="") as file:
+            out = csv.writer(file)
+            out.writerow(("finding in the paper", "ours", "verdict", "criterion", "needed", "id"))
+            for one in findings:
+                out.writerow((one, "ours", verdicts.get((study, one), "found"), "criterion", "three runs", one))
+            file.write(f"# Study {study}\n")
+        rows = "seed,smarticles [-],aspect ratio [-]\n1,494,0.4\n2,168,1.1\n# Study\n"
+        (folder / study / "runs.csv").write_text(rows)
+        (folder / study / "provenance.json").write_text(json.dumps({"runs": [{"versions": {"links": "x"}}]}))
+    return folder
+
+
+def one_of(found: tuple[Claim, ...], says: str) -> Claim:
+    """The claim that says so."""
+    (claim,) = [claim for claim in found if claim.says == says]
+    return claim
+
+
+def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
+    folder = written(tmp_path, {})
+    (folder / "procedures-code" / "points.csv").write_text("point,seeds [-]\na,16\nb,8\n# Study\n")
+    found = claims(folder)
+    assert [claim.number for claim in found] == list(range(1, len(found) + 1))
+    assert {claim.verdict for claim in found} == {"reproduced", "not testable"}
+    most = one_of(found, MOST)
+    assert most.text is not None
+    assert most.code is not None
+    assert most.text.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 2 seeds, links"
+    assert most.code.basis == "168 – 494 smarticles, l/w 0.4 – 1.1, 8 – 16 seeds, links"
+
+
+@pytest.mark.parametrize(
+    ("by_text", "by_code", "verdict"),
+    [
+        ("not found", "found", "partly"),
+        ("not resolved", "found", "partly"),
+        ("not found", "not found", "not"),
+        ("not found", "not resolved", "not"),
+        ("not resolved", "not resolved", "not resolved"),
+        ("no data", "found", "reproduced"),
+        ("no data", "no data", "no data"),
+    ],
+)
+def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: str, verdict: str) -> None:
+    results = written(tmp_path, {("procedures", HIGHEST): by_text, ("procedures-code", HIGHEST): by_code})
+    claim = one_of(claims(results), MOST)
+    assert claim.verdict == verdict
+    assert f"**{verdict}**" in text((claim,))
+    assert f"| {verdict}: ours; three runs |" in text((claim,)) or by_text != by_code
+
+
+@pytest.mark.parametrize(
+    ("by_theirs", "by_ours", "verdict"),
+    [
+        ("not resolved", "found", "reproduced"),
+        ("not resolved", "not found", "not"),
+        ("no data", "found", "reproduced"),
+        ("not resolved", "not resolved", "not resolved"),
+        ("not found", "found", "not"),
+    ],
+)
+def test_a_test_of_ours_decides_where_theirs_cannot_tell(
+    tmp_path: Path, by_theirs: str, by_ours: str, verdict: str
+) -> None:
+    strongest = "shape-change-strongest"
+    theirs = {(study, strongest): by_theirs for study in ("fracture", "fracture-code")}
+    ours = {(study, strongest): by_ours for study in ("strength", "strength-code")}
+    claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
+    assert claim.verdict == verdict
+    assert "; by a test of ours, strength-code: " in text((claim,))
+
+
+@pytest.mark.parametrize(
+    ("links", "yade", "told"),
+    [
+        ("found", "found", "1 claims: 1 verdicts are the same. Opposite, for the reason told there: none"),
+        ("found", "not found", "0 verdicts are the same. Opposite, for the reason told there: 37 by the text. Links"),
+        ("not found", "not resolved", "by more runs: 37 by the text. YADE alone: none"),
+        ("not resolved", "not found", "by more runs: none. YADE alone: 37 by the text."),
+        ("found", "no data", "asked 0 findings of 0 claims"),
+    ],
+)
+def test_where_engines_do_not_agree_is_told(tmp_path: Path, links: str, yade: str, told: str) -> None:
+    results = written(tmp_path, {("procedures", HIGHEST): links})
+    shutil.copytree(results / "procedures", results / "procedures-yade")
+    findings = results / "procedures-yade" / "findings.csv"
+    findings.write_text(f"finding in the paper,ours,verdict,criterion\n{HIGHEST},ours,{yade},criterion\n")
+    page = text((one_of(claims(results), MOST),))
+    assert told in page
+    assert ("(otherwise on YADE)" in page) == ((links, yade) == ("found", "not found"))
+
+
+def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
+    results = written(tmp_path, {})
+    findings = results / "chain" / "findings.csv"
+    findings.write_text(findings.read_text().replace("widens", "narrows"))
+    with pytest.raises(InputError, match="chain: has no finding 'widens'"):
+        claims(results)
+    findings.unlink()
+    with pytest.raises(InputError, match=r"chain: has neither findings\.csv nor"):
+        claims(results)
+
+
+def test_what_is_shipped_says_what_the_tables_beside_it_say() -> None:
+    found = claims(RESULTS)
+    assert (RESULTS / "CLAIMS.md").read_text(encoding="utf-8") == text(found), "run `make claims`"
+    # Nothing is claimed without a number: every claim that was tested has ours, and every other one says why not.
+    for claim in found:
+        tested = [one for one in (claim.text, claim.code) if one is not None]
+        assert all(one.ours for one in tested)
+        assert tested or claim.why
+
+
+def test_the_command_writes_page_and_table(tmp_path: Path) -> None:
+    results = written(tmp_path, {})
+    main([str(results)])
+    assert (results / "CLAIMS.md").read_text(encoding="utf-8").startswith("# The paper's claims")
+    assert (results / "claims.csv").is_file()

@@ -1,0 +1,149 @@
+"""The study of friction: curves that cross Gravish's values, and each finding from data that deserve each verdict."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from synthetic import SyntheticRun, write_run
+
+from postprocess.statistics.columns import ASPECT
+from postprocess.statistics.seeds import Scatter
+from studies.framework.provenance import DIGITISING_ERROR
+from studies.framework.shaken import FRICTION, phi
+from studies.friction import GROWTHS, STUDY, Curve
+
+ORIGIN = {"note": "the full study as shipped", "command": "smarticles study friction --out friction"}
+FRICTIONS = np.array([0.2, 0.4, 0.6, 0.8])
+# Gravish's φ_0 and φ_f; there is no φ_0 at l/w = 1.
+GRAVISH = {0.4: (0.1425, 0.163), 0.7: (0.105, 0.130), 1.0: (None, 0.105)}
+
+
+def curve(reference: float, half_width: float = 0.004, packing: Any = 0.20 - 0.2 * (FRICTIONS - 0.2)) -> Curve:
+    """Make a curve whose φ falls by two thousandths per hundredth of friction."""
+    widths = np.full(len(packing), half_width)
+    scatter = Scatter(value=0.01, freedom=20)
+    keys = {"friction": FRICTIONS[: len(packing)], "packing": np.asarray(packing), "half_widths": widths}
+    return Curve(**keys, reference=reference, scatter=scatter)
+
+
+def test_the_error_of_friction_is_that_of_packing_over_the_slope() -> None:
+    value, low, high, place = curve(0.16, half_width=0.0).crossing()
+    assert (value, place) == (pytest.approx(0.4), "within the range")
+    assert (low, high) == pytest.approx((0.4 - DIGITISING_ERROR / 0.2, 0.4 + DIGITISING_ERROR / 0.2), abs=0.0011)
+
+
+@pytest.mark.parametrize(
+    ("reference", "value", "interval"), [(0.05, math.inf, (0.8, math.inf)), (0.25, -math.inf, (-math.inf, 0.2))]
+)
+def test_beyond_what_was_measured_nothing_is_extrapolated(
+    reference: float, value: float, interval: tuple[float, float]
+) -> None:
+    assert curve(reference).crossing()[:3] == (value, *interval)
+
+
+def test_odd_curves_have_crossings() -> None:
+    # Scatter that crosses twice gives the middle; one within the error of the last point an open interval.
+    assert curve(0.15, packing=[0.2, 0.14, 0.16, 0.1]).crossing()[0] == pytest.approx((11 / 30 + 19 / 30) / 2)
+    assert curve(0.081).crossing()[2] == math.inf
+    assert math.isnan(curve(0.15, half_width=math.nan).crossing()[1])
+    assert curve(0.15, packing=[0.2]).crossing()[0] == math.inf
+    # At the edge of the 95 % interval it is 97.5 % sure that φ is on one side of Gravish's.
+    error = float(curve(0.16).error(np.array([0.4]))[0])
+    assert curve(0.16 - error).within(10.0, 0.4) == pytest.approx(1)
+    assert curve(0.16 - 2 * error).within(error, 0.4) == pytest.approx(0.025, abs=1e-3)
+
+
+def runs_of(
+    *, at: float = 0.5, before: float | None = None, relaxed: float = 1.08, noise: float = 0.002
+) -> pd.DataFrame:
+    """φ is Gravish's at the friction `at`, φ_0 at `before` if elsewhere, and falls by 0.6 of it per 1."""
+    rows = []
+    for aspect, (initial, final) in GRAVISH.items():
+        for friction in (0.2, 0.4, 0.5, 0.65, 0.8):
+            fall_0, fall_f = (1 - 0.6 * (friction - place) for place in (at if before is None else before, at))
+            for seed, factor in ((1, 1 - noise), (2, 1.0), (3, 1 + noise)):
+                first, last = (initial or 0.09) * fall_0 * factor, final * fall_f * factor
+                stages = {"phi_0": first, "phi 5 s": 0.9 * last, "phi 10 s": 0.95 * last, "phi 20 s": last}
+                stages |= {"phi_f": last, "phi_f relaxed": 1.08 * last}
+                place = {ASPECT: aspect, FRICTION: friction, "seed": seed, "smarticles [-]": 9}
+                rows.append(place | {phi(stage): value for stage, value in stages.items()})
+    return pd.DataFrame(rows)
+
+
+def verdicts(runs: pd.DataFrame) -> dict[str, str]:
+    return {one.finding.id: str(one.verdict) for one in STUDY.judge(STUDY.tabulate(runs))}
+
+
+def test_points_have_the_error_of_their_seeds_and_deviations_also_gravishs() -> None:
+    tables = STUDY.tabulate(runs_of())
+    row = tables["points"].set_index(["stage", ASPECT, FRICTION]).loc[("phi_f", 0.7, 0.5)]
+    half_width = 2.042272 * 0.002 * 0.130 / math.sqrt(3)  # t(0.975; 30), pooled over 15 points
+    assert (row["phi [-]"], row["phi 95 % [-]"]) == pytest.approx((0.130, half_width), rel=1e-3)
+    assert row["deviation 95 % [%]"] == pytest.approx(100 * math.hypot(half_width, 0.003) / 0.130, rel=1e-3)
+    found = tables["crossings"].set_index(["stage", ASPECT])[FRICTION]
+    assert found["phi_f"].tolist() == pytest.approx([0.5] * 3)
+    assert len(found["phi_0"]) == 2
+    assert tables["growth"][GROWTHS[1]].tolist() == pytest.approx([100 * (1 / 0.95 - 1)] * 15)
+
+
+def test_one_friction_for_all_is_found_and_different_ones_are_refused() -> None:
+    found = verdicts(runs_of())
+    assert (found["one-friction-phi-0-and-phi-f"], found["common-friction"]) == ("found", "found")
+    # At rest again piles are 8 % denser: another friction would do, but not together with φ_0.
+    assert found["one-friction-phi-f-relaxed"] == "found"
+    assert found["one-friction-phi-0-and-phi-f-relaxed"] != "found"
+    apart = verdicts(runs_of(before=0.2, at=0.8))
+    assert (apart["one-friction-phi-0"], apart["one-friction-phi-0-and-phi-f"]) == ("found", "not found")
+    assert apart["common-friction"] == "not found"
+    assert verdicts(runs_of(noise=0.2))["one-friction-phi-f"] == "not resolved"
+
+
+@pytest.mark.parametrize(
+    ("at", "papers", "steel"),
+    [(0.4, "found", ("found", "not found")), (0.76, "not found", ("not found", "found"))],
+)
+def test_the_papers_friction_and_steel_are_judged(at: float, papers: str, steel: tuple[str, str]) -> None:
+    found = verdicts(runs_of(at=at, noise=1e-4))
+    assert found["papers-friction"] == papers
+    # Reading Gravish's points to 0.003 makes ± 0.03 to 0.05 of friction, more than clean steel spans.
+    assert found["dry-steel-as-it-comes"] == steel[0]
+    assert found["clean-dry-steel"] in (steel[1], "not resolved")
+
+
+def test_growth_is_judged_by_all_points() -> None:
+    runs = runs_of()
+    runs[phi("phi 20 s")] *= 1 + 0.02 * runs[FRICTION]
+    names = ("still-grows", "grows-more-with-friction")
+    assert [verdicts(runs)[name] for name in names] == ["found", "found"]
+    runs[phi("phi 20 s")] = runs[phi("phi 10 s")] * (0.99 - 0.02 * runs[FRICTION])
+    assert [verdicts(runs)[name] for name in names] == ["not found", "not found"]
+    assert verdicts(runs.drop(columns=phi("phi 20 s")))["still-grows"] == "no data"
+
+
+def test_what_was_put_into_runs_is_found(tmp_path: Path) -> None:
+    runs = []
+    for friction, seed in ((0.2, 1), (0.2, 2), (0.8, 1), (0.8, 2)):
+        factor = (1 + 0.01 * (-1) ** seed) * (1 - 0.6 * (friction - 0.5))
+        packing = tuple(factor * share for share in (0.09, 0.105, 0.13, 0.14))
+        run = SyntheticRun(aspect_ratio=0.7, seed=seed, packing=packing, friction=friction)
+        runs.append(write_run(tmp_path / f"mu{friction}_{seed}", run))
+    other = write_run(tmp_path / "other", SyntheticRun(friction=0.4, friction_wall=0.2))
+    report = STUDY.analyse([*runs, other], tmp_path / "out", **ORIGIN)
+    row, factor = report.tables["runs"].set_index("run").loc["mu0.2_2"], 1.01 * 1.18
+    assert [row[phi(stage)] / factor for stage in ("phi_0", "phi_f", "phi_f relaxed")] == pytest.approx(
+        [0.105, 0.13, 0.14], rel=1e-4
+    )
+    for time in (5, 10, 20):
+        # The series rises as 1 - exp(-5 t / 20 s); the mean over the last second lies a little below.
+        value = factor * (0.105 + 0.025 * (1 - math.exp(-(time - 0.45) / 4)))
+        assert row[phi(f"phi {time} s")] == pytest.approx(value, rel=2e-3)
+    assert report.tables["crossings"].set_index("stage").loc["phi_f", FRICTION] == pytest.approx(0.5, abs=1e-3)
+    assert {"phi_friction.png", "phi_time.png", "crossings.csv"} <= set(report.files)
+    assert "friction is 0.4 between smarticles, 0.2 at walls" in report.missing[0].cause
+    assert json.loads((tmp_path / "out" / "provenance.json").read_text())["study"] == "friction"

@@ -1,0 +1,270 @@
+"""The ladder of accuracy: its rungs, what is left out, and the sweep that it becomes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dem.errors import InputError
+from dem.phases.gaits.drive import actuated
+from dem.scene.reading import load_scene, scene_hash
+from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES, fidelities
+from studies.ladder import (
+    ACTIVITIES,
+    ACTUATED,
+    BASE,
+    KNOBS,
+    Ladder,
+    affordable,
+    build_ladder,
+    default_seeds,
+    ladder_sweep,
+    parse_knobs,
+    parse_seeds,
+)
+from templates.sweep.expand import expand
+
+SCENE = """\
+schema_version: 1
+name: "pile {{ of }} {% steel"
+seed: 7
+count: 20
+fidelity: draft
+phases:
+  - {type: deposit}
+  - {type: relax, duration_s: 0.3}
+  - {type: shake, duration_s: 1.5}
+"""
+OSCILLATION = SCENE.replace("{type: shake, duration_s: 1.5}", "{type: internal-oscillation, theta_deg: 10}")
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Scene:
+    return scene_of(tmp_path)
+
+
+def scene_of(folder: Path, text: str = SCENE, *settings: str) -> Scene:
+    file = folder / "scene.yaml"
+    file.write_text(text, encoding="utf-8")
+    return load_scene(file, settings)
+
+
+def labels(ladder: Ladder, knob: str) -> list[tuple[str, str]]:
+    return [(rung.label, rung.setting) for rung in ladder.rungs if rung.knob == knob]
+
+
+def test_each_knob_goes_from_coarse_to_fine(scene: Scene) -> None:
+    ladder = build_ladder(scene, source="scene.yaml")
+    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "fidelity")
+    assert labels(ladder, "time-step") == [("0.9", BASE), ("0.45", "time-step-0.45"), ("0.225", "time-step-0.225")]
+    assert labels(ladder, "stiffness") == [
+        ("250 N/m", BASE),
+        ("500 N/m", "stiffness-x2"),
+        ("1000 N/m", "stiffness-x4"),
+    ]
+    assert [name for name, _ in labels(ladder, "section")] == ["pitch 1.3", "pitch 1", "pitch 0.5", "two rows"]
+    assert [name for name, _ in labels(ladder, "restitution")] == ["0.2", "0.5", "0.7", "0.9"]
+    assert labels(ladder, "fidelity") == [("draft", BASE), ("standard", "standard"), ("reference", "reference")]
+    references = {knob: rung.label for knob, rung in ladder.references().items()}
+    assert references == {
+        "time-step": "0.225",
+        "stiffness": "1000 N/m",
+        "section": "two rows",
+        "restitution": "0.7",
+        "fidelity": "reference",
+    }
+    assert ladder.left_out == ()
+
+
+def test_a_rung_differs_from_the_scene_in_its_knob_alone(scene: Scene) -> None:
+    ladder = build_ladder(scene, source="scene.yaml")
+    base = scene.model_dump()
+    for rung in ladder.rungs:
+        varied = ladder.scenes[rung.setting].model_dump()
+        differing = {key for key in base if varied[key] != base[key]}
+        assert differing == (
+            set() if rung.setting == BASE else {"contact" if rung.knob == "restitution" else "fidelity"}
+        )
+    turned = ladder.scenes["time-step-0.45"].fidelity
+    assert turned == scene.fidelity.model_copy(update={"time_step_fraction": 0.45})
+    assert ladder.scenes["stiffness-x4"].fidelity.stiffness_N_per_m == 1000
+    rows = ladder.scenes["two-rows"].fidelity
+    assert (rows.rows, rows.pitch, rows.diameter_m) == (2, 1.0, None)
+    assert ladder.scenes["reference"].fidelity.model_dump().items() >= FIDELITIES["reference"].items()
+
+
+def test_the_scene_is_run_once_and_each_setting_once_per_seed(scene: Scene) -> None:
+    ladder = build_ladder(scene, source="scene.yaml")
+    points = expand(ladder_sweep(scene, ladder, (7, 3)))
+    assert len(points) == 2 * len(ladder.settings) == 26
+    # All settings with the first seed come first; its base is the scene itself, name and all.
+    assert [point.name for point in points[:2]] == ["base_seed7", "time-step-0.45_seed7"]
+    assert points[0].scene_sha256 == scene_hash(scene)
+    assert {point.scene.seed for point in points[13:]} == {3}
+    assert {point.name.removesuffix("_seed7") for point in points[:13]} == set(ladder.settings)
+
+
+def test_the_scene_has_its_own_place_among_the_rungs(tmp_path: Path) -> None:
+    settings = ("fidelity.time_step_fraction=0.6", "fidelity.pitch=1.1", "contact.restitution=0.6")
+    ladder = build_ladder(scene_of(tmp_path, SCENE, *settings), source="scene.yaml")
+    assert [name for name, setting in labels(ladder, "time-step")] == ["0.9", "0.6", "0.45", "0.225"]
+    for knob, own in {"time-step": "0.6", "section": "pitch 1.1", "restitution": "0.6"}.items():
+        assert (own, BASE) in labels(ladder, knob)
+    assert ladder.references()["restitution"].label == "0.6"
+    # No named fidelity is the scene itself.
+    assert labels(ladder, "fidelity")[0] == ("draft", "draft")
+
+
+def test_a_diameter_by_hand_is_a_rung_of_its_own(tmp_path: Path) -> None:
+    ladder = build_ladder(
+        scene_of(tmp_path, SCENE, "fidelity.diameter_m=1.2e-3"), source="scene.yaml", knobs=["section"]
+    )
+    names = labels(ladder, "section")
+    assert names[0] in [("pitch 1.3", "pitch-1.3"), ("pitch 1.3 d 1.2 mm", BASE)]
+    assert {BASE, "pitch-1.3"} <= {setting for _, setting in names}
+    assert ladder.scenes["pitch-1.3"].fidelity.diameter_m is None
+
+
+def test_a_scene_of_two_rows_is_compared_with_what_is_finer_yet(tmp_path: Path) -> None:
+    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=reference"), source="scene.yaml", knobs=["section"])
+    assert labels(ladder, "section")[3:] == [
+        ("two rows", BASE),
+        ("two rows of pitch 0.5", "two-rows-of-pitch-0.5"),
+        ("four rows", "four-rows"),
+    ]
+    spheres = [len(ladder.scenes[name].particle.centres) for _, name in labels(ladder, "section")[3:]]
+    assert spheres[1] > 1.9 * spheres[0]
+    assert spheres[2] == 2 * spheres[0]
+
+
+def test_settings_that_differ_in_nothing_but_their_name_run_once(tmp_path: Path) -> None:
+    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=standard"), source="scene.yaml")
+    assert labels(ladder, "fidelity") == [("draft", "draft"), ("standard", BASE), ("reference", "two-rows")]
+
+
+def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
+    ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
+    assert ladder.knobs == tuple(knob for knob in KNOBS if knob != "engine")
+    assert [name for name, _ in labels(ladder, "control")] == ["0.0004 s", "0.0002 s", "0.0001 s"]
+    assert [name for name, _ in labels(ladder, "hinge")] == ["5000 N/m", "10000 N/m", "20000 N/m"]
+    assert ladder.scenes["control-0.0001"].fidelity.control_interval_s == 1e-4
+    assert ladder.scenes["hinge-x2"].fidelity.hinge_stiffness_N_per_m == 10000
+
+
+def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, OSCILLATION, "engine=links", "fidelity=standard")
+    ladder = build_ladder(scene, source="scene.yaml")
+    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "control", "fidelity")
+    own = f"{scene.fidelity.stiffness_N_per_m:g} N/m"
+    values = [f"{k:g} N/m" for k in (125, 250, 500, 1000, 2000, 4000)]
+    assert labels(ladder, "stiffness") == [
+        (value, BASE if value == own else f"stiffness-{value.removesuffix(' N/m')}") for value in values
+    ]
+    assert [name for name, _ in labels(ladder, "section")] == ["1 strand", "2 strands", "3 strands"]
+    idle = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
+    assert len({tuple(getattr(one.fidelity, key) for key in idle) for one in ladder.scenes.values()}) == 1
+    # Named fidelities are those of the engine, and run once where a knob alone makes them.
+    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference", "converged"]
+    for rung in ladder.rungs:
+        if rung.knob == "fidelity" and rung.value != "converged":
+            turned = ladder.scenes[rung.setting].fidelity.model_dump()
+            assert {key: turned[key] for key in turned if key != "base"}.items() >= fidelities("links")[
+                rung.value
+            ].items()
+    with pytest.raises(InputError, match="--knobs: hinge turns nothing: the engine links has no pins"):
+        build_ladder(scene, source="scene.yaml", knobs=["hinge"])
+
+
+@pytest.mark.parametrize("engine", ["yade", "links"])
+def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: str, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SCENE, f"engine={engine}", "fidelity=standard")
+    ladder = build_ladder(scene, source="scene.yaml", knobs=["engine"])
+    found = dict(labels(ladder, "engine"))
+    assert list(found) == [*(f"{one} {name}" for one in ("yade", "links") for name in FIDELITIES), "links converged"]
+    assert found[f"{engine} standard"] == BASE
+    assert ladder.references()["engine"].label == "links converged"
+    finer, finest = (ladder.scenes[found[f"links {name}"]].fidelity for name in ("converged", "reference"))
+    assert finer.rows > finest.rows
+    assert finer.stiffness_N_per_m > finest.stiffness_N_per_m
+    del found["links converged"]
+    for name, setting in found.items():
+        one = ladder.scenes[setting]
+        assert one.engine == name.split()[0]
+        assert one.fidelity.model_dump().items() >= fidelities(one.engine)[name.split()[1]].items()
+    points = {point.name: point.scene for point in expand(ladder_sweep(scene, ladder, (7,)))}
+    assert {points[f"{setting}_seed7"].engine for setting in found.values()} == {"yade", "links"}
+
+
+def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
+    assert default_seeds(scene_of(tmp_path)) == (1, 2, 3)
+    assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
+
+
+def test_types_of_phase_that_actuate_are_those_of_the_simulator(tmp_path: Path) -> None:
+    phase = scene_of(tmp_path, OSCILLATION).phases[-1]
+    assert actuated(phase)
+    assert phase.type in ACTUATED
+    shaken = scene_of(tmp_path).phases[-1]
+    assert not actuated(shaken)
+    assert shaken.type in ACTIVITIES - ACTUATED
+
+
+def test_what_the_scene_cannot_have_is_left_out_and_said(tmp_path: Path) -> None:
+    square = scene_of(tmp_path, SCENE, "smarticle.thickness_in_plane_m=1.27e-3")
+    ladder = build_ladder(square, source="scene.yaml")
+    assert [name for name, _ in labels(ladder, "section")] == ["pitch 1.3", "pitch 1", "pitch 0.5"]
+    assert ladder.references()["section"].label == "pitch 0.5"
+    assert [line.partition(":")[0] for line in ladder.left_out] == ["section two rows", "fidelity reference"]
+    assert "2 rows of 0.00127 m do not fit" in ladder.left_out[0]
+    assert ladder.references()["fidelity"].label == "standard"
+
+
+def test_what_takes_too_long_is_left_out_but_never_the_scene(scene: Scene) -> None:
+    ladder = build_ladder(scene, source="scene.yaml", knobs=["section", "fidelity"])
+    cost = {name: 7200.0 if name in (BASE, "two-rows", "reference") else 60.0 for name in ladder.settings}
+    kept = affordable(ladder, cost, 3600.0)
+    assert set(kept.settings) == set(kept.scenes) == {BASE, "pitch-1", "pitch-0.5", "standard"}
+    assert {knob: rung.label for knob, rung in kept.references().items()} == {
+        "section": "pitch 0.5",
+        "fidelity": "standard",
+    }
+    assert kept.left_out[0] == "section two rows: a run is expected to take 2 h, more than 1 h"
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "knobs", "message"),
+    [
+        (SCENE.replace("  - {type: shake, duration_s: 1.5}\n", ""), (), None, "phases: deposit, relax: no activity"),
+        (SCENE, ("fidelity.time_step_s=1e-5",), None, "fidelity.time_step_s: a step of 1e-05 s by hand"),
+        (SCENE, (), ["control"], "--knobs: control turns nothing: no phase of scene.yaml actuates"),
+    ],
+)
+def test_a_scene_that_makes_no_ladder_is_refused(
+    text: str, settings: tuple[str, ...], knobs: list[str] | None, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        build_ladder(scene_of(tmp_path, text, *settings), source="scene.yaml", knobs=knobs)
+    assert "\n" not in str(error.value)
+
+
+def test_knobs_are_known_and_in_order() -> None:
+    assert parse_knobs("fidelity, time-step") == ("time-step", "fidelity")
+    with pytest.raises(InputError, match=r"--knobs: 'timestep' is no knob; did you mean 'time-step'\?"):
+        parse_knobs("timestep,section")
+    with pytest.raises(InputError, match="names none; known: time-step, stiffness"):
+        parse_knobs(",")
+
+
+def test_seeds_are_whole_numbers_each_once() -> None:
+    assert parse_seeds("3, 1,20") == (3, 1, 20)
+    assert parse_seeds("1-3,7") == (1, 2, 3, 7)
+    for text in ("3-1", "0-99999"):
+        with pytest.raises(InputError, match=f"{text} must go up, by fewer than 1000"):
+            parse_seeds(text)
+    for text in ("", "1,x", "1.5", "-1", "²"):
+        with pytest.raises(InputError, match="must be whole numbers from 0, such as 1,2,3"):
+            parse_seeds(text)
+    with pytest.raises(InputError, match="--seeds 1,2,1: 1 is given twice"):
+        parse_seeds("1,2,1")

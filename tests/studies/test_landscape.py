@@ -1,0 +1,319 @@
+"""The study of the landscape: runs with known forces and works, tables with a known order of measures, known costs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from synthetic import SyntheticRun
+from synthetic.hooked import UPPER, weight, write_hooked_run
+from synthetic.shapes import W
+
+from dem.record.run import open_run
+from postprocess.measures.pull import WINDOW
+from postprocess.statistics.columns import ASPECT, SEED
+from studies import landscape
+from studies.framework.findings import Judged
+from studies.framework.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
+from studies.landscape import (
+    ABOVE,
+    ALL,
+    BEYOND,
+    COMMON,
+    ENERGY,
+    EVERY,
+    FIRST,
+    FREE,
+    FRONTIER,
+    GAIN,
+    HELD_FAST,
+    HIGH,
+    LEAD,
+    LIFTS,
+    LINKING,
+    LOW,
+    OTHER,
+    PAIRS,
+    PART,
+    PEAK,
+    PLANNED,
+    PREDICTOR,
+    PREDICTORS,
+    RAISED,
+    RHO,
+    SCOPE,
+    STRENGTH,
+    STUDY,
+    VERDICT,
+    WITHIN,
+    WORK,
+    YIELD,
+    best_points,
+    common_aspects,
+    costs,
+    measure,
+    predicted,
+    trajectories,
+)
+
+ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
+APEX, BASE = 0.5, 0.4
+RATIOS = (0.4, 0.7, 1.0)
+TIMES = (0.5, 1.0, 2.0, 4.0)
+THETAS = (5.0, 10.0, 20.0)
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(landscape, "RESAMPLES", 60)
+
+
+def write(
+    folder: Path, procedure: str, *, seed: int = 1, top: float = 0.5, time: float = 2.0, ratio: float = 0.7, **more: Any
+) -> Path:
+    """A run whose force is a triangle of a height over n W_s."""
+    active = () if procedure == STATIC else (ACTIVITY[procedure], "relax")
+    phases = ("deposit", "relax", *active, "pull-hook")
+    keys: dict[str, Any] = {"phases": phases, "packing": (0.01,) * len(phases), "frames_per_phase": 2}
+    run = SyntheticRun(**keys, seed=seed, aspect_ratio=ratio, shake_time=time, oscillate_time=time)
+    total = run.count * weight(run)
+    theta = "10" if procedure == INTERNAL else ""
+    seconds = 0.0 if procedure == STATIC else time
+    name = f"{procedure}{theta}_{seconds:g}s_lw{ratio:.2f}_seed{seed}"
+    spent = None if procedure == STATIC else more.pop("spent", 1e-3 * time)
+    return write_hooked_run(
+        folder / name, run, lambda t: top * total * np.clip(1 - np.abs(t - APEX) / BASE, 0, None), spent=spent, **more
+    )
+
+
+def row_of(directory: Path) -> dict[str, Any]:
+    return dict(measure(open_run(directory)))
+
+
+def test_measures_are_those_put_in(tmp_path: Path) -> None:
+    row = row_of(write(tmp_path, INTERNAL, spent=6e-3))
+    made = SyntheticRun(seed=1)
+    above = float((made.shares() * made.height(0.01 * (1 - 0.002)) > UPPER).mean())
+    assert row[PEAK] == pytest.approx(0.5 * (1 - WINDOW / BASE / 4), rel=1e-3)
+    assert 0 < above < 1
+    assert (row[ABOVE], row[BEYOND]) == (above, pytest.approx(row[PEAK] - above))
+    assert row[RAISED] == pytest.approx(APEX * W, abs=0.005 * W)
+    assert row[WORK] == pytest.approx(0.5 * BASE, rel=1e-3)
+    assert row[ENERGY] == pytest.approx(6e-3 / made.count, rel=1e-6)
+    assert row[LIFTS] == pytest.approx(6e-3 / made.count / weight(made) / W, rel=1e-6)
+    assert (row[PLANNED], row[ACTIVE], row[THETA], row[HELD_FAST]) == (2.0, 2.0, 10.0, 0.0)
+    assert row[PHI] == pytest.approx(0.01, rel=0.01)
+
+
+def test_energy_is_that_of_the_activity_alone(tmp_path: Path) -> None:
+    # Neither the work of the hook nor what motors did before.
+    assert row_of(write(tmp_path, EXTERNAL, spent=3e-3))[ENERGY] == pytest.approx(3e-3 / 12, rel=1e-6)
+    directory = write(tmp_path, INTERNAL, spent=6e-3)
+    with h5py.File(directory / "series.h5", "r+") as series:
+        series["motor_work_J"][:] += np.where(series["phase"][:] >= 1, 5e-4, 0.0)
+    assert row_of(directory)[ENERGY] == pytest.approx(6e-3 / 12, rel=1e-6)
+    row = row_of(write(tmp_path, STATIC))
+    assert (row[PROCEDURE], row[ENERGY], row[LIFTS], row[PLANNED]) == (STATIC, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_whole_study(tmp_path: Path) -> None:
+    levels = {STATIC: 0.3, EXTERNAL: 0.35, INTERNAL: 0.5, SHAPE: 0.9}
+    runs = [
+        write(tmp_path, name, seed=seed, ratio=ratio, top=level * (0.9 + 0.03 * seed + ratio / 5), time=time)
+        for name, level in levels.items()
+        for seed in (1, 2, 3)
+        for ratio in (0.7, 1.0)
+        for time in ((0.5, 2.0) if name == INTERNAL else (2.0,))
+    ]
+    stopped = write(tmp_path, SHAPE, seed=9, limit=0.01, stops=0.6)
+    other = write(tmp_path / "x", SHAPE)
+    renamed = other.rename(other.with_name("shape"))
+    report = STUDY.analyse([*runs, stopped, renamed], tmp_path / "out", note="a test", command="a command")
+    assert {"predictors.csv", "comparisons.csv", "cost.csv", "points.csv", "findings.csv"} <= set(report.files)
+    assert len(report.rows) == 6
+    assert any("held fast: 1 of 31 runs" in line for line in report.footer)
+    assert "not named like a run of this study" in report.missing[0].cause
+    assert {one.finding.id: one.verdict for one in report.judged}["as-strong-as-shape-change"] == "not found"
+
+
+# Which measure goes with strength
+
+
+def table(strength: Callable[[pd.DataFrame, np.random.Generator], Any]) -> pd.DataFrame:
+    """Runs at random places of every measure, all independent, and a strength that follows from them."""
+    random = np.random.default_rng(0)
+    rows = [(STATIC, math.nan, 0.0)] + [(INTERNAL, theta, time) for theta in THETAS for time in TIMES]
+    runs = pd.DataFrame(
+        [
+            {PROCEDURE: name, THETA: theta, PLANNED: time, ASPECT: ratio, SEED: number}
+            for number in (1, 2)
+            for ratio in RATIOS
+            for name, theta, time in rows
+        ]
+    )
+    for column in PREDICTORS:
+        runs[column] = random.normal(size=len(runs))
+    runs[LIFTS] = runs[ENERGY]
+    runs[HELD_FAST] = 0.0
+    runs[PEAK] = strength(runs, random)
+    runs[BEYOND] = runs[PEAK] - runs[ABOVE]
+    return runs
+
+
+def told(runs: pd.DataFrame, scope: str, *, part: str = EVERY) -> tuple[pd.DataFrame, pd.DataFrame]:
+    first, second = (
+        one[(one[STRENGTH] == PEAK) & (one[SCOPE] == scope) & (one[PART] == part)].reset_index()
+        for one in predicted(runs)
+    )
+    return first, second
+
+
+def judged(runs: pd.DataFrame, *, correlated: bool = True) -> dict[str, Judged]:
+    ranked, compared = predicted(runs) if correlated else (pd.DataFrame(), pd.DataFrame())
+    tables = {"runs": runs, "predictors": ranked, "comparisons": compared, "cost": costs(runs)}
+    return {one.id: one.judge(runs, tables) for one in STUDY.findings}
+
+
+def test_the_measure_that_strength_follows_from_is_found() -> None:
+    runs = table(lambda t, random: 0.2 * t[CROSSINGS] - 0.02 * t[PHI] + 0.05 * random.normal(size=len(t)))
+    ranked, compared = told(runs, WITHIN)
+    first = ranked.iloc[0]
+    assert first[PREDICTOR] == CROSSINGS
+    assert first[LOW] < first[RHO] < first[HIGH]
+    assert first[RHO] > 0.9
+    assert first["slope per SD [-]"] == pytest.approx(0.2, rel=0.15)
+    assert first[FIRST] == 1.0
+    assert compared[VERDICT].tolist() == ["better"] * (len(PREDICTORS) - 1)
+    verdicts = judged(runs)
+    names = ("best-strength-over", "best-strength-within", "stronger-crossings")
+    assert {verdicts[name].verdict for name in names} == {"found"}
+
+
+def test_where_nothing_tells_strength_nothing_is_found() -> None:
+    runs = table(lambda t, random: random.normal(size=len(t)))
+    verdicts = judged(runs)
+    assert verdicts["best-strength-over"].verdict == verdicts["best-strength-within"].verdict == "not resolved"
+    ranked, _ = told(runs, ALL)
+    assert ((ranked[LOW] > 0) | (ranked[HIGH] < 0)).sum() <= 2
+
+
+def test_two_measures_that_tell_it_alike_are_not_resolved() -> None:
+    def both(t: pd.DataFrame, random: np.random.Generator) -> Any:
+        t[LINKING] = t[CROSSINGS] + 0.05 * random.normal(size=len(t))
+        return -t[CROSSINGS] - t[LINKING] + 0.3 * random.normal(size=len(t))
+
+    runs = table(both)
+    ranked, compared = told(runs, WITHIN)
+    assert set(ranked[PREDICTOR].iloc[:2]) == {CROSSINGS, LINKING}
+    # Sizes are compared: it falls with both.
+    assert (ranked[RHO].iloc[:2] < -0.9).all()
+    assert compared.set_index(OTHER)[VERDICT].tolist() == ["not resolved"] + ["better"] * (len(PREDICTORS) - 2)
+    assert compared[LEAD].iloc[0] < 0.05
+    verdicts = judged(runs)
+    assert verdicts["best-strength-within"].verdict == "not resolved"
+    assert verdicts["stronger-crossings"].verdict == "not found"
+
+
+def test_what_goes_with_the_aspect_ratio_alone_tells_nothing_within() -> None:
+    def by_ratio(t: pd.DataFrame, random: np.random.Generator) -> Any:
+        t[PHI] = -t[ASPECT] + 0.02 * random.normal(size=len(t))
+        return t[ASPECT] + 0.02 * random.normal(size=len(t))
+
+    runs = table(by_ratio)
+    (over, _), (within, _) = told(runs, ALL), told(runs, WITHIN)
+    assert over[PREDICTOR].iloc[0] == PHI
+    assert over[RHO].iloc[0] < -0.85
+    assert abs(within.set_index(PREDICTOR)[RHO][PHI]) < 0.3
+
+
+def test_lower_bounds_are_left_out_of_their_part() -> None:
+    runs = table(lambda t, _: t[CROSSINGS])
+    stopped = runs.index[:20]
+    runs.loc[stopped, PEAK] = -runs.loc[stopped, CROSSINGS]
+    runs.loc[stopped, HELD_FAST] = 1.0
+    ranked, _ = told(runs, WITHIN, part=FREE)
+    assert ranked["runs [-]"].iloc[0] == len(runs) - 20
+    assert (ranked[PREDICTOR].iloc[0], ranked[RHO].iloc[0]) == (CROSSINGS, pytest.approx(1.0))
+    every, _ = told(runs, WITHIN)
+    assert every.set_index(PREDICTOR)[RHO][CROSSINGS] < 0.9
+
+
+def test_runs_of_one_trajectory_are_one_block() -> None:
+    def by_trajectory(t: pd.DataFrame, random: np.random.Generator) -> Any:
+        numbers = trajectories(t)
+        for column in PREDICTORS:
+            t[column] = numbers.map(dict(enumerate(random.normal(size=len(t)))))
+        return t[CROSSINGS] + numbers.map(dict(enumerate(random.normal(size=len(t)))))
+
+    runs = table(by_trajectory)
+    assert runs.groupby(trajectories(runs))[[ASPECT, SEED]].nunique().max().max() == 1
+    # Ten times the same runs tell no more.
+    (once, _), (often, _) = told(runs, WITHIN), told(pd.concat([runs] * 10, ignore_index=True), WITHIN)
+    blocks = 2 * len(RATIOS) * (1 + len(THETAS))
+    assert set(once["trajectories [-]"]) == set(often["trajectories [-]"]) == {blocks}
+    widths = [one.set_index(PREDICTOR)[HIGH] - one.set_index(PREDICTOR)[LOW] for one in (once, often)]
+    assert widths[1].to_numpy() == pytest.approx(widths[0].to_numpy(), rel=0.1)
+
+
+# What strength costs
+
+
+def bought(scatter: float = 0.01) -> pd.DataFrame:
+    """Oscillation gains 0.1 for each doubling of energy; shape change much, at a price; shaking nothing."""
+    random = np.random.default_rng(3)
+    rows = []
+    for seed in (1, 2, 3, 4):
+        for ratio in RATIOS:
+            level = random.uniform(0.3, 0.5)
+            points = [(STATIC, math.nan, 0.0, 0.0, 0.0)]
+            points += [(INTERNAL, 10.0, time, 0.1 * k + 0.1, 5.0 * time) for k, time in enumerate(TIMES)]
+            points += [(SHAPE, math.nan, 3.0, 0.5, 50.0), (EXTERNAL, math.nan, 3.0, -0.02, 40.0)]
+            for name, theta, time, gain, energy in points:
+                rows.append(
+                    {PROCEDURE: name, THETA: theta, PLANNED: time, ASPECT: ratio, SEED: seed}
+                    | {PEAK: level + gain + scatter * random.normal(), LIFTS: energy, ENERGY: 1e-5 * energy}
+                )
+    return pd.DataFrame(rows)
+
+
+def test_gains_are_those_over_the_pile_poured_alike() -> None:
+    found = costs(bought())
+    found = found[found[SCOPE] == COMMON].set_index([PROCEDURE, PLANNED])
+    shape, half = found.loc[(SHAPE, 3.0)], found.loc[(INTERNAL, 0.5)]
+    assert shape[GAIN] == pytest.approx(0.5, abs=0.01)
+    # The level of the pour, which scatters by 0.06, is in both.
+    assert shape["strength gained over n W_s 95 % [-]"] < 0.02
+    assert half[YIELD] == pytest.approx(0.1 / 2.5, rel=0.1)
+    assert half[LOW] < half[YIELD] < half[HIGH]
+    assert half[HIGH] - half[LOW] < 0.3 * half[YIELD]
+    assert found[PAIRS].tolist() == [12] * 6
+    assert found[FRONTIER].tolist() == [0.0, *[1.0] * 5]
+
+
+def test_the_cheapest_procedure_is_found_where_it_surely_is() -> None:
+    sure = judged(bought(), correlated=False)["cheapest"]
+    assert sure.verdict == "found"
+    assert sure.ours.index("internal θ = 10° for 0.5 s") < sure.ours.index("shape-change for 3 s")
+    assert "no sure gain: external" in sure.ours
+    assert judged(bought(scatter=0.6), correlated=False)["cheapest"].verdict == "not resolved"
+
+
+def test_of_a_procedure_the_point_that_surely_gains_is_its_best() -> None:
+    row = {SCOPE: COMMON, PROCEDURE: INTERNAL, HIGH: 1.0}
+    found = pd.DataFrame([{**row, PLANNED: 1.0, YIELD: 0.2, LOW: 0.1}, {**row, PLANNED: 2.0, YIELD: 0.5, LOW: -0.1}])
+    assert best_points(found)[PLANNED].tolist() == [1.0]
+
+
+def test_only_aspect_ratios_that_have_everything_are_averaged_over() -> None:
+    runs = bought()
+    runs = runs[~((runs[ASPECT] == 0.4) & (runs[PLANNED] == 4.0))]
+    assert common_aspects(runs) == [0.7, 1.0]
+    found = costs(runs)
+    assert set(found[found[SCOPE] == COMMON][PAIRS]) == {8}

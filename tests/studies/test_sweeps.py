@@ -1,0 +1,165 @@
+"""The shipped sweeps: they expand on either engine, and variants differ in what they say alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from functools import cache
+from itertools import product
+from typing import Any
+
+import pytest
+from sweeps import of_one_seed
+
+from dem.errors import InputError
+from dem.phases.shake import Shake
+from dem.setting.fidelity import FIDELITIES, Fidelity
+from smarticles.commands.study import differences
+from studies.registry import STUDIES, study_file
+from templates.sweep.expand import Point, expand
+from templates.sweep.sweep_file import load_sweep, on_engine
+
+CODES = ("procedures", "fracture", "strength", "melting", "casting")
+AGAIN = {"gravish": 9, "melting": 8}
+
+
+@cache
+def points_of(name: str, *, quick: bool = False) -> list[Point]:
+    """Points of a study, expanded once for all tests of this file."""
+    return expand(load_sweep(study_file(name, quick=quick)))
+
+
+def first_seed(name: str) -> list[Point]:
+    """Points of a study with the first of its seeds."""
+    return expand(of_one_seed(load_sweep(study_file(name))))
+
+
+@pytest.mark.parametrize("name", sorted(AGAIN))
+def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
+    found = points_of(name)
+    again = [point for point in found if point.again]
+    assert again == found[-len(again) :]
+    assert len(again) == AGAIN[name]
+    for point in again:
+        assert point.scene.engine == "yade"
+        twin = next(p for p in found if p.name == point.name.replace("yade", "links"))
+        # A name means knobs of its own on each engine; all else is the same, and so are seed and pour.
+        assert twin.scene.fidelity.base == point.scene.fidelity.base
+        assert twin.scene.model_copy(update={"engine": "yade", "fidelity": point.scene.fidelity}) == point.scene
+        assert twin.scene.seed_for("poses") == point.scene.seed_for("poses")
+
+
+@pytest.mark.parametrize("name", sorted(set(STUDIES) - {"engines", "chain-bodies"}))
+@pytest.mark.parametrize("engine", ["yade", "links"])
+def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
+    found = expand(on_engine(of_one_seed(load_sweep(study_file(name))), engine))
+    assert {point.scene.engine for point in found} == {engine}
+    assert not any(point.again for point in found)
+
+
+def test_chains_with_bodies_differ_from_those_without_in_the_bodies_and_the_walls_alone() -> None:
+    bodies, plain = (points_of(name) for name in ("chain-bodies", "chain"))
+    twins = {(p.values["variant"], p.values["count"], p.scene.seed): p.scene for p in plain}
+    for point in bodies:
+        twin = twins["baseline", point.values["count"], point.scene.seed]
+        alike = {"engine": "yade", "plane": point.scene.plane, "smarticle": point.scene.smarticle}
+        assert twin.model_copy(update={**alike, "fidelity": point.scene.fidelity}) == point.scene
+        assert twin.smarticle.model_copy(update={"middle_thickness_in_plane_m": 0.021}) == point.scene.smarticle
+        assert point.scene.plane is not None
+        assert point.scene.plane.width_m == pytest.approx(0.062 / point.values["h_over_H"])
+    with pytest.raises(InputError, match=r"middle_thickness_in_plane_m: 0\.021 m on engine: links.*use engine: yade"):
+        expand(on_engine(load_sweep(study_file("chain-bodies")), "links"))
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str) -> None:
+    """Point by point, in the same order."""
+    text, code = first_seed(name), first_seed(f"{name}-code")
+    assert len(text) == len(code) > 0
+    for one, other in zip(text, code, strict=True):
+        assert one.name == other.name
+        assert {**one.values, "protocol": "code", "title": f"{name}-code"} == other.values
+        assert (one.scene.motor.law, other.scene.motor.law) == ("halt", "ease")
+        assert (one.scene.contact.friction_smarticle, other.scene.contact.friction_smarticle) == (0.4, 0.2)
+        for phase, twin in zip(one.scene.phases, other.scene.phases, strict=True):
+            if isinstance(phase, Shake) and isinstance(twin, Shake):
+                assert (phase.moves, twin.moves) == ("container", "floor")
+            else:
+                assert phase == twin
+        assert one.scene.seed_for("poses") == other.scene.seed_for("poses")
+
+
+def test_factors_are_all_combinations_of_the_rules() -> None:
+    factors = first_seed("factors")
+    rules = {(p.scene.motor.law, p.scene.contact.friction_wall, p.scene.container.radius_m) for p in factors}
+    assert rules == set(product(("halt", "ease"), (0.4, 0.2), (0.0234, 0.0224)))
+    assert len(factors) == len(rules) * 2
+
+
+def test_the_study_of_engines_pairs_every_run() -> None:
+    names = {point.name for point in points_of("engines")}
+    assert {name.replace("_links_", "_yade_") for name in names} <= names
+    with pytest.raises(InputError, match=r"'engine' is a variable.*; leave --engine links out"):
+        on_engine(load_sweep(study_file("engines")), "links")
+
+
+@pytest.mark.parametrize(
+    ("study", "choices"),
+    [
+        ("sensitivity", {"draft": 0, "diameter-1.27mm": 1, "friction-0.6": 2}),  # friction of smarticles and of walls
+        ("sensitivity-section", {"draft": 0, "pitch-0.5": 1, "two-rows": 2}),  # rows and pitch
+    ],
+)
+def test_variants_differ_from_the_draft_in_their_choice_alone(study: str, choices: dict[str, int]) -> None:
+    found = points_of(study)
+    # The file writes the draft out: the two must stay the same.
+    assert found[0].scene.fidelity == Fidelity(base="draft", **FIDELITIES["draft"])
+    for point in found:
+        variant = str(point.values["variant"])
+        twin = next(p for p in found if p.values["variant"] == "draft" and p.scene.seed == point.scene.seed)
+        here, there = (flat(p.scene.model_dump()) for p in (point, twin))
+        changed = {key for key in here if here[key] != there[key]}
+        assert len(changed) == choices.get(variant, 1), (variant, changed)
+        assert all(key.startswith(("fidelity.", "contact.")) for key in changed)
+
+
+def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return found
+
+
+def test_the_quick_variant_says_how_it_differs() -> None:
+    full = points_of("gravish")
+    assert differences(full, full) == []
+    lines = differences(points_of("gravish", quick=True), full)
+    assert lines[0] == "18 runs instead of 73"
+    assert "l_over_w: only 0.4, 0.5, 0.7, 0.9, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
+    assert "shake_s: 1.5 instead of 20.0" in lines
+    # Columns that follow from l/w, and what is the same, are left out.
+    assert not any(line.startswith(("layers:", "engine:", "title:")) for line in lines)
+
+
+def test_studies_that_are_not_there() -> None:
+    with pytest.raises(InputError, match=r"'gravitsh' does not exist; did you mean 'gravish'\?"):
+        study_file("gravitsh")
+    with pytest.raises(InputError, match="study sensitivity has no quick variant; leave --quick out"):
+        study_file("sensitivity", quick=True)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
+    shipped = STUDIES[name]
+    assert shipped.load(quick=True).name == name
+    assert shipped.about
+    variables = expand(of_one_seed(load_sweep(shipped.sweep_file())))[0].values
+    assert set(shipped.pictured) <= set(variables)
+
+
+def test_what_is_known_of_studies_beforehand_loads_nothing_large() -> None:
+    code = "import sys, studies.registry; print(*{name.split('.')[0] for name in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "studies" in loaded
+    assert not {"pandas", "matplotlib", "numpy", "pyvista", "yade"} & set(loaded)
