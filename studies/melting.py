@@ -106,7 +106,7 @@ def measure(run: Run) -> MeasuredRun:
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
     return MeasuredRun(
-        manifest=run, rows=[row], history=history | {name: np.array([one[name] for one in rows]) for name in rows[0]}
+        run=run, rows=[row], history=history | {name: np.array([one[name] for one in rows]) for name in rows[0]}
     )
 
 
