@@ -53,7 +53,7 @@ def test_a_run_is_what_the_table_and_the_provenance_say(wanted: dict[str, Wanted
 def test_the_same_tables_come_out_again(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
     report = (
         shipped("procedures")
-        .load(quick=False)
+        .load()
         .analyse(
             [tmp_path / name for name in wanted],
             tmp_path / "results",

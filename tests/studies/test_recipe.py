@@ -46,7 +46,7 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 def study_of(table: str) -> Study:
     """Load the study that a folder of results is of."""
     name = next(name for name in sorted(SCRIPTS, key=len, reverse=True) if table.startswith(name))
-    study = STUDIES[name].load(quick=False)
+    study = STUDIES[name].load()
     assert isinstance(study, Study)
     return study
 
