@@ -332,7 +332,7 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
             *(
                 Quantity(
                     column=f"{name} error [%]",
-                    label=f"{symbol} error %",
+                    label=f"{symbol} error % (95 %)",
                     form="+.1f",
                     bar="95 %",
                     meaning=f"of {symbol} against the knob's reference",

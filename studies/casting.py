@@ -27,7 +27,7 @@ from studies.framework import plots
 from studies.framework.figures import Analysis, Drawing
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, declare
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
 from studies.framework.runs import Row, duration
 from studies.framework.study import Study
@@ -50,34 +50,35 @@ LIKENESS_BEFORE, LIKENESS = "likeness to the mould [-]", "likeness to the mould 
 HEIGHT, CENTRE = "height of 95 % [m]", "com height over that before [-]"
 
 
-def _by_tier(columns: Mapping[str, str], label: str, meaning: str) -> list[Quantity]:
-    return [
-        Quantity(column=column, label=label and label.format(tier), form=".3f", meaning=meaning.format(tier))
-        for tier, column in columns.items()
-    ]
-
-
-QUANTITIES = (
-    *_by_tier(FILLED, "filled {}", "share of the volume of the {} tier inside the pile before"),
-    *_by_tier(FILLED_AFTER, "{} after", "share of the volume of the {} tier inside the pile after the walls went"),
-    *_by_tier(KEPT, "kept {}", "of what was inside the pile in the {} tier, the share that still is"),
-    *_by_tier(MATERIAL, "", "share of the pile's material in the {} tier before"),
-    *_by_tier(MATERIAL_AFTER, "", "share of the pile's material in the {} tier after"),
-    *(
-        Quantity(column=column, label=label, form=".3f", meaning=meaning)
-        for column, label, meaning in (
-            (NECK, "in the neck", "share of the material above the mould, in the neck it was poured through, before"),
-            (WHOLE, "whole", "share of the volume of the whole mould inside the pile before"),
-            (WHOLE_AFTER, "whole after", "share of the volume of the whole mould inside the pile after"),
-            (WHOLE_KEPT, "kept whole", "of what was inside the pile in the mould, the share that still is"),
-            (IN_MOULD, "", "share of the material where the mould was, after"),
-            (OVERLAP, "overlap", "volume common to the pile before and after over that of both together"),
-            (LIKENESS_BEFORE, "likeness", "volume common to pile and mould over that of both together, before"),
-            (LIKENESS, "likeness after", "volume common to pile and mould over that of both together, after"),
-            (HEIGHT, "", "height below which 95 % of the material lies, before"),
-            (CENTRE, "", "height of the centre of mass after, over that before"),
-        )
-    ),
+_BY_TIER = (
+    (FILLED, "filled {}", "share of the volume of the {} tier inside the pile before"),
+    (FILLED_AFTER, "{} after", "share of the volume of the {} tier inside the pile after the walls went"),
+    (KEPT, "kept {}", "of what was inside the pile in the {} tier, the share that still is"),
+    (MATERIAL, "", "share of the pile's material in the {} tier before"),
+    (MATERIAL_AFTER, "", "share of the pile's material in the {} tier after"),
+)
+QUANTITIES = declare(
+    {
+        **{
+            column: (label.format(tier), ".3f", meaning.format(tier))
+            for columns, label, meaning in _BY_TIER
+            for tier, column in columns.items()
+        },
+        NECK: (
+            "in the neck",
+            ".3f",
+            "share of the material above the mould, in the neck it came through, before",
+        ),
+        WHOLE: ("whole", ".3f", "share of the volume of the whole mould inside the pile before"),
+        WHOLE_AFTER: ("whole after", ".3f", "share of the volume of the whole mould inside the pile after"),
+        WHOLE_KEPT: ("kept whole", ".3f", "of what was inside the pile in the mould, the share that still is"),
+        IN_MOULD: ("", "", "share of the material where the mould was, after"),
+        OVERLAP: ("overlap", ".3f", "volume common to the pile before and after over that of both together"),
+        LIKENESS_BEFORE: ("likeness", ".3f", "volume common to pile and mould over that of both together, before"),
+        LIKENESS: ("likeness after", ".3f", "volume common to pile and mould over that of both together, after"),
+        HEIGHT: ("", "", "height below which 95 % of the material lies, before"),
+        CENTRE: ("", "", "height of the centre of mass after, over that before"),
+    }
 )
 
 
@@ -233,7 +234,7 @@ STUDY = Study(
     title="Casts of smarticles",
     measure=measure,
     keys=(Key(column=PROCEDURE, label="procedure", order=ORDER),),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(
         Drawing(

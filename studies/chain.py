@@ -39,7 +39,7 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
 from studies.framework import plots
 from studies.framework.figures import Analysis, Drawing, Histories, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, declare
 from studies.framework.runs import Row
 from studies.framework.study import Study
 
@@ -64,11 +64,7 @@ _SHOWN = {
     WIDENING: ("widening", ".3f"),
     WALL: ("wall force [N]", ".2f"),
 }
-QUANTITIES = {
-    column: Quantity(column=column, meaning=meaning, label=label, form=form)
-    for column, meaning in MEANINGS.items()
-    for label, form in [_SHOWN.get(column, ("", ".3g"))]
-}
+QUANTITIES = declare({column: (*_SHOWN.get(column, ("", "")), meaning) for column, meaning in MEANINGS.items()})
 
 
 def measure(run: Run) -> Row:

@@ -22,7 +22,7 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.framework.figures import Combinations
 from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
 from studies.framework.provenance import DIGITISING_ERROR, GRAVISH, read_reference, reference_at
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, Quantity, declare
 from studies.framework.runs import DEFINITION, Row
 from studies.framework.shaken import FRICTION, WHEN, WINDOW, contact_of, phi, timed_row
 from studies.framework.study import Study
@@ -39,22 +39,16 @@ CALLED = {
 }
 RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
 PHI_0, PHI_F, PHI_RELAXED = (phi(stage) for stage in ("phi_0", "phi_f", "phi_f relaxed"))
-QUANTITIES = {
-    column: Quantity(column=column, label=label, form=form, axis=axis, meaning=meaning)
-    for column, label, form, axis, meaning in (
-        (PHI_0, "phi_0", ".4f", "", "packing fraction before shaking"),
-        (PHI_F, "phi_f", ".4f", "", "packing fraction at the end of shaking"),
-        (PHI_RELAXED, "phi_f at rest again", ".4f", "", "packing fraction after the rest that follows"),
-        (CROSSED, "N after shaking", ".2f", "", "links through a smarticle's plane at the end of shaking"),
-        (
-            RISEN,
-            "the rise of the lowest tenth [w]",
-            ".3f",
-            "rise of the lowest tenth [w]",
-            "mean height of the centres of mass of the lowest tenth of all smarticles: after shaking less before",
-        ),
-    )
-}
+QUANTITIES = declare(
+    {
+        PHI_0: ("phi_0", ".4f", "packing fraction before shaking"),
+        PHI_F: ("phi_f", ".4f", "packing fraction at the end of shaking"),
+        PHI_RELAXED: ("phi_f at rest again", ".4f", "packing fraction after the rest that follows"),
+        CROSSED: ("N after shaking", ".2f", "links through a smarticle's plane at the end of shaking"),
+        RISEN: ("the rise of the lowest tenth [w]", ".3f", "mean height of the lowest tenth of all, after less before"),
+    },
+    axes={RISEN: "rise of the lowest tenth [w]"},
+)
 TOGETHER, EVERYWHERE = "both frictions together", "all"
 QUANTITY, FACTOR, EFFECT, SHARE = "quantity", "factor", "effect [unit of the quantity]", "effect over the mean [%]"
 DEVIATION = "deviation of phi_f from Gravish [%]"

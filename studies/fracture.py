@@ -38,7 +38,7 @@ from studies.framework.procedures import (
     paired,
     prepared_by,
 )
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, declare
 from studies.framework.runs import DEFINITION, Row, duration
 from studies.framework.study import Study
 from studies.strength import ABOVE, BEFORE, HELD_FAST, LIMIT, PEAK, RAISED, WORK, harder_but_brittle, other_order
@@ -56,28 +56,27 @@ CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
 ACCOUNT = "work less that of the engine's account [-]"
 
 _FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where it held"
-_TOLD = {
-    PEAK: ("peak", ".3f", 1.0, _FORCE),
-    HELD_FAST: ("held fast", ".2f", 1.0, "1 where the hook was stopped by its force limit, 0 where it arrived"),
-    **{column: ("", ".3f", 1.0, f"largest mean over {window:g} s") for window, column in WINDOWS.items()},
-    HELD: ("lower hook at it", ".3f", 1.0, "upwards on the lower hook at the peak: what goes from hook to hook"),
-    NET: ("peak less lower hook", ".3f", 1.0, "largest mean of the force on the upper hook less that on the lower"),
-    PEAK_TIME: ("", ".3g", 1.0, "time since the pull began at which the peak is"),
-    RAISED: ("raised at it [mm]", ".1f", 1e3, "how far the hook had been raised then"),
-    WORK: ("work / n W_s w", ".3f", 1.0, "∫ F dz over the whole pull"),
-    CAME_FREE: ("came free", ".2f", 1.0, f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
-    FREE_TIME: ("", ".3g", 1.0, "when it did so, since the pull began; empty where it did not"),
-    LEFT: ("load at the end", ".3f", 1.0, f"mean force over the last {END:g} s of the pull"),
-    BEFORE: ("", ".3g", 1.0, f"mean force on the hook over the last {END:g} s before the pull"),
-    ABOVE: ("above the hook", ".2f", 1.0, "share with the centre of mass above the hook before the pull"),
-    CROSSINGS: ("⟨N⟩", ".2f", 1.0, "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
-    PHI: ("", ".3g", 1.0, "packing fraction at rest before the pull"),
-}
-_AXES = {PEAK: r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]", CROSSINGS: CROSSINGS_LABEL}
-QUANTITIES = {
-    column: Quantity(column=column, label=label, form=form, scale=scale, meaning=meaning, axis=_AXES.get(column, ""))
-    for column, (label, form, scale, meaning) in _TOLD.items()
-}
+QUANTITIES = declare(
+    {
+        PEAK: ("peak", ".3f", _FORCE),
+        HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
+        **{column: ("", ".3f", f"largest mean over {window:g} s") for window, column in WINDOWS.items()},
+        HELD: ("lower hook at it", ".3f", "upwards on the lower hook at the peak: what goes from hook to hook"),
+        NET: ("peak less lower hook", ".3f", "largest mean of the force on the upper hook less that on the lower"),
+        PEAK_TIME: ("", ".3g", "time since the pull began at which the peak is"),
+        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
+        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull"),
+        CAME_FREE: ("came free", ".2f", f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
+        FREE_TIME: ("", ".3g", "when it did so, since the pull began; empty where it did not"),
+        LEFT: ("load at the end", ".3f", f"mean force over the last {END:g} s of the pull"),
+        BEFORE: ("", ".3g", f"mean force on the hook over the last {END:g} s before the pull"),
+        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
+        PHI: ("", ".3g", "packing fraction at rest before the pull"),
+    },
+    axes={PEAK: r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]", CROSSINGS: CROSSINGS_LABEL},
+    scales={RAISED: 1e3},
+)
 
 
 def measure(run: Run) -> Row:

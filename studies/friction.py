@@ -494,7 +494,7 @@ def _draw(path: Path, analysis: Analysis) -> list[Path]:
         axes.set_xlabel(r"coefficient of friction $\mu$ [-]")
     panels[0].set_ylabel(r"packing fraction $\phi$ [-]")
     panels[0].set_ylim(bottom=0)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3 if len(ratios) > 2 else 2)
     told = "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured."
     below = [told, told_reference(ratios, ("phi_0", "phi_f"))]
     return plots.finished(figure, path, below, analysis.footer, pooled=True)

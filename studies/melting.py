@@ -21,7 +21,7 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Times, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, mean, means_by
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, declare
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
 from studies.framework.runs import MeasuredRun, duration
 from studies.framework.study import Study
@@ -36,32 +36,21 @@ HEIGHT, TOP_KEPT = "com height over that before [-]", "height of 95 % over that 
 SPREAD, SLOUGHED = "radius of 95 % over that before [-]", "sloughed [-]"
 TILT, OFFSET, TOPPLED = "tilt [degree]", "com offset over the base's radius [-]", "toppled [-]"
 
-QUANTITIES = tuple(
-    Quantity(column=column, label=label, form=form, meaning=meaning)
-    for column, label, form, meaning in (
-        (
-            BASE,
-            "radius before [m]",
-            ".4f",
-            "radius about the centre of mass that holds 95 % of it, with the wall",
-        ),
-        (TOP, "height before [m]", ".4f", "height below which 95 % of the material lies, with the wall"),
-        (CENTRE, "", "", "height of the centre of mass, with the wall"),
-        (CONTACT, "cluster by contact", ".3f", "share of the smarticles in the largest cluster joined by contact"),
-        (ENTANGLED, "by crossings", ".3f", "share in the largest cluster joined by links that pass through planes"),
-        (HEIGHT, "h/h0", ".3f", "height of the centre of mass over that with the wall"),
-        (TOP_KEPT, "", "", "height below which 95 % of the material lies, over that with the wall"),
-        (SPREAD, "radius / before", ".2f", "radius that holds 95 % of the material, over that with the wall"),
-        (
-            SLOUGHED,
-            "sloughed",
-            ".3f",
-            "share whose centre of mass is farther from the middle than the wall was by w/2",
-        ),
-        (TILT, "tilt [deg]", ".1f", "angle from the vertical of the line from the foot to the centre of mass"),
-        (OFFSET, "", "", "how far the centre of mass moved sideways, over the radius of 95 % before"),
-        (TOPPLED, "toppled", ".2f", "1 where the centre of mass ends beyond the radius of 95 % before, 0 otherwise"),
-    )
+QUANTITIES = declare(
+    {
+        BASE: ("radius before [m]", ".4f", "radius about the centre of mass that holds 95 % of it, with the wall"),
+        TOP: ("height before [m]", ".4f", "height below which 95 % of the material lies, with the wall"),
+        CENTRE: ("", "", "height of the centre of mass, with the wall"),
+        CONTACT: ("cluster by contact", ".3f", "share of the smarticles in the largest cluster joined by contact"),
+        ENTANGLED: ("by crossings", ".3f", "share in the largest cluster joined by links that pass through planes"),
+        HEIGHT: ("h/h0", ".3f", "height of the centre of mass over that with the wall"),
+        TOP_KEPT: ("", "", "height below which 95 % of the material lies, over that with the wall"),
+        SPREAD: ("radius / before", ".2f", "radius that holds 95 % of the material, over that with the wall"),
+        SLOUGHED: ("sloughed", ".3f", "share farther from the middle than the wall was, by w/2 or more"),
+        TILT: ("tilt [deg]", ".1f", "angle from the vertical of the line from the foot to the centre of mass"),
+        OFFSET: ("", "", "how far the centre of mass moved sideways, over the radius of 95 % before"),
+        TOPPLED: ("toppled", ".2f", "1 where the centre of mass ends beyond the radius of 95 % before, 0 otherwise"),
+    }
 )
 
 
@@ -106,7 +95,7 @@ def measure(run: Run) -> MeasuredRun:
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
     return MeasuredRun(
-        manifest=run, rows=[row], history=history | {name: np.array([one[name] for one in rows]) for name in rows[0]}
+        run=run, rows=[row], history=history | {name: np.array([one[name] for one in rows]) for name in rows[0]}
     )
 
 
@@ -290,7 +279,7 @@ STUDY = Study(
         Key(column=ASPECT, label="l/w", form="g"),
         Key(column=PROCEDURE, label="procedure", order=ORDER),
     ),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(
         *(_against_time(*point) for point in ((0.7, 0.0), (0.7, 0.1), (0.4, 0.0), (1.0, 0.0))),

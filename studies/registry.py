@@ -53,7 +53,7 @@ class Script:
         """Values of the run that a picture is drawn of."""
         return self.load().pictured
 
-    def load(self, *, quick: bool = False) -> Study:
+    def load(self) -> Study:
         """Import the study."""
         study: Study = importlib.import_module(f"studies.{self.module}").STUDY
         return replace(study, name=self.name)

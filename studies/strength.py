@@ -44,7 +44,7 @@ from studies.framework.procedures import (
     of_procedure,
     prepared_by,
 )
-from studies.framework.quantities import Key, Quantity
+from studies.framework.quantities import Key, declare
 from studies.framework.runs import DEFINITION, Row, duration
 from studies.framework.study import Study
 
@@ -56,97 +56,38 @@ CARRIED, BREAK = "carried off [-]", "lowest points of what is carried off, befor
 BEFORE, ABOVE = "load before the pull over n W_s [-]", "smarticles above the hook [-]"
 TOP, KEPT = "height of 95 % [m]", "com height without over with the wall [-]"
 
-QUANTITIES = {
-    quantity.column: quantity
-    for quantity in (
-        Quantity(
-            column=PEAK,
-            label="peak",
-            form=".3f",
-            axis=r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]",
-            meaning=f"largest mean over {WINDOW:g} s of the force that raises the hook, over the weight n W_s of all "
-            "smarticles; at least, where it held",
+QUANTITIES = declare(
+    {
+        PEAK: (
+            "peak",
+            ".3f",
+            f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held",
         ),
-        Quantity(
-            column=RAISED,
-            label="raised at it [mm]",
-            form=".1f",
-            scale=1e3,
-            axis="hook raised at the peak [mm]",
-            axis_scale=1e3,
-            meaning="how far the hook had been raised then",
+        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
+        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull: to fracture, and to carry off what comes along"),
+        THROUGH: ("through to the grid", ".3f", "upwards on the grid at the peak less that before the pull"),
+        BEFORE: ("before", ".3f", "force on the hook before the pull: what rests on it, and a pile that is braced"),
+        HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
+        CARRIED: ("carried off", ".3f", "share that rose by more than half of the hook's way; empty where held"),
+        BREAK: (
+            "broke at [mm]",
+            ".1f",
+            "mean height of the lowest points of those before the pull",
         ),
-        Quantity(
-            column=WORK,
-            label="work / n W_s w",
-            form=".3f",
-            axis=r"work $W/(n W_\mathrm{s} w)$ [-]",
-            meaning="∫ F dz over the whole pull, over n W_s w: work to fracture, and to carry off what comes along",
-        ),
-        Quantity(
-            column=THROUGH,
-            label="through to the grid",
-            form=".3f",
-            meaning="upwards on the grid at the peak less that before the pull, over n W_s: what goes through the "
-            "pile, where the rest is weight that was lifted",
-        ),
-        Quantity(
-            column=BEFORE,
-            label="before",
-            form=".3f",
-            meaning="force on the hook before the pull, over n W_s: of what rests on it, and of a pile that is braced "
-            "between hook and grid",
-        ),
-        Quantity(
-            column=HELD_FAST,
-            label="held fast",
-            form=".2f",
-            meaning="1 where the hook was stopped by its force limit on the way, 0 where it arrived",
-        ),
-        Quantity(
-            column=CARRIED,
-            label="carried off",
-            form=".3f",
-            axis="fraction carried off [-]",
-            meaning="smarticles whose centre of mass rose by more than half of the hook's way, over n; empty "
-            "where held",
-        ),
-        Quantity(
-            column=BREAK,
-            label="broke at [mm]",
-            form=".1f",
-            scale=1e3,
-            meaning="height above the floor of those smarticles' lowest points before the pull, mean over them: where "
-            "the pile broke; empty where nothing was carried off, or the hook was held",
-        ),
-        Quantity(
-            column=ABOVE,
-            label="above the hook",
-            form=".2f",
-            meaning="smarticles whose centre of mass is above the hook before the pull, over n",
-        ),
-        Quantity(
-            column=TOP,
-            label="height [mm]",
-            form=".1f",
-            scale=1e3,
-            meaning="height below which 95 % of the material lies before the pull",
-        ),
-        Quantity(
-            column=KEPT,
-            label="kept without wall",
-            form=".3f",
-            meaning="height of the centre of mass before the pull over that before the wall went",
-        ),
-        Quantity(
-            column=CROSSINGS,
-            label="⟨N⟩",
-            form=".2f",
-            axis=CROSSINGS_LABEL,
-            meaning="⟨N⟩ at rest before the wall went: links of others through a smarticle's plane",
-        ),
-    )
-}
+        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
+        KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
+        CROSSINGS: ("⟨N⟩", ".2f", "links of others through a smarticle's plane at rest before the wall went"),
+    },
+    axes={
+        PEAK: r"peak force $F_\mathrm{max}/(n W_\mathrm{s})$ [-]",
+        RAISED: "hook raised at the peak [mm]",
+        WORK: r"work $W/(n W_\mathrm{s} w)$ [-]",
+        CARRIED: "fraction carried off [-]",
+        CROSSINGS: CROSSINGS_LABEL,
+    },
+    scales={RAISED: 1e3, BREAK: 1e3, TOP: 1e3},
+)
 
 
 def measure(run: Run) -> Row:

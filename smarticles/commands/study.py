@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,7 +74,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     folder = make_folder(file, arguments.out, arguments.command_line, changed, engine=arguments.engine)
     note = _note(arguments.name, file, changed, arguments.engine)
     print(note, flush=True)
-    load = partial(shipped.load, quick=arguments.quick)
+    load = shipped.load
     earlier = _earlier(arguments.earlier, folder, load)
     if earlier:
         note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"

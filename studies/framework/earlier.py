@@ -64,7 +64,7 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> Mapping[s
             {str(column): value for column, value in row.items() if column != ENGINE}
             for row in rows.to_dict(orient="records")
         ]
-        found[str(name)] = MeasuredRun(manifest=_manifest(run, origin), rows=cells)
+        found[str(name)] = MeasuredRun(run=_manifest(run, origin), rows=cells)
     if not found:
         msg = f"{results}: none of its {table['run'].nunique()} runs is of a scene of this study as it is; {_REMEDY}"
         raise InputError(msg)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import pandas as pd
 
@@ -39,6 +40,27 @@ class Quantity:
         """Format the mean of a point with its error, where it has one."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return told_number(self.scale * point[self.column], self.form, self.scale * error)
+
+
+def declare(
+    rows: Mapping[str, tuple[str, str, str]],
+    *,
+    axes: Mapping[str, str] = MappingProxyType({}),
+    scales: Mapping[str, float] = MappingProxyType({}),
+) -> dict[str, Quantity]:
+    """Declare quantities by column: label, format and meaning; axes and factors where they are not the default."""
+    return {
+        column: Quantity(
+            column=column,
+            label=label,
+            form=form or ".3g",
+            meaning=meaning,
+            axis=axes.get(column, ""),
+            scale=scales.get(column, 1.0),
+            axis_scale=scales.get(column, 1.0),
+        )
+        for column, (label, form, meaning) in rows.items()
+    }
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -61,12 +61,12 @@ class MeasuredRun:
     """A finished run and what was measured of it.
 
     Attributes:
-        manifest: What the run says of itself.
+        run: The run.
         rows: Its rows of the table of runs: one, unless a study measures the same run in several ways.
         history: Quantities against time by the names of columns, (n,) each; empty where a study has none.
     """
 
-    manifest: Run
+    run: Run
     rows: Sequence[Row] = field(repr=False)
     history: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, repr=False)
 
@@ -78,7 +78,7 @@ class MeasuredRun:
     @property
     def name(self) -> str:
         """Name of its directory, which the table of runs calls it by."""
-        return self.manifest.path.name
+        return self.run.path.name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,20 +100,18 @@ class Collected:
     @property
     def manifests(self) -> tuple[Run, ...]:
         """What the finished runs say of themselves."""
-        return tuple(run.manifest for run in self.runs)
+        return tuple(run.run for run in self.runs)
 
     @property
     def engines(self) -> tuple[str, ...]:
         """The engines that the finished runs were computed by, as in `ENGINES`."""
-        present = {run.manifest.manifest.engine for run in self.runs}
+        present = {run.run.manifest.engine for run in self.runs}
         return tuple(name for name in ENGINES if name in present) + tuple(sorted(present - set(ENGINES)))
 
     def table(self) -> pd.DataFrame:
         """The rows of all runs; with their engine where there are several."""
         if len(self.engines) > 1:
-            return pd.DataFrame(
-                [{ENGINE: run.manifest.manifest.engine, **row} for run in self.runs for row in run.rows]
-            )
+            return pd.DataFrame([{ENGINE: run.run.manifest.engine, **row} for run in self.runs for row in run.rows])
         return pd.DataFrame([row for run in self.runs for row in run.rows])
 
     def times(self) -> pd.DataFrame | None:
@@ -144,8 +142,8 @@ class Collected:
             if value(run) != value(first):
                 msg = (
                     f"study {self.study}: runs of different {quantity} must not be averaged: "
-                    f"{first.manifest.path} is {value(first)}, "
-                    f"{run.manifest.path} is {value(run)}; analyse them apart"
+                    f"{first.run.path} is {value(first)}, "
+                    f"{run.run.path} is {value(run)}; analyse them apart"
                 )
                 raise InputError(msg)
 
@@ -161,11 +159,11 @@ class Collected:
         """
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
-            key = (value(run), run.manifest.manifest.seed, run.manifest.manifest.engine)
+            key = (value(run), run.run.manifest.seed, run.run.manifest.engine)
             if key in seen:
                 msg = (
                     f"study {self.study}: {name} = {key[0]} with seed {key[1]} is given twice, "
-                    f"{seen[key].manifest.path} and {run.manifest.path}; leave one out"
+                    f"{seen[key].run.path} and {run.run.path}; leave one out"
                 )
                 raise InputError(msg)
             seen[key] = run

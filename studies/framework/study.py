@@ -184,7 +184,7 @@ class Study:
         measured = self.measure(run)
         if isinstance(measured, MeasuredRun):
             return measured
-        return MeasuredRun(manifest=run, rows=[measured] if isinstance(measured, Mapping) else measured)
+        return MeasuredRun(run=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
         """Reject runs that must not be averaged or compared.
@@ -193,13 +193,13 @@ class Study:
             InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
         """
         found.refuse_mixture(
-            "fidelity", lambda run: run.manifest.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
+            "fidelity", lambda run: run.run.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
         )
         if self.one_engine:
-            found.refuse_mixture("engine", lambda run: run.manifest.manifest.engine)
+            found.refuse_mixture("engine", lambda run: run.run.manifest.engine)
         found.refuse_mixture(
             "count",
-            lambda run: f"{run.manifest.manifest.count} smarticles",
+            lambda run: f"{run.run.manifest.count} smarticles",
             within=partial(_values, columns=self.same_count),
         )
         for column, within in self.constant.items():

@@ -13,39 +13,44 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
 
 from dem.errors import InputError
-from dem.record.files import write_json, write_text
+from dem.record.document import Document
+from dem.record.files import write_text
 from templates.slurm import queue
 from templates.slurm.cluster import Cluster
 from templates.slurm.request import Request
 from templates.slurm.script import RUN_LIST, SCRIPT, job_name, render_script
-from templates.sweep.files import read_json
 from templates.sweep.folder import Entry, Folder, RunStatus
 
 JOBS, JOB = "jobs", "job.json"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Submission:
-    """Runs that were given to a queue, or written for it.
+class Submission(Document):
+    """Runs that were given to a queue, or written for it: `job.json`.
 
-    Args:
-        number: its number, the name of its folder.
-        job_name: name of the job; unique, so that the job is found even if its number was lost.
-        job_id: number of the job, or None where the script was only written.
-        cluster: what --cluster said.
-        runs_per_task: runs of one task.
-        runs: names of the runs, in the order of the tasks.
+    Attributes:
+        job_name: Name of the job; unique, so that the job is found even if its number was lost.
+        job_id: Number of the job; None where the script was only written.
+        cluster: What --cluster said.
+        runs: Names of the runs, in the order of the tasks.
+        number: Name of its folder in `jobs/`.
     """
 
-    number: str
+    remedy: ClassVar[str] = (
+        "it is not known which runs are in the queue; look with `squeue --me`, cancel them, and remove its folder"
+    )
+    format: Literal[1] = 1
     job_name: str
-    job_id: int | None
+    job_id: int | None = None
     cluster: str
     runs_per_task: int
+    stored: str = ""
     runs: tuple[str, ...]
+    number: str = Field("", exclude=True)
 
     @property
     def script(self) -> str:
@@ -85,30 +90,8 @@ def submissions(folder: Path) -> list[Submission]:
     Raises:
         InputError: a record is damaged.
     """
-    found = []
-    for file in sorted(folder.glob(f"{JOBS}/*/{JOB}")):
-        content = read_json(file)
-        try:
-            if content is None:
-                raise ValueError
-            job_id = content["job_id"]
-            found.append(
-                Submission(
-                    number=file.parent.name,
-                    job_name=str(content["job_name"]),
-                    job_id=None if job_id is None else int(job_id),
-                    cluster=str(content["cluster"]),
-                    runs_per_task=int(content["runs_per_task"]),
-                    runs=tuple(map(str, content["runs"])),
-                )
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            msg = (
-                f"{file}: is damaged, so it is not known which runs are in the queue; look with `squeue --me`, "
-                f"cancel it, and remove {file.parent}"
-            )
-            raise InputError(msg) from error
-    return found
+    files = sorted(folder.glob(f"{JOBS}/*/{JOB}"))
+    return [Submission.read(file).model_copy(update={"number": file.parent.name}) for file in files]
 
 
 def draft(
@@ -144,7 +127,6 @@ def draft(
     submission = Submission(
         number=number,
         job_name=job_name(name, token or uuid.uuid4().hex[:8]),
-        job_id=None,
         cluster=reference,
         runs_per_task=request.runs_per_task,
         runs=tuple(entry.name for entry in ordered),
@@ -187,22 +169,14 @@ def submit(folder: Folder, draft: Draft) -> Submission:
     """
     # The name was stored before: a job whose number is lost here is still found in the queue by its name.
     number = queue.submit(draft.submission.script, folder.path)
-    submitted = replace(draft.submission, job_id=number)
+    submitted = draft.submission.model_copy(update={"job_id": number})
     _store(folder, submitted)
     return submitted
 
 
 def _store(folder: Folder, submission: Submission) -> None:
-    content = {
-        "format": 1,
-        "job_name": submission.job_name,
-        "job_id": submission.job_id,
-        "cluster": submission.cluster,
-        "runs_per_task": submission.runs_per_task,
-        "stored": datetime.now(UTC).isoformat(timespec="seconds"),
-        "runs": list(submission.runs),
-    }
-    write_json(folder.path / JOBS / submission.number / JOB, content)
+    stored = submission.model_copy(update={"stored": datetime.now(UTC).isoformat(timespec="seconds")})
+    stored.write(folder.path / JOBS / submission.number / JOB)
 
 
 def tasks_of_runs(found: Sequence[Submission]) -> dict[str, queue.Task]:

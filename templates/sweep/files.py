@@ -1,13 +1,11 @@
-"""Text files in: CSV read strictly, JSON if it is there."""
+"""Text files in, CSV read strictly."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from pathlib import Path
-from typing import Any
 
 from dem.errors import InputError
 
@@ -64,12 +62,3 @@ def _cell(text: str) -> int | float | str:
         except ValueError:
             continue
     return text
-
-
-def read_json(path: Path) -> dict[str, Any] | None:
-    """A JSON object, or None where the file is absent, being replaced, or something else."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return content if isinstance(content, dict) else None

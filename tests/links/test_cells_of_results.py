@@ -137,7 +137,7 @@ def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, obje
     command = [sys.executable, "-m", "smarticles", "run", str(file), "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    study = shipped(table).load(quick=False)
+    study = shipped(table).load()
     measured = study.measured if isinstance(study, Study) else study.measure
     return measured(open_run(out)).rows[0]
 

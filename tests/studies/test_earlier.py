@@ -44,16 +44,16 @@ def test_a_run_is_what_the_table_and_the_provenance_say(wanted: dict[str, Wanted
     run = found[NAME]
     line = next(line for line in (RESULTS / "runs.csv").read_text().splitlines() if line.endswith(f",{NAME}"))
     assert str(run.row["crossings [-]"]) in line.split(",")
-    assert run.row["seed"] == run.manifest.seed == 3
-    assert (run.manifest.count, run.manifest.aspect_ratio, run.manifest.engine) == (270, 0.7, "links")
-    assert run.manifest.command.startswith("smarticles run procedures/scenes/shape-change_lw0.70")
-    assert run.manifest.versions["git"] in (RESULTS / "provenance.json").read_text()
+    assert run.row["seed"] == run.run.manifest.seed == 3
+    assert (run.run.manifest.count, run.run.manifest.aspect_ratio, run.run.manifest.engine) == (270, 0.7, "links")
+    assert run.run.manifest.command.startswith("smarticles run procedures/scenes/shape-change_lw0.70")
+    assert run.run.manifest.versions["git"] in (RESULTS / "provenance.json").read_text()
 
 
 def test_the_same_tables_come_out_again(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
     report = (
         shipped("procedures")
-        .load(quick=False)
+        .load()
         .analyse(
             [tmp_path / name for name in wanted],
             tmp_path / "results",
@@ -122,9 +122,7 @@ def test_a_directory_that_is_there_goes_before_the_tables(wanted: dict[str, Want
     earlier = earlier_runs(RESULTS, wanted)
     there, gone = tmp_path / NAME, tmp_path / "internal10_lw0.40_links_seed1"
     write_run(there)
-    found = collect_runs(
-        "test", [there, gone], lambda run: MeasuredRun(manifest=run, rows=[{"new": 1}]), earlier=earlier
-    )
+    found = collect_runs("test", [there, gone], lambda run: MeasuredRun(run=run, rows=[{"new": 1}]), earlier=earlier)
     assert [run.row.get("new") for run in found.runs] == [1, None]
 
 

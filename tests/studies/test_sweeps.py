@@ -152,7 +152,7 @@ def test_studies_that_are_not_there() -> None:
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
     shipped = STUDIES[name]
-    assert shipped.load(quick=True).name == name
+    assert shipped.load().name == name
     assert shipped.about
     variables = expand(of_one_seed(load_sweep(shipped.sweep_file())))[0].values
     assert set(shipped.pictured) <= set(variables)

@@ -90,7 +90,7 @@ def test_submit_none_writes_scripts_that_are_submitted_by_hand(
     assert said.status == 0
     assert "&& sbatch jobs/001/array.sh" in said.out
     assert (out / "jobs/001/runs.txt").read_text().split() == ["n6", "n5"]
-    assert json.loads((out / "jobs/001/job.json").read_text())["job_id"] is None
+    assert json.loads((out / "jobs/001/job.json").read_text()).get("job_id") is None
 
 
 def test_a_sweep_is_submitted_followed_and_resumed(

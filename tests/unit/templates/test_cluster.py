@@ -46,10 +46,6 @@ def test_shipped_clusters_are_valid(name: str) -> None:
     assert load_cluster(name).name == name
 
 
-def test_three_kinds_are_shipped() -> None:
-    assert shipped_clusters() == ["example-apptainer", "example-large", "local-slurm"]
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
