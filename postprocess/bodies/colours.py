@@ -113,7 +113,7 @@ def colour_field(name: str | None, run: Run) -> Field:
         InputError: It is no field, or the run has no such.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
-    field = checked_field(usual if name is None else ALIASES.get(name, name))
+    field = checked_field(usual if name is None else name, ALIASES)
     if not field.available_for(run):
         msg = f"{run.path}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
         raise InputError(msg)

@@ -270,16 +270,17 @@ def fields_of(run: Run) -> tuple[Field, ...]:
     return tuple(field for field in FIELDS if field.available_for(run))
 
 
-def checked_field(name: str) -> Field:
-    """Return the field of a name.
+def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) -> Field:
+    """Return the field of a name, or of one of its short names.
 
     Raises:
         InputError: There is none.
     """
-    if name not in BY_NAME:
-        msg = f"{name!r} is no field; {nearest(name, list(BY_NAME), cutoff=0.5)}"
+    field = BY_NAME.get(aliases.get(name, name))
+    if field is None:
+        msg = f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}"
         raise InputError(msg)
-    return BY_NAME[name]
+    return field
 
 
 def link_values(field: Field, frame: Frame, run: Run) -> NDArray[Any] | None:

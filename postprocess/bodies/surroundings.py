@@ -124,7 +124,7 @@ def read_surroundings(run: Run) -> Surroundings:
     Raises:
         InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
     """
-    scene, phases = run.scene, run.scene["phases"]
+    scene, phases = run.scene, run.scene.get("phases", ())
     series = run.series if run.has_series else None
     hooks = scene.get("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)

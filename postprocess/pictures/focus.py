@@ -13,7 +13,7 @@ from dem.errors import InputError
 from postprocess.geometry.links import plane_frames
 from postprocess.measures.entanglement import has_plane, link_passages
 from postprocess.pictures.canvas import MILLIMETRE, Canvas, Caption, Look, drawn, rectangle
-from postprocess.pictures.render import Shot
+from postprocess.pictures.shot import Shot
 from postprocess.report import figures
 
 if TYPE_CHECKING:

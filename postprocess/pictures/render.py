@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
 from dem.record.forces import read_forces
-from dem.record.frames import FrameSequence, read_frames
-from dem.record.run import Run, open_run
-from postprocess.bodies.colours import ColourScale, Span, scalars, span
-from postprocess.bodies.fields import BY_NAME, IDENTITY
-from postprocess.bodies.meshes import USUAL, Bodies
+from postprocess.bodies.colours import ColourScale, Span, span
 from postprocess.pictures import film
-from postprocess.pictures.canvas import VIEWS, Canvas, Caption, Look, Rectangle, axes_from, drawn, rectangle, union
+from postprocess.pictures.canvas import VIEWS, Canvas, Caption, Look, axes_from, drawn, union
 from postprocess.pictures.captions import caption_of, titles_of
+from postprocess.pictures.focus import focused
+from postprocess.pictures.shot import Shot
 from postprocess.report import figures
 
 if TYPE_CHECKING:
@@ -31,35 +29,6 @@ Limits = Span | Literal["run"] | None
 
 Track = Callable[[Iterable[Image.Image], int], Iterable[Image.Image]]
 """Follows the pictures of a film, of which there are so many."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Shot:
-    """A run to be drawn."""
-
-    run: Run
-    frames: FrameSequence = field(repr=False)
-    bodies: Bodies = field(repr=False)
-
-    @classmethod
-    def of(cls, directory: Path | str, *, forces: bool = False) -> Self:
-        """Return a shot of a run directory.
-
-        Raises:
-            InputError: Something of it is missing or damaged, or forces are wanted and not recorded.
-        """
-        run = open_run(directory)
-        kinds = (*USUAL, "forces") if forces else USUAL
-        bodies = Bodies(run, kinds, [BY_NAME[name] for name in IDENTITY], cut=True)
-        return cls(run=run, frames=read_frames(directory), bodies=bodies)
-
-    def room(self, indices: Iterable[int], axes: NDArray[np.float64]) -> Rectangle:
-        """Return what the camera must have in view to show some frames [mm]."""
-        return union([rectangle(drawn(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
-
-    def values(self, indices: Iterable[int], look: Look) -> list[NDArray[np.float64]]:
-        """Return values (N, 3) that the colours of some frames show."""
-        return [scalars(look.field, self.frames[i], self.run) for i in indices]
 
 
 def render_run(
@@ -116,8 +85,6 @@ def render_run(
     # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
     figures.refuse_to_overwrite(output, overwrite=overwrite)
     if smarticle is not None:
-        from postprocess.pictures.focus import focused  # noqa: PLC0415  (imports this module)
-
         if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
             raise InputError(msg)

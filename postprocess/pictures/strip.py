@@ -10,7 +10,7 @@ import numpy as np
 
 from postprocess.bodies.colours import ColourScale
 from postprocess.pictures.canvas import Canvas, Caption, Look, drawn, union
-from postprocess.pictures.render import Shot
+from postprocess.pictures.shot import Shot
 from postprocess.report import figures
 
 _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out

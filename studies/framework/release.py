@@ -12,7 +12,6 @@ from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from postprocess.measures.table import PASSIVE_PHASES
-from postprocess.pictures import strip
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
@@ -88,6 +87,8 @@ class Pictures:
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the runs whose directories are there."""
+        from postprocess.pictures import strip  # noqa: PLC0415  (imports PyVista)
+
         runs, rows = analysis.runs, []
         if self.select:
             runs = runs[(runs[list(self.select)] == 0).all(axis=1)]

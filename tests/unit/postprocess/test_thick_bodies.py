@@ -18,9 +18,9 @@ from dem.body.state import State
 from dem.record.frames import FrameWriter
 from dem.record.run import open_run
 from dem.scene.reading import dump_scene
+from postprocess.bodies.meshes import link_boxes
 from postprocess.geometry import chains
 from postprocess.measures.contacts import chain_of
-from postprocess.pictures.canvas import link_boxes
 
 W, L, T1, BARB, BODY = 0.0467, 0.042, 0.021, 0.0095, 0.0213
 SPREAD = np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])  # m/s, of barb 1, middle link, barb 2

@@ -40,7 +40,7 @@ def test_values_are_those_of_the_measures(pile):
 def test_cells_of_local_packing_fill_the_container(pile):
     frame, local = values(pile, "local_packing_fraction")
     assert np.isfinite(local).all()
-    solid = open_run(pile).solid_volume
+    solid = open_run(pile).manifest.solid_volume_m3
     top = frame.vertices[..., 2].max() - frame.floor_z
     # The wall is a polygon around the circle, and the lid half a spacing above the highest point.
     assert (solid / local[:, 0]).sum() == pytest.approx(np.pi * RADIUS**2 * top, rel=0.15)
