@@ -120,7 +120,7 @@ def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: fl
             os.environ[RANKS] = str(number)
             engine = LammpsKind().build(scene, time_step(scene))
             engine.load(saved, folder)
-            engine.fixtures.shake(amplitude=5.5e-4, frequency=30.0)
+            engine.boundaries.shake(amplitude=5.5e-4, frequency=30.0)
             engine.advance(1)
             took = []
             for _ in range(STRETCHES):

@@ -46,7 +46,7 @@ def stretches(run: Path) -> dict[str, Any]:
     checkpoint, _ = read_checkpoint(run, scene_sha256=scene_hash(scene), made_by=("links", made_by))
     state: dict[str, Any] = dict(checkpoint.state)
     engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), run)
-    engine.fixtures.shake(amplitude=AMPLITUDE, frequency=FREQUENCY)
+    engine.boundaries.shake(amplitude=AMPLITUDE, frequency=FREQUENCY)
     engine.advance(30)
     wall, processor = [], []
     for _ in range(STRETCHES):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.chain import Tie
-from dem.body.forces import ContactForces, at_fixtures, at_links, contacts_of_points
+from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_points
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -40,7 +40,7 @@ STABLE_STEP = 5e-4  # s; nothing here is unstable
 
 
 @dataclass(kw_only=True)
-class FixturesDouble:
+class BoundariesDouble:
     """Floor, wall and hooks; the upper hook is pulled down by a spring, `hook_stiffness` [N/m], as it is raised."""
 
     told: Told
@@ -186,7 +186,7 @@ class StringsDouble:
 
 
 @dataclass
-class AccountDouble:
+class LedgerDouble:
     """Energies, exact."""
 
     container_work: float = 0.0
@@ -223,10 +223,10 @@ class EngineDouble:
     steps: int = 0
     cpu_elsewhere: float = 0.0
     told: Told = field(default_factory=list)
-    account: AccountDouble = field(default_factory=AccountDouble)
+    ledger: LedgerDouble = field(default_factory=LedgerDouble)
 
     def __post_init__(self) -> None:
-        self.fixtures = FixturesDouble(told=self.told, top=self.cylinder.height, planar=self.planar)
+        self.boundaries = BoundariesDouble(told=self.told, top=self.cylinder.height, planar=self.planar)
         self.motors = MotorsDouble(told=self.told)
         self.strings = StringsDouble(told=self.told)
         self.positions = np.zeros((0, 3))
@@ -248,12 +248,12 @@ class EngineDouble:
             planar=scene.channel is not None,
         )
         engine.motors.present = scene.actuates
-        engine.fixtures.bottom = scene.cylinder.bottom
+        engine.boundaries.bottom = scene.cylinder.bottom
         if scene.hooks is not None:
-            engine.fixtures.upper_start = scene.hooks.upper_height_m
-            engine.fixtures.hook_sums = np.zeros((2, 3))
+            engine.boundaries.upper_start = scene.hooks.upper_height_m
+            engine.boundaries.hook_sums = np.zeros((2, 3))
         if scene.channel is not None and scene.channel.width is not None:
-            engine.fixtures.channel_sums = np.zeros((2, 3))
+            engine.boundaries.channel_sums = np.zeros((2, 3))
         return engine
 
     # -- time --------------------------------------------------------------------------------------------------
@@ -270,9 +270,9 @@ class EngineDouble:
             self._step()
 
     def _step(self) -> None:
-        dt, carried, floor = self.time_step, self._standing, self.fixtures.floor
+        dt, carried, floor = self.time_step, self._standing, self.boundaries.floor
         falling = ~carried
-        self.fixtures.step(dt)
+        self.boundaries.step(dt)
         self.strings.step(dt)
         self.time, self.steps = self.time + dt, self.steps + 1
         self._seconds += dt * self.count
@@ -283,13 +283,13 @@ class EngineDouble:
                 self.positions[k, 0] += dt * velocity
                 self.strings.places[k, :, 0] += dt * velocity
             return
-        if self.fixtures.floor == floor and not (self.drift or self.velocities.any() or falling.any()):
+        if self.boundaries.floor == floor and not (self.drift or self.velocities.any() or falling.any()):
             return
-        ground, before = self.fixtures.floor + self.stands, self._energy(carried)
-        along = [self.drift, 0.0, self.fixtures.velocity]
+        ground, before = self.boundaries.floor + self.stands, self._energy(carried)
+        along = [self.drift, 0.0, self.boundaries.velocity]
         self.positions[carried, 0] += self.drift * dt
         self.positions[carried, 2], self.velocities[carried] = ground[carried], along
-        self.account.container_work += self._energy(carried) - before
+        self.ledger.container_work += self._energy(carried) - before
         if not falling.any():
             return
         self.positions[falling] += dt * self.velocities[falling] - [0.0, 0.0, self.gravity * dt**2 / 2]
@@ -298,7 +298,7 @@ class EngineDouble:
         if landed.any():
             before = self._energy(landed)
             self.positions[landed, 2], self.velocities[landed] = ground[landed], along
-            self.account.dissipated += before - self._energy(landed)
+            self.ledger.dissipated += before - self._energy(landed)
             self._standing = carried | landed
 
     def _energy(self, which: NDArray[np.bool_]) -> float:
@@ -322,14 +322,14 @@ class EngineDouble:
         self.stands = self.particle.radius - lowest
         self._standing = np.concatenate([self._standing, np.zeros(n, dtype=np.bool_)])
         energy = self.gravity * float(poses.positions[:, 2].sum()) + n * speed**2 / 2
-        self.account.added += boxes.mass * energy
+        self.ledger.added += boxes.mass * energy
         self.motors.angles = np.tile(boxes.angles, (self.count, 1))
         self.strings.places = self.state().link_positions
 
     def still(self) -> None:
         assert not self.motors.articulated
         self.told.append(("still",))
-        self.account.dissipated += self.state().kinetic_energy
+        self.ledger.dissipated += self.state().kinetic_energy
         self.velocities[:] = 0.0
 
     def state(self) -> State:
@@ -360,9 +360,9 @@ class EngineDouble:
         weight = self.particle.boxes.mass * self.gravity
         return contacts_of_points(
             at_links(standing, np.ones_like(standing)),
-            at_fixtures(np.zeros_like(standing)),
+            at_boundaries(np.zeros_like(standing)),
             loads=np.full(len(standing), weight),
-            points=points + np.array([0.0, 0.0, self.fixtures.floor]),
+            points=points + np.array([0.0, 0.0, self.boundaries.floor]),
             friction=0 * up,
             forces=weight * up,
         )
@@ -374,7 +374,7 @@ class EngineDouble:
 
     def save(self, scratch: Path) -> Saved:
         kept = {name: value for name, value in vars(self).items() if name not in ("particle", "cylinder", "told")}
-        parts = {name: vars(kept.pop(name)) for name in ("fixtures", "motors", "strings", "account")}
+        parts = {name: vars(kept.pop(name)) for name in ("boundaries", "motors", "strings", "ledger")}
         content = {name: {key: value for key, value in part.items() if key != "told"} for name, part in parts.items()}
         time, steps = kept.pop("time"), kept.pop("steps")
         return Saved(content=pickle.dumps((kept, content)), memory={"time": time, "steps": steps})

@@ -42,7 +42,7 @@ def taken_over(engine: str, source: str) -> dict[str, Any]:
             running.advance(max(1, round(wait / running.time_step)))
         memory |= stage.memory
     assert put is not None
-    state, stored = running.state(), running.account.elastic()[0]
+    state, stored = running.state(), running.ledger.elastic()[0]
     moved = np.linalg.norm(state.positions - put.positions, axis=1)
     gravity = running.gravity
     return {
@@ -54,7 +54,7 @@ def taken_over(engine: str, source: str) -> dict[str, Any]:
         "diameter": scene.sphere_diameter,
         "vertices": state.vertices,
         # What came from nowhere, in heights that it could lift all by [m].
-        "gained": (state.kinetic_energy + state.potential_energy(gravity, 0.0) + stored - running.account.added)
+        "gained": (state.kinetic_energy + state.potential_energy(gravity, 0.0) + stored - running.ledger.added)
         / (scene.count * running.particle.boxes.mass * gravity),
-        "lost": running.account.dissipated,
+        "lost": running.ledger.dissipated,
     }

@@ -142,7 +142,7 @@ def look(engine: Engine, recorder: Recorder) -> str | None:
 def energy(engine: Engine) -> float:
     """Kinetic, potential, and that of the springs of all contacts [J]."""
     state = engine.state()
-    return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.account.elastic()[0]
+    return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.ledger.elastic()[0]
 
 
 def fastest(engine: Engine) -> float:

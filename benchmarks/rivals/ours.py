@@ -25,8 +25,8 @@ def simulate(given: Given, knobs: Knobs) -> Outcome:
 
 
 def residual(engine: Engine) -> Mapping[str, float]:
-    """What the account of energies misses, over all that was dissipated; adds as `dem.run.sampler` does."""
-    state, account = engine.state(), engine.account
+    """What the energy ledger misses, over all that was dissipated; adds as `dem.run.sampler` does."""
+    state, account = engine.state(), engine.ledger
     gravity = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0)
     given = account.added + account.container_work + engine.motors.work
     return {RESIDUAL: 100 * (given - gravity - sum(account.elastic()) - account.dissipated) / account.dissipated}
@@ -77,4 +77,4 @@ class OnEngine:
     def links(self) -> tuple[Array, Array]:
         """See `Stepped.links`."""
         state = self.engine.state()
-        return state.link_positions - np.array([0.0, 0.0, self.engine.fixtures.floor]), state.link_rotations
+        return state.link_positions - np.array([0.0, 0.0, self.engine.boundaries.floor]), state.link_rotations

@@ -1,7 +1,7 @@
 """What a run needs of an engine: the one interface between the physics and everything around it.
 
 An engine is a container, or a plane, that smarticles are added to and that time is advanced in. `Engine` is the running
-simulation, in groups: time and smarticles on the engine itself, and `fixtures`, `motors`, `strings` and `account` for
+simulation, in groups: time and smarticles on the engine itself, and `boundaries`, `motors`, `strings` and `ledger` for
 what does not give way, what moves barbs, what pulls chains, and what energies add up to. `EngineKind` is what is asked
 of an engine before there is a simulation.
 
@@ -64,7 +64,7 @@ class MotorReadings:
     halted: NDArray[np.bool_]
 
 
-class Fixtures(Protocol):
+class Boundaries(Protocol):
     """What does not give way to smarticles: floor and wall, hooks, or the walls of a channel."""
 
     # -- how they stand ----------------------------------------------------------------------------------------
@@ -211,12 +211,12 @@ class Strings(Protocol):
         """(strings, 3) where the strings are tied [m]."""
 
 
-class Account(Protocol):
+class EnergyLedger(Protocol):
     """Energies that have to be added up step by step, each only where a scene asks for it."""
 
     @property
     def container_work(self) -> float:
-        """Work of moving fixtures, and of strings, on the smarticles since the start [J]."""
+        """Work of moving boundaries, and of strings, on the smarticles since the start [J]."""
 
     @property
     def added(self) -> float:
@@ -228,7 +228,7 @@ class Account(Protocol):
 
     @property
     def given(self) -> float:
-        """Energy added and work of fixtures since the start [J]; NaN while one moves whose work is not added up."""
+        """Energy added and work of boundaries since the start [J]; NaN while one moves whose work is not added up."""
 
     def elastic(self) -> tuple[float, float]:
         """Energy in the springs of contacts and of hinges [J]."""
@@ -253,7 +253,7 @@ class Engine(Protocol):
         """g, downwards [m/s²]."""
 
     @property
-    def fixtures(self) -> Fixtures:
+    def boundaries(self) -> Boundaries:
         """What does not give way."""
 
     @property
@@ -265,7 +265,7 @@ class Engine(Protocol):
         """What pulls a chain."""
 
     @property
-    def account(self) -> Account:
+    def ledger(self) -> EnergyLedger:
         """What energies add up to."""
 
     # -- time --------------------------------------------------------------------------------------------------
@@ -326,7 +326,7 @@ class Engine(Protocol):
         """(N,) how many other smarticles each one touches."""
 
     def touches(self) -> NDArray[np.int64]:
-        """(N,) contacts of each smarticle with others and with fixtures, however many with the same."""
+        """(N,) contacts of each smarticle with others and with boundaries, however many with the same."""
 
     def overlaps(self, limit: float) -> Overlaps:
         """How deep contacts are at present, and who has some deeper than a limit [m]."""

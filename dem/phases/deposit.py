@@ -153,7 +153,7 @@ def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng
     tops = state.vertices[..., 2].max(axis=1)
     cylinder, slab = engine.cylinder, phase.layer_height_w * scene.smarticle.middle_length_m
     if phase.every_s is None:
-        bottom = tops.max(initial=engine.fixtures.floor) + particle.radius
+        bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
     else:
         # Some may still fly: from the top of the wall, so that layers keep the distance that they have in time.
         bottom = cylinder.height - slab - 2 * particle.reach

@@ -136,7 +136,7 @@ class Pulling:
             arrival = engine.time + phase.distance_m / phase.speed_m_per_s
             memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True, felt=_felt_above(engine))
             engine.motors.weld()
-            engine.fixtures.raise_upper(phase.speed_m_per_s)
+            engine.boundaries.raise_upper(phase.speed_m_per_s)
             self._note(engine)
         elif memory["raising"] and self._overloaded(engine):
             memory.update(arrival=engine.time, end=engine.time + HELD_FAST)
@@ -144,7 +144,7 @@ class Pulling:
             return left if phase.force_limit_N is None else min(CHECK_INTERVAL, left)
         if memory["raising"]:
             memory["raising"] = False
-            engine.fixtures.stop()
+            engine.boundaries.stop()
         left = time_left(engine, memory["end"])
         if not left and memory.get("felt") == _felt_above(engine):
             memory["warning"] = (
@@ -160,10 +160,10 @@ class Pulling:
         return limit is not None and before - self.memory["force_sum"] > limit * (self.memory["step"] - step)
 
     def _note(self, engine: Engine) -> None:
-        self.memory.update(force_sum=float(engine.fixtures.hook_sums[1, 2]), step=engine.steps)
+        self.memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
 
 
 def _felt_above(engine: Engine) -> list[float]:
     """All that the upper hook has felt so far, summed over steps [N]: unchanged where nothing touches it."""
-    felt: list[float] = engine.fixtures.hook_sums[1].tolist()
+    felt: list[float] = engine.boundaries.hook_sums[1].tolist()
     return felt

@@ -76,18 +76,18 @@ class Removing:
             memory["end"] = engine.time + self._phase.duration_s
             engine.motors.weld()
             if speed is None:
-                engine.fixtures.remove_wall()
+                engine.boundaries.remove_wall()
             else:
-                engine.fixtures.lift_wall(speed)
+                engine.boundaries.lift_wall(speed)
                 memory["lifting"] = True
         left = time_left(engine, memory["end"])
         if memory["lifting"]:
             top = engine.state().vertices[..., 2].max() + engine.particle.radius
-            if engine.fixtures.wall_bottom > top:
-                engine.fixtures.remove_wall()
+            if engine.boundaries.wall_bottom > top:
+                engine.boundaries.remove_wall()
                 memory["lifting"] = False
             elif not left:
-                engine.fixtures.stop()
+                engine.boundaries.stop()
             else:
                 return min(CHECK_INTERVAL, left)
         return left

@@ -98,10 +98,10 @@ class Shaking:
     def proceed(self, engine: Engine) -> float:
         """See `Stage.proceed`."""
         if self.memory["begun"]:
-            engine.fixtures.stop()
+            engine.boundaries.stop()
             return 0.0
-        if self._freed and engine.fixtures.walled:
-            edge = engine.fixtures.wall_bottom - engine.fixtures.floor
+        if self._freed and engine.boundaries.walled:
+            edge = engine.boundaries.wall_bottom - engine.boundaries.floor
             msg = (
                 f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
                 "not clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its "
@@ -111,5 +111,5 @@ class Shaking:
         self.memory["begun"] = True
         engine.motors.weld()
         walls = self._phase.moves == "container"
-        engine.fixtures.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz, walls=walls)
+        engine.boundaries.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz, walls=walls)
         return self._phase.duration_s

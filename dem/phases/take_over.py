@@ -202,7 +202,7 @@ class TakingOver:
             return engine.time_step
         if memory["task"] == "count":
             # Contacts are known from the first step on.
-            engine.account.take_in()
+            engine.ledger.take_in()
             memory["task"] = "let apart"
             return stride
         if memory["task"] == "let apart":

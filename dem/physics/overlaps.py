@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-APART = 0.1  # of the depth that is too deep; fixtures that have moved against each other by less have not
+APART = 0.1  # of the depth that is too deep; boundaries that have moved against each other by less have not
 
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between two fixtures that have moved apart: what gives way is the contact alone.
+    """A smarticle between two boundaries that have moved apart: what gives way is the contact alone.
 
     Args:
         smarticle: its number.
-        between: names of the two fixtures.
+        between: names of the two boundaries.
         apart: by how much they have moved against each other since the start [m].
     """
 
@@ -33,7 +33,7 @@ class Overlaps:
         deepest: overlap of the deepest contact [m].
         deep: (N,) bool, smarticles with a contact that is deeper than asked for.
         elastic_energy: no less than what the springs of all contacts and hinges hold [J].
-        held: those of the deep ones that two fixtures hold.
+        held: those of the deep ones that two boundaries hold.
     """
 
     deepest: float

@@ -109,15 +109,15 @@ def wall_removal(scene: Scene) -> Call:
 
 
 def energies(scene: Scene) -> Call:
-    """Energies in the series, where asked for or needed by the account."""
+    """Energies in the series, where asked for or needed by the energy ledger."""
     recording = scene.recording
     if recording.energies and not recording.energy:
-        return True, "recording.dissipation_interval_s is given, and the account needs them"
+        return True, "recording.dissipation_interval_s is given, and the energy ledger needs them"
     return recording.energies, f"recording.energy is {str(recording.energy).lower()}"
 
 
 def energy_account(scene: Scene) -> Call:
-    """The account of what is dissipated."""
+    """The ledger of what is dissipated."""
     return _every(scene.recording.dissipation_interval_s, "dissipation_interval_s", "dissipation is sampled")
 
 

@@ -87,7 +87,7 @@ LEDGER_COLUMNS: Columns = {
         "J", "dissipated_energy_J", "by contacts, hinges and welding since the start, sampled"
     ),
     "energy_residual_J": Column(
-        "J", "energy_residual_J", "added energy and work less everything stored and dissipated: the account's error"
+        "J", "energy_residual_J", "added energy and work less everything stored and dissipated: the ledger's error"
     ),
 }
 # Only in scenes with hooks.
@@ -151,8 +151,8 @@ FIELDS: Columns = {
 FORCE_FIELDS: Columns = {
     "first_smarticle": Column("1", "first", "number of the one that the force acts on"),
     "first_link": Column("1", "first link", "0 barb 1, 1 middle link, 2 barb 2"),
-    "second_smarticle": Column("1", "second", "number of the one that exerts it, the higher one; -1 for a fixture"),
-    "second_link": Column("1", "second link", "likewise; -1 for a fixture"),
+    "second_smarticle": Column("1", "second", "number of the one that exerts it, the higher one; -1 for a boundary"),
+    "second_link": Column("1", "second link", "likewise; -1 for a boundary"),
     "fixture": Column(
         "1", "fixture", "-1 none, 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls"
     ),

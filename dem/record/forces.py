@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.forces import FIXTURES, NONE, ContactForces
+from dem.body.forces import BOUNDARIES, NONE, ContactForces
 from dem.record.files import cannot_read
 from dem.record.frame import Frame, read_mesh
 from dem.record.names import FORCE, collection, member
@@ -24,7 +24,7 @@ _REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: 
 
 
 def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
-    """All contacts as lines from the first smarticle's centre of mass to the second's, or to the point at a fixture.
+    """All contacts as lines from the first smarticle's centre of mass to the second's, or to the point at a boundary.
 
     Args:
         found: the contacts.
@@ -32,7 +32,7 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
         time: simulated time [s].
         phase: index of the phase.
     """
-    number, between = len(found.forces), found.fixtures == NONE
+    number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))
     ends[:, 0] = positions[found.smarticles[:, 0]]
     ends[:, 1] = found.points
@@ -42,7 +42,7 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
         "first_link": found.links[:, 0],
         "second_smarticle": found.smarticles[:, 1],
         "second_link": found.links[:, 1],
-        "fixture": found.fixtures,
+        "fixture": found.boundaries,
         "normal_force_N": found.normal,
         "tangential_force_N": found.tangential,
         "force_N": found.forces,
@@ -61,7 +61,7 @@ class RecordedForces:
     Attributes:
         path: The file that they came from.
         contacts: The contacts.
-        ends: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a fixture [m].
+        ends: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a boundary [m].
     """
 
     path: Path
@@ -71,7 +71,7 @@ class RecordedForces:
     @property
     def between(self) -> NDArray[np.bool_]:
         """(M,) which contacts are between two smarticles."""
-        found: NDArray[np.bool_] = self.contacts.fixtures == NONE
+        found: NDArray[np.bool_] = self.contacts.boundaries == NONE
         return found
 
 
@@ -119,7 +119,7 @@ def read_forces(frame: Frame) -> RecordedForces:
     contacts = ContactForces(
         smarticles=numbers("first_smarticle", "second_smarticle", below=frame.count),
         links=numbers("first_link", "second_link", below=3),
-        fixtures=numbers("fixture", below=len(FIXTURES))[:, 0],
+        boundaries=numbers("fixture", below=len(BOUNDARIES))[:, 0],
         points=values("point_m", 3),
         normal=values("normal_force_N"),
         tangential=values("tangential_force_N"),

@@ -78,7 +78,7 @@ class Recorder:
                 state,
                 contacts=engine.neighbours(),
                 time=engine.time,
-                floor=engine.fixtures.floor,
+                floor=engine.boundaries.floor,
                 phase=phase,
                 hinged=engine.motors.present,
                 torques=None if motors is None else motors.torques,
@@ -114,7 +114,7 @@ class Recorder:
             RunError: it stopped the run.
         """
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
-        floor, raised, glance = engine.fixtures.floor, engine.fixtures.raised, engine.glance(state)
+        floor, raised, glance = engine.boundaries.floor, engine.boundaries.raised, engine.glance(state)
         if glance is not None and watchdog.content(glance, floor=floor, raised=raised):
             elastic = glance.elastic_energy
         else:
@@ -123,7 +123,7 @@ class Recorder:
             overlaps = engine.overlaps(watchdog.depth)
             watchdog.check_depths(overlaps, time=time)
             elastic = overlaps.elastic_energy
-        given = engine.account.given + engine.motors.work
+        given = engine.ledger.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
         watchdog.check_energy(state, energy=energy, elastic=elastic, time=time)
 

@@ -70,7 +70,7 @@ class Sampler:
             phase: index of the phase.
         """
         boxes = engine.particle.boxes
-        heights = state.positions[:, 2] - engine.fixtures.floor
+        heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
         more: dict[str, Any] = {}
@@ -81,12 +81,12 @@ class Sampler:
             more |= {
                 "hook_upper_force_N": upper,
                 "hook_lower_force_N": lower,
-                "hook_upper_z_m": engine.fixtures.upper_height,
+                "hook_upper_z_m": engine.boundaries.upper_height,
             }
         if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
             more["outside_count"] = np.count_nonzero(outside)
-            if not engine.fixtures.enclosed:
+            if not engine.boundaries.enclosed:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
             more |= self._strain_row(engine, state)
@@ -97,8 +97,8 @@ class Sampler:
             "time_s": engine.time,
             "phase": phase,
             "count": engine.count,
-            "container_z_m": engine.fixtures.floor,
-            "container_velocity_m_per_s": engine.fixtures.velocity,
+            "container_z_m": engine.boundaries.floor,
+            "container_velocity_m_per_s": engine.boundaries.velocity,
             "container_force_N": container_force,
             "com_height_m": heights.mean() if len(heights) else math.nan,
             "kinetic_energy_J": state.kinetic_energy,
@@ -111,7 +111,7 @@ class Sampler:
         if EffectName.ENERGIES in self.effects:
             row |= {
                 "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
-                "container_work_J": engine.account.container_work,
+                "container_work_J": engine.ledger.container_work,
             }
         if EffectName.ENERGY_ACCOUNT in self.effects:
             row |= _ledger_row(engine, row)
@@ -130,7 +130,7 @@ class Sampler:
         return mean
 
     def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
-        steps, sums, before = engine.steps, engine.fixtures.hook_sums, self._hooks_before
+        steps, sums, before = engine.steps, engine.boundaries.hook_sums, self._hooks_before
         self._hooks_before = (steps, sums)
         if before is None or steps <= before[0]:
             return np.full_like(sums, math.nan)
@@ -147,7 +147,7 @@ class Sampler:
         before, self._strain_before = self._strain_before, None
         if not strings.tied:
             return row
-        walls = engine.fixtures.channel_sums
+        walls = engine.boundaries.channel_sums
         sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
         self._strain_before = (engine.steps, sums)
         row["pulled_m"] = strings.pulled
@@ -202,15 +202,15 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
 
 
 def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
-    contacts, hinges = engine.account.elastic()
-    given = engine.account.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
+    contacts, hinges = engine.ledger.elastic()
+    given = engine.ledger.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
     stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
     return {
-        "added_energy_J": engine.account.added,
+        "added_energy_J": engine.ledger.added,
         "contact_elastic_energy_J": contacts,
         "hinge_elastic_energy_J": hinges,
-        "dissipated_energy_J": engine.account.dissipated,
-        "energy_residual_J": given - stored - engine.account.dissipated,
+        "dissipated_energy_J": engine.ledger.dissipated,
+        "energy_residual_J": given - stored - engine.ledger.dissipated,
     }
 
 

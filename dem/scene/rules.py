@@ -151,7 +151,7 @@ def _check_recording(scene: SceneView) -> None:
     if sampled is not None and sampled > series:
         msg = (
             f"recording.dissipation_interval_s: {sampled:g} s is longer than series_interval_s = {series:g} s, so "
-            "that the account of energies would not close; 2e-4 s is dense enough"
+            "that the energy ledger would not close; 2e-4 s is dense enough"
         )
         raise ValueError(msg)
     for number, phase in enumerate(scene.phases):

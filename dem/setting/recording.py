@@ -32,7 +32,7 @@ class Recording(Part):
     )
     dissipation_interval_s: Duration | None = Field(
         None,
-        description="time between samples of what contacts dissipate [s], which closes the account of energies; null: "
+        description="time between samples of what contacts dissipate [s], which closes the energy ledger; null: "
         "none. A sample costs 10 µs per contact, as much as some twenty steps of a small pile; 2e-4 s is dense enough",
     )
     checkpoint_interval_s: Duration | None = Field(
@@ -47,5 +47,5 @@ class Recording(Part):
 
     @property
     def energies(self) -> bool:
-        """Whether energies are recorded: asked for, or needed by the account."""
+        """Whether energies are recorded: asked for, or needed by the energy ledger."""
         return self.energy or self.dissipation_interval_s is not None

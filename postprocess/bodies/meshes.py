@@ -229,7 +229,7 @@ class Bodies:
         values = {
             "first_id": frame.smarticle_ids[first],  # as the field smarticle_id has them
             "second_id": np.where(second < 0, second, frame.smarticle_ids[second]),
-            "fixture": found.fixtures,
+            "fixture": found.boundaries,
             "normal_force_N": found.normal,
             "tangential_force_N": found.tangential,
             "force_N": found.forces,

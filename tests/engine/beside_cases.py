@@ -22,7 +22,7 @@ def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every:
     )
     engine.add(poses, speed=speed)
     vertices, touches = [np.array(engine.state().vertices)], []
-    engine.fixtures.shake(amplitude=5e-4, frequency=30.0)
+    engine.boundaries.shake(amplitude=5e-4, frequency=30.0)
     for _ in range(steps // every):
         engine.advance(every)
         vertices.append(np.array(engine.state().vertices))
@@ -31,7 +31,7 @@ def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every:
         "vertices": np.array(vertices),
         "touches": touches,
         "diameter": scene.sphere_diameter,
-        "floor": engine.fixtures.floor,
+        "floor": engine.boundaries.floor,
         "time": engine.time,
         "impulse": engine.impulse,
     }

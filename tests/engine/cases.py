@@ -126,7 +126,7 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
 
 def _wall(engine: YadeEngine) -> float:
     """Height of the first facet of the wall."""
-    return float(engine._omega.bodies[engine.fixtures.container[0]].state.pos[2])
+    return float(engine._omega.bodies[engine.boundaries.container[0]].state.pos[2])
 
 
 def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0, walls: bool = True) -> dict[str, Any]:
@@ -137,16 +137,16 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
     amplitude = phase.amplitude(scene.gravity_m_per_s2)
     if delay:  # YADE takes a run of no steps for one without end
         engine.advance(delay)
-    begun, start = engine.time, engine.fixtures.floor
+    begun, start = engine.time, engine.boundaries.floor
     wall_start = _wall(engine)
-    engine.fixtures.shake(amplitude=amplitude, frequency=phase.frequency_hz, walls=walls)
+    engine.boundaries.shake(amplitude=amplitude, frequency=phase.frequency_hz, walls=walls)
     rows: list[tuple[float, float]] = []
     steps = math.ceil(periods / phase.frequency_hz / engine.time_step)
-    advance_watched(engine, steps, lambda: rows.append((engine.fixtures.floor, engine.fixtures.velocity)))
+    advance_watched(engine, steps, lambda: rows.append((engine.boundaries.floor, engine.boundaries.velocity)))
     floors, speeds = np.array(rows).T
     wall = _wall(engine)
-    last, elapsed = engine.fixtures.floor, engine.time - begun
-    engine.fixtures.stop()
+    last, elapsed = engine.boundaries.floor, engine.time - begun
+    engine.boundaries.stop()
     if rest:
         engine.advance(rest)
     return {
@@ -157,8 +157,8 @@ def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0
         "dt": engine.time_step,
         "amplitude": amplitude,
         "wall_moved": wall - wall_start,
-        "crept": engine.fixtures.floor - last,
-        "rest_velocity": engine.fixtures.velocity,
+        "crept": engine.boundaries.floor - last,
+        "rest_velocity": engine.boundaries.velocity,
     }
 
 
@@ -169,7 +169,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     pour(engine, scene, count)
     engine.advance(round(0.15 / engine.time_step))
     phase = next(p for p in scene.phases if p.type == "shake")
-    engine.fixtures.shake(amplitude=phase.amplitude(scene.gravity_m_per_s2), frequency=phase.frequency_hz)
+    engine.boundaries.shake(amplitude=phase.amplitude(scene.gravity_m_per_s2), frequency=phase.frequency_hz)
     sampler = Sampler(scene.container.radius_m)
     sampler.sample(engine, engine.state(), 0)
     means, balance = [], []

@@ -81,8 +81,8 @@ def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
     engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)
     engine.advance(2500)
-    before, folder = engine.account.elastic(), Path(out)
+    before, folder = engine.ledger.elastic(), Path(out)
     engine.load(engine.save(folder), folder)
-    after = engine.account.elastic()
-    engine.fixtures.remove_wall()
-    return {"before": before, "after": after, "dissipated": engine.account.dissipated}
+    after = engine.ledger.elastic()
+    engine.boundaries.remove_wall()
+    return {"before": before, "after": after, "dissipated": engine.ledger.dissipated}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import boundary_cases
 import cases
-import fixture_cases
 import h5py
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ SceneData = Callable[..., dict[str, Any]]
 @pytest.mark.parametrize("fidelity", ["draft"])
 def test_a_hook_reads_the_weight_that_hangs_on_it(simulate: Simulate, scene_data: SceneData, fidelity: str) -> None:
     data = scene_data({"fidelity": fidelity, "hooks": {"upper_height_m": 0.02}})
-    hung = simulate(fixture_cases.hang, data, settle=0.3, pull=0.1)
+    hung = simulate(boundary_cases.hang, data, settle=0.3, pull=0.1)
     lower, upper = hung["rest"]
     assert hung["speed"] < 1e-6
     assert upper == pytest.approx([0, 0, -hung["weight"]], abs=5e-3 * hung["weight"])

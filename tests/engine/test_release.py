@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import boundary_cases
 import cases
-import fixture_cases
 import numpy as np
 import pytest
 from run_files import series
@@ -18,7 +18,7 @@ SceneData = Callable[..., dict[str, Any]]
 
 def test_removing_the_wall_leaves_no_contact_and_adds_no_energy(simulate: Simulate, scene_data: SceneData) -> None:
     # A pile that leans on a narrow wall, and collapses beyond where it stood.
-    gone = simulate(fixture_cases.remove, scene_data({"container.radius_m": 0.0135}), count=40, settle=0.6, watch=0.2)
+    gone = simulate(boundary_cases.remove, scene_data({"container.radius_m": 0.0135}), count=40, settle=0.6, watch=0.2)
     before, after, totals = gone["before"], gone["after"], gone["totals"]
     assert gone["contacts"] > 10
     assert (gone["stale"], gone["later"], gone["bodies"]) == (0, 0, 0)

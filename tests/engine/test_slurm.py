@@ -181,7 +181,7 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
     assert done.returncode == 1
     assert "sbatch refused it: " in done.stderr
     assert "invalid partition specified: absent" in done.stderr
-    assert json.loads((tmp_path / "out/jobs/001/job.json").read_text())["job_id"] is None
+    assert json.loads((tmp_path / "out/jobs/001/job.json").read_text()).get("job_id") is None
     (tmp_path / "here.toml").write_text(CLUSTER)
     said = smarticles(
         "resume", tmp_path / "out", "--submit", "slurm", "--cluster", tmp_path / "here.toml", "--memory", "900"

@@ -56,7 +56,7 @@ def test_a_saved_simulation_goes_on_to_the_same_bits(build: Build, ranks: int, t
     poured(engine, 1, 1e-4)
     engine.advance(300)
     poured(engine, 2, 0.03)
-    engine.fixtures.shake(amplitude=5e-4, frequency=30.0)
+    engine.boundaries.shake(amplitude=5e-4, frequency=30.0)
     engine.advance(150)
     while not engine.touches().sum():
         assert engine.steps < 800
@@ -76,7 +76,7 @@ def test_a_saved_simulation_goes_on_to_the_same_bits(build: Build, ranks: int, t
     other.advance(100)
     assert np.array_equal(other.state().vertices, went_on.vertices)
     assert np.array_equal(other.state().link_spins, went_on.link_spins)
-    assert other.fixtures.floor == engine.fixtures.floor != 0
+    assert other.boundaries.floor == engine.boundaries.floor != 0
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(InputError, match=r"^checkpoint: format 'links-3', here is 'lammps-2'"):
         other.load(replace(saved, memory={"format": "links-3"}), tmp_path)

@@ -53,18 +53,18 @@ def test_the_floor_carries_what_lies_on_it(build: Build) -> None:
     put(engine, (0, 0, engine.particle.radius))
     engine.advance(200)
     rested = engine.state().positions[0, 2]
-    engine.fixtures.shake(amplitude=1e-4, frequency=30.0)  # 0.36 g: it stays on the floor
+    engine.boundaries.shake(amplitude=1e-4, frequency=30.0)  # 0.36 g: it stays on the floor
     engine.advance(100)
-    floor = engine.fixtures.floor
+    floor = engine.boundaries.floor
     assert floor == pytest.approx(1e-4 * math.sin(2 * math.pi * 30 * 100 * engine.time_step), rel=1e-9)
     assert engine.state().positions[0, 2] - rested == pytest.approx(floor, abs=3e-6)
-    assert engine.state().velocities[0, 2] == pytest.approx(engine.fixtures.velocity, abs=2e-3)
-    assert math.isnan(engine.account.given)
-    engine.fixtures.stop()
+    assert engine.state().velocities[0, 2] == pytest.approx(engine.boundaries.velocity, abs=2e-3)
+    assert math.isnan(engine.ledger.given)
+    engine.boundaries.stop()
     engine.advance(200)
-    assert engine.fixtures.floor == floor
+    assert engine.boundaries.floor == floor
     assert engine.state().positions[0, 2] - rested == pytest.approx(floor, abs=1e-7)
-    assert not math.isnan(engine.account.given)
+    assert not math.isnan(engine.ledger.given)
 
 
 def test_the_wall_holds_until_it_is_taken_away(build: Build) -> None:
@@ -73,7 +73,7 @@ def test_the_wall_holds_until_it_is_taken_away(build: Build) -> None:
     engine.advance(1)
     engine.still()
     assert not engine.state().link_velocities.any()
-    assert engine.account.dissipated > 0
+    assert engine.ledger.dissipated > 0
     engine.advance(50)
     assert np.abs(engine.state().velocities).max() < 1e-9
     # Beside the wall it overlaps, and is pushed back.
@@ -81,7 +81,7 @@ def test_the_wall_holds_until_it_is_taken_away(build: Build) -> None:
     put(other, (0.0027, 0, 0.01))
     inside = other.overlaps(1.0).deepest
     assert inside > 0
-    other.fixtures.remove_wall()
+    other.boundaries.remove_wall()
     assert other.overlaps(1.0).deepest == 0
     other.advance(50)
     assert np.abs(other.state().velocities).max() < 1e-12

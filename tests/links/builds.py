@@ -90,7 +90,7 @@ def pile(made: LinksEngine, count: int, *, seed: int = 1, settle: float = 0.3, p
     while made.count < count:
         state = made.state()
         tops = state.vertices[..., 2].max(axis=1)
-        top = tops.max(initial=made.fixtures.floor)
+        top = tops.max(initial=made.boundaries.floor)
         near = tops > top - 2 * p.radius
         made.add(
             place_layer(

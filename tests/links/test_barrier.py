@@ -88,7 +88,7 @@ def test_links_do_not_pass_each_other_at_ten_metres_per_second(spin: float, stif
         made.advance(1)
         upper, lower = made.state().positions[1, 2], made.state().positions[0, 2]
         assert upper > lower  # nothing has passed
-    assert made.account.elastic()[0] == 0.0
+    assert made.ledger.elastic()[0] == 0.0
     assert made.state().kinetic_energy == pytest.approx(energy, rel=0.01)
     assert made.state().velocities[0, 2] < -1.0  # they have met
     assert made._world.totals[MOST] > 1.0

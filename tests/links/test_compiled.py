@@ -52,7 +52,7 @@ def test_a_scene_compiles_what_it_calls_for_only() -> None:
         if all(s[names.index(n)] is types.none for n in ("motors", "hooks", "rims", "channel", "cords", "ledger"))
     ]
     assert plain
-    # Nothing of a hook, a rim, a string or the account is in its code. Compiled anew: cached code cannot be looked at.
+    # Nothing of a hook, a rim, a string or the ledger is in its code. Compiled anew: cached code cannot be looked at.
     fresh = numba.njit(**OPTIONS)(advance.py_func)
     fresh.compile(plain[0])
     code = fresh.inspect_llvm(plain[0])

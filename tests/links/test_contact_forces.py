@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dem.body.forces import FIXTURES, NONE, ContactForces
+from dem.body.forces import BOUNDARIES, NONE, ContactForces
 from dem.engine.links.engine import LinksEngine
 from dem.plan.steps import time_steps
 from dem.run.build import build_engine
@@ -22,8 +22,8 @@ Holds = Callable[[LinksEngine, ContactForces], bool]
 
 
 def touched(*parts: str) -> Holds:
-    """Whether all of some fixtures, and two smarticles, carry something."""
-    return lambda _, found: {NONE, *map(FIXTURES.index, parts)} <= set(found.fixtures.tolist())
+    """Whether all of some boundaries, and two smarticles, carry something."""
+    return lambda _, found: {NONE, *map(BOUNDARIES.index, parts)} <= set(found.boundaries.tolist())
 
 
 CASES: dict[str, tuple[str, tuple[str, ...], Holds]] = {
@@ -34,7 +34,7 @@ CASES: dict[str, tuple[str, tuple[str, ...], Holds]] = {
     "a lifted wall": (
         "collapse",
         ("count=40", "phases.1.duration_s=0.1", "phases.3.speed_m_per_s=0.02"),
-        lambda made, found: 1e-3 < made.fixtures.wall_bottom < 1 and touched("floor", "wall")(made, found),
+        lambda made, found: 1e-3 < made.boundaries.wall_bottom < 1 and touched("floor", "wall")(made, found),
     ),
     "a channel": ("chain", ("count=4",), touched("channel's lower wall", "channel's upper wall")),
 }
@@ -62,16 +62,16 @@ def simulated(folder: Path, name: str, overrides: tuple[str, ...], holds: Holds)
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_they_are_what_moves_smarticles_and_what_fixtures_feel(tmp_path: Path, case: str) -> None:
+def test_they_are_what_moves_smarticles_and_what_boundaries_feel(tmp_path: Path, case: str) -> None:
     engine, found = simulated(tmp_path, *CASES[case])
     world = engine._world
     engine.set_time_step(NO_TIME)
     engine.advance(1)
-    on_each, between = np.zeros((engine.count, 3)), found.fixtures == NONE
+    on_each, between = np.zeros((engine.count, 3)), found.boundaries == NONE
     np.add.at(on_each, found.smarticles[:, 0], found.forces)
     np.subtract.at(on_each, found.smarticles[between, 1], found.forces[between])
-    felt = np.zeros((len(FIXTURES), 3))
-    np.subtract.at(felt, found.fixtures[~between], found.forces[~between])
+    felt = np.zeros((len(BOUNDARIES), 3))
+    np.subtract.at(felt, found.boundaries[~between], found.forces[~between])
     bodies = world.bodies
     loads = bodies.shares.reshape(engine.count, 3, 6).sum(axis=1) if engine.motors.articulated else bodies.load
     largest = np.abs(found.forces).max()

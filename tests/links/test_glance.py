@@ -29,7 +29,7 @@ def shaken(*, hinged: bool = False, rows: int = 1, hooked: bool = False) -> Link
         hooks=HOOKS if hooked else None,
     )
     builds.pile(made, COUNT, settle=0.1)
-    made.fixtures.shake(amplitude=1.2e-3, frequency=30.0)
+    made.boundaries.shake(amplitude=1.2e-3, frequency=30.0)
     made.advance(40)
     if hinged:
         made.motors.articulate()

@@ -29,7 +29,7 @@ def test_a_bar_bounces_with_its_restitution() -> None:
     made._world.bodies.velocity[0, 2] = -0.1
     made.advance(4000)
     assert made.state().velocities[0, 2] == pytest.approx(0.06, rel=2e-3)
-    assert made.fixtures.container_force[2] == 0.0
+    assert made.boundaries.container_force[2] == 0.0
 
 
 def test_a_bar_rests_with_its_weight_on_the_floor() -> None:
@@ -37,7 +37,7 @@ def test_a_bar_rests_with_its_weight_on_the_floor() -> None:
     weight = made.particle.boxes.mass * 9.81
     made.add(builds.at([0, 0, RADIUS], [FLAT]))
     made.advance(8000)
-    assert made.fixtures.container_force[2] == pytest.approx(-weight, rel=1e-6)
+    assert made.boundaries.container_force[2] == pytest.approx(-weight, rel=1e-6)
     assert RADIUS - made.state().positions[0, 2] == pytest.approx(weight / (2 * 500.0), rel=1e-6)
     assert made.touches().tolist() == [2]
     assert made.neighbours().tolist() == [0]
@@ -105,7 +105,7 @@ def test_the_wall_holds_what_circles_inside_it() -> None:
     assert after.angular_momentum[2] == pytest.approx(spin, rel=1e-9)
     assert after.kinetic_energy == pytest.approx(energy, rel=0.02)
     assert np.hypot(*after.vertices[0, :, :2].T).max() < 0.0234
-    assert made.fixtures.container_force.shape == (3,)
+    assert made.boundaries.container_force.shape == (3,)
 
 
 def test_a_smarticle_hangs_on_a_hook_with_its_weight() -> None:
@@ -120,21 +120,21 @@ def test_a_smarticle_hangs_on_a_hook_with_its_weight() -> None:
     com = builds.boxes().plain_centre_of_mass[1]
     made.add(builds.at([0, 3e-3, 40e-3 + side / 2 + RADIUS - com], [turn]))
     made.advance(25000)
-    sums = made.fixtures.hook_sums
+    sums = made.boundaries.hook_sums
     made.advance(1000)
-    mean = (made.fixtures.hook_sums - sums) / 1000
+    mean = (made.boundaries.hook_sums - sums) / 1000
     assert mean[1, 2] == pytest.approx(-MASS * 9.81, rel=1e-3)
     assert np.abs(mean[0]).max() == 0.0
     # Raised, it comes along, and the work is the gain of potential energy.
-    height, work = made.state().positions[0, 2], made.account.container_work
-    made.fixtures.raise_upper(0.01)
+    height, work = made.state().positions[0, 2], made.ledger.container_work
+    made.boundaries.raise_upper(0.01)
     made.advance(10000)
-    made.fixtures.stop()
+    made.boundaries.stop()
     made.advance(10000)
     gain = made.state().positions[0, 2] - height
     assert gain == pytest.approx(0.002, rel=1e-2)
-    assert made.account.container_work - work == pytest.approx(MASS * 9.81 * gain, rel=1e-2)
-    assert made.fixtures.upper_height == pytest.approx(0.042)
+    assert made.ledger.container_work - work == pytest.approx(MASS * 9.81 * gain, rel=1e-2)
+    assert made.boundaries.upper_height == pytest.approx(0.042)
 
 
 SIDE = 0.5e-3
@@ -149,9 +149,9 @@ def test_each_bar_of_a_grid_carries_what_hangs_on_it() -> None:
     # Bars along y lie at x = -5, 0 and 5 mm, those along x likewise: one on the outermost bar along y, clear of others.
     made.add(builds.at([5e-3, 2.5e-3, 20e-3 + SIDE / 2 + RADIUS - com], [turn]))
     made.advance(25000)
-    sums = made.fixtures.hook_sums
+    sums = made.boundaries.hook_sums
     made.advance(1000)
-    mean = (made.fixtures.hook_sums - sums) / 1000
+    mean = (made.boundaries.hook_sums - sums) / 1000
     # What holds it is a bar that only a grid has; the other grip is empty.
     assert mean[0, 2] == pytest.approx(-MASS * 9.81, rel=1e-3)
     assert np.abs(mean[1]).max() == 0.0
@@ -169,14 +169,14 @@ def test_a_smarticle_that_bridges_both_grips_is_two_springs_in_a_row(count: int)
     # Off the bars along y.
     made.add(builds.at([2.5e-3, com - 0.35 * builds.W, (lower.height + upper.height) / 2], [across]))
     made.advance(100)
-    assert np.abs(made.fixtures.hook_sums).max() == 0.0
-    made.fixtures.raise_upper(0.01)
+    assert np.abs(made.boundaries.hook_sums).max() == 0.0
+    made.boundaries.raise_upper(0.01)
     made.advance(round(raised / 0.01 / 2e-5))
-    made.fixtures.stop()
+    made.boundaries.stop()
     made.advance(20000)
-    sums = made.fixtures.hook_sums
+    sums = made.boundaries.hook_sums
     made.advance(1000)
-    mean = (made.fixtures.hook_sums - sums) / 1000
+    mean = (made.boundaries.hook_sums - sums) / 1000
     # Each barb lies across a bar: one spring, and each of the two gives way by half of the way. The tolerance: one step
     # of raising is 0.25 % of it.
     assert mean[1, 2] == pytest.approx(-500.0 * (raised - gap) / 2, rel=3e-3)
@@ -211,32 +211,32 @@ def test_a_lifted_wall_lets_through_below_its_edge_and_its_work_is_counted() -> 
     made = builds.engine(gravity=9.81, radius=0.0234)
     made.add(builds.at([0.016, 0, RADIUS], [FLAT]))
     made.advance(500)
-    assert made.fixtures.enclosed
-    made.fixtures.lift_wall(0.1)
+    assert made.boundaries.enclosed
+    made.boundaries.lift_wall(0.1)
     made.advance(round(0.1 / made.time_step))
-    made.fixtures.stop()
-    assert made.fixtures.wall_bottom == pytest.approx(0.01 - 0.00234)
-    assert not made.fixtures.enclosed
+    made.boundaries.stop()
+    assert made.boundaries.wall_bottom == pytest.approx(0.01 - 0.00234)
+    assert not made.boundaries.enclosed
     made._world.bodies.velocity[0, 0] = 0.4
     made.advance(4000)
     assert made.state().positions[0, 0] > 0.0234
-    made.fixtures.remove_wall()
-    assert not made.fixtures.walled
-    assert made.fixtures.wall_bottom == math.inf
+    made.boundaries.remove_wall()
+    assert not made.boundaries.walled
+    assert made.boundaries.wall_bottom == math.inf
 
 
 def test_shaking_moves_floor_and_wall_and_ends_where_it_is() -> None:
     made = builds.engine(gravity=9.81, dt=1e-4)
-    made.fixtures.shake(amplitude=1e-3, frequency=30.0)
+    made.boundaries.shake(amplitude=1e-3, frequency=30.0)
     made.add(builds.at([0, 0, 1.0]))
     made.advance(1234)
     phase = 2 * math.pi * 30 * 0.1234
-    assert made.fixtures.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
-    assert made.fixtures.velocity == pytest.approx(1e-3 * 2 * math.pi * 30 * math.cos(phase), rel=1e-9)
-    made.fixtures.stop()
+    assert made.boundaries.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
+    assert made.boundaries.velocity == pytest.approx(1e-3 * 2 * math.pi * 30 * math.cos(phase), rel=1e-9)
+    made.boundaries.stop()
     made.advance(10)
-    assert made.fixtures.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
-    assert made.fixtures.velocity == 0.0
+    assert made.boundaries.floor == pytest.approx(1e-3 * math.sin(phase), rel=1e-9)
+    assert made.boundaries.velocity == 0.0
 
 
 def test_a_channel_confines_and_keeps_motion_in_the_plane() -> None:
@@ -247,9 +247,9 @@ def test_a_channel_confines_and_keeps_motion_in_the_plane() -> None:
     state = made.state()
     assert np.abs(state.vertices[..., 2]).max() == 0.0
     assert np.abs(state.vertices[..., 1]).max() < 0.015
-    assert made.fixtures.channel_sums[0, 1] < 0 < made.fixtures.channel_sums[1, 1]
-    assert made.fixtures.floor == -1e-3
-    assert not made.fixtures.enclosed
+    assert made.boundaries.channel_sums[0, 1] < 0 < made.boundaries.channel_sums[1, 1]
+    assert made.boundaries.floor == -1e-3
+    assert not made.boundaries.enclosed
 
 
 @pytest.mark.parametrize("rows", [1, 2])

@@ -1,4 +1,4 @@
-"""Piles: the same bits again, checkpoints, the account of energy, motors under load, nothing passes through."""
+"""Piles: the same bits again, checkpoints, the energy ledger, motors under load, nothing passes through."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_looks_told_one_by_one_or_at_once(law: str) -> None:
 
 def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
     made = poured(12)
-    made.fixtures.shake(amplitude=5e-4, frequency=30.0)
+    made.boundaries.shake(amplitude=5e-4, frequency=30.0)
     made.advance(333)
     saved = made.save(HERE)
     assert isinstance(saved.content, bytes)
@@ -80,7 +80,7 @@ def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
     again.load(saved, HERE)
     for each in (made, again):
         each.advance(777)
-        each.fixtures.stop()
+        each.boundaries.stop()
         each.motors.articulate()
         swing(each, 30)
         each.advance(2)
@@ -95,7 +95,7 @@ def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
         each.advance(500)
     assert bits(made) == bits(again) == bits(third)
     assert made.motors.work == third.motors.work
-    assert made.account.container_work == third.account.container_work
+    assert made.ledger.container_work == third.ledger.container_work
     assert made.overlaps(1e-4).deepest == third.overlaps(1e-4).deepest
 
 
@@ -113,35 +113,37 @@ def test_a_pile_comes_to_rest() -> None:
     made.advance(12000)
     assert made.state().kinetic_energy < 1e-12
     assert made.unbalanced_force() < 1e-3
-    assert made.fixtures.container_force[2] == pytest.approx(-30 * builds.boxes().mass * 9.81, rel=1e-3)
+    assert made.boundaries.container_force[2] == pytest.approx(-30 * builds.boxes().mass * 9.81, rel=1e-3)
 
 
 @pytest.mark.parametrize("law", ["halt", "stall", "slip", "servo"])
 def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
     more = {"damping": 1e-6} if law == "servo" else {}
-    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), account=True)
+    made = builds.engine(
+        gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), keep_ledger=True
+    )
     builds.pile(made, 30, settle=0.1)
     made.motors.articulate()
     swing(made, 1500)
     made.motors.weld()
     made.advance(1000)
     state = made.state()
-    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.account.elastic())
-    given = made.account.given + made.motors.work
-    assert made.motors.work > 0.1 * made.account.added
-    assert abs(given - stored - made.account.dissipated) < 0.01 * given
+    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
+    given = made.ledger.given + made.motors.work
+    assert made.motors.work > 0.1 * made.ledger.added
+    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
 
 
 def test_the_account_closes_in_a_shaken_pile() -> None:
-    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, account=True)
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, keep_ledger=True)
     builds.pile(made, 20, settle=0.1)
-    made.fixtures.shake(amplitude=2 * 9.81 / (2 * math.pi * 30) ** 2, frequency=30.0)
+    made.boundaries.shake(amplitude=2 * 9.81 / (2 * math.pi * 30) ** 2, frequency=30.0)
     made.advance(20000)
     state = made.state()
-    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.account.elastic())
-    given = made.account.given
-    assert made.account.container_work > 0.1 * made.account.added
-    assert abs(given - stored - made.account.dissipated) < 0.01 * given
+    stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
+    given = made.ledger.given
+    assert made.ledger.container_work > 0.1 * made.ledger.added
+    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
 
 
 def test_a_motor_that_halts_holds_and_may_give_way() -> None:
@@ -266,14 +268,14 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
 def test_the_floor_is_shaken_with_its_wall_or_alone(walls: bool) -> None:
     made = poured(6)
     amplitude, frequency = 5e-4, 30.0
-    made.fixtures.shake(amplitude=amplitude, frequency=frequency, walls=walls)
+    made.boundaries.shake(amplitude=amplitude, frequency=frequency, walls=walls)
     begun, floors, wall = made.time, [], []
     for _ in range(400):
         made.advance(4)
-        floors.append(made.fixtures.floor)
-        wall.append(made.fixtures.wall_bottom)
+        floors.append(made.boundaries.floor)
+        wall.append(made.boundaries.wall_bottom)
     times = begun + 2e-4 * np.arange(1, 401)
     np.testing.assert_allclose(floors, amplitude * np.sin(2 * math.pi * frequency * (times - begun)), atol=1e-12)
     assert np.ptp(wall) == pytest.approx(np.ptp(floors) if walls else 0.0, abs=1e-15)
-    # What the floor alone gives is all that the account has.
-    assert made.account.container_work > 0.0
+    # What the floor alone gives is all that the ledger has.
+    assert made.ledger.container_work > 0.0

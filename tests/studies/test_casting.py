@@ -74,7 +74,7 @@ def test_of_a_tier_that_holds_less_than_the_ball_no_share_is_told(tmp_path: Path
 
 
 def test_piles_without_a_mould_are_listed_and_others_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.framework.release.strip.draw_strip", lambda rows, output, **_: output)
+    monkeypatch.setattr("postprocess.pictures.strip.draw_strip", lambda rows, output, **_: output)
     piles = {"before": crossed(14), "after": crossed(14)}
     runs = [write_released(tmp_path / f"{seed}", "static", **piles, **KEYS, seed=seed) for seed in (1, 2)]
     plain = write_released(tmp_path / "plain", "static", **piles, aspect_ratio=0.8)

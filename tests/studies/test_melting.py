@@ -68,7 +68,7 @@ def test_a_pile_that_fell_over_is_told_from_one_that_sank(tmp_path: Path) -> Non
 
 
 def test_the_study_judges_and_writes_what_it_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.framework.release.strip.draw_strip", lambda rows, output, **_: output)
+    monkeypatch.setattr("postprocess.pictures.strip.draw_strip", lambda rows, output, **_: output)
     runs = []
     for seed in (1, 2, 3):
         afters = {"static": sunk(stack(), 0.7 + 0.01 * seed), "internal": shed(stack(), 2 + seed % 2)}

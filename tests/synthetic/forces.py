@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dem.body.forces import ContactForces, at_fixtures, at_links, contacts_of_points
+from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_points
 from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.names import FORCE
@@ -15,13 +15,13 @@ from postprocess.geometry.links import centres_of_mass
 
 
 def pressed(pairs: Sequence[tuple[int, int]], loads: Sequence[float], points: object = None) -> ContactForces:
-    """Contacts of middle links of pairs of smarticles, pressed upwards [N]; a second one below 0 is a fixture."""
+    """Contacts of middle links of pairs of smarticles, pressed upwards [N]; a second one below 0 is a boundary."""
     first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     ones = np.ones_like(first)
     forces = np.array(loads, dtype=float)[:, None] * [0.0, 0.0, 1.0]
     return contacts_of_points(
         at_links(first, ones),
-        np.where(second < 0, at_fixtures(-1 - second), at_links(second, ones)),
+        np.where(second < 0, at_boundaries(-1 - second), at_links(second, ones)),
         loads=np.array(loads, dtype=float),
         points=np.zeros((len(first), 3)) if points is None else np.asarray(points, dtype=float),
         friction=0.1 * np.roll(forces, 1, axis=1),

@@ -164,7 +164,7 @@ def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, flo
                 engine.motors.actuate(held[None], interval)
             engine.advance(round(interval / dt))
         state = engine.state()
-        total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.account.elastic())
+        total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.ledger.elastic())
         yield engine.time, state.kinetic_energy, total - engine.motors.work
 
 

@@ -191,7 +191,7 @@ def mass_ratio(
     add(engine, (0, 0, flat - sunk[0] * carries))
     add(engine, (0, 0, 3 * flat - sum(sunk) * carries))
     if access.name == "links":
-        recorder.watchdog.energy = math.inf  # a load added through test access: its work is in no account
+        recorder.watchdog.energy = math.inf  # a load added through test access: its work is in no ledger
     access.burden(engine, int(heavy_above), ratio, rise=0.0 if carries else time)
     said, begun, heights = None, engine.time, []
     while not said and engine.time < begun + time:

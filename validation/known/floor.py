@@ -247,7 +247,7 @@ def _level(found: ContactForces, level: int, each: int) -> Array:
         below = (bodies == (level - 1, level)).all(axis=1)
         upwards: Array = -found.forces[below]
     else:
-        upwards = found.forces[found.fixtures == FLOOR]
+        upwards = found.forces[found.boundaries == FLOOR]
     return upwards
 
 

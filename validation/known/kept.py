@@ -1,4 +1,4 @@
-"""What is kept: momentum and energy of smarticles that nothing touches, the account of a pile, and links as solids."""
+"""Conservation: momentum and energy of smarticles in free flight, the energy ledger of a pile, links as solids."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def thousand_turns(access: EngineAccess) -> list[Answer]:
 
 
 @case(
-    "account of a pile",
+    "energy ledger of a pile",
     "100 smarticles swing their barbs in a pile, standard",
     "added energy and work are what is stored and what was dissipated",
     absent={"yade": "dissipation is sampled there, not added up: tests/engine has its error"},
@@ -185,7 +185,7 @@ def account(access: EngineAccess, *, count: int, seconds: float) -> list[Answer]
     )
     return [
         Answer(
-            "residual of the account, over all that was dissipated since the pour [J]",
+            "residual of the ledger, over all that was dissipated since the pour [J]",
             0.0,
             float(np.nanmax(np.abs(run.series["energy_residual_J"]))),
             0.01,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dem.engine.lammps.fixtures import LammpsFixtures
+from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.physics.contact import ContactLaw
 from dem.physics.overlaps import Overlaps
 
@@ -34,7 +34,7 @@ class Contacts:
     fixed_depths: Array
 
     @classmethod
-    def of(cls, spheres: Array, radius: float, fixtures: LammpsFixtures) -> Contacts:
+    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:
         """Contacts of spheres (N, S, 3) [m] of a radius [m] with each other and with floor and wall."""
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
@@ -43,11 +43,11 @@ class Contacts:
         found = cKDTree(centres).query_pairs(2 * radius, output_type="ndarray") if len(centres) else none
         found = found[owners[found[:, 0]] != owners[found[:, 1]]]
         apart = np.linalg.norm(centres[found[:, 0]] - centres[found[:, 1]], axis=1)
-        beside = [radius - (centres[:, 2] - fixtures.floor)]
-        if fixtures.walled:
-            high = (centres[:, 2] > fixtures.wall_bottom) & (centres[:, 2] < fixtures.wall_top)
+        beside = [radius - (centres[:, 2] - boundaries.floor)]
+        if boundaries.walled:
+            high = (centres[:, 2] > boundaries.wall_bottom) & (centres[:, 2] < boundaries.wall_top)
             off_axis = np.hypot(centres[:, 0], centres[:, 1])
-            beside.append(np.where(high, radius - (fixtures.cylinder.radius - off_axis), -np.inf))
+            beside.append(np.where(high, radius - (boundaries.cylinder.radius - off_axis), -np.inf))
         touching = [np.flatnonzero(depths > 0) for depths in beside]
         return cls(
             count=count,

@@ -21,10 +21,10 @@ from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.lammps import text
 from dem.engine.lammps.absent import NoMotors, NoStrings, refuse
-from dem.engine.lammps.account import LammpsAccount
+from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.engine.lammps.child import Child
 from dem.engine.lammps.contacts import Contacts
-from dem.engine.lammps.fixtures import LammpsFixtures
+from dem.engine.lammps.ledger import LammpsLedger
 from dem.engine.lammps.text import Moving
 from dem.errors import InputError, RunError
 from dem.physics.contact import ContactLaw
@@ -82,10 +82,10 @@ class LammpsEngine:
         self._seconds = 0.0
         self._thrown = 0.0
         self._contacts: Contacts | None = None
-        self.fixtures = LammpsFixtures(cylinder, self._told, lambda: (self.steps, self.time_step))
+        self.boundaries = LammpsBoundaries(cylinder, self._told, lambda: (self.steps, self.time_step))
         """See the interface."""
         self.motors, self.strings = NoMotors(), NoStrings()
-        self.account = LammpsAccount(lambda: self.fixtures.moving, lambda: self.contacts.elastic_energy(law))
+        self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
         """See the interface."""
 
     # -- what LAMMPS is told -----------------------------------------------------------------------------------
@@ -108,8 +108,8 @@ class LammpsEngine:
         yield f"pair_style gran/hooke/history {between}"
         yield "pair_coeff * *"
         yield f"fix weight all gravity {self.gravity:.17g} vector 0 0 -1"
-        yield from self.fixtures.variables()
-        yield from text.container(self.cylinder, at_wall, walled=self.fixtures.walled)
+        yield from self.boundaries.variables()
+        yield from text.container(self.cylinder, at_wall, walled=self.boundaries.walled)
         yield f"timestep {self.time_step:.17g}"
         yield "thermo 0"
         yield "thermo_style custom step"
@@ -141,7 +141,7 @@ class LammpsEngine:
         """See the interface."""
         if time_step == self.time_step:
             return
-        if self.fixtures.moving:
+        if self.boundaries.moving:
             msg = "engine: lammps cannot change the time step while the container moves"
             raise RunError(msg)
         self.time_step = time_step
@@ -226,7 +226,7 @@ class LammpsEngine:
             self._box = True
         self.child.tell(*self._bodies(BODIES))
         self._frames, self._fresh, self._contacts = None, True, None
-        self.account.added += boxes.mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self.ledger.added += boxes.mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += boxes.mass * new * speed
 
     def _write(self, name: str, lines: Iterator[str]) -> None:
@@ -235,7 +235,7 @@ class LammpsEngine:
 
     def still(self) -> None:
         """See the interface."""
-        self.account.dissipated += self.state().kinetic_energy
+        self.ledger.dissipated += self.state().kinetic_energy
         none = np.zeros_like(self._moving.velocities)
         self._moving = replace(self._moving, velocities=none, spins=none, momenta=none)
         self._told(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
@@ -261,7 +261,7 @@ class LammpsEngine:
     def contacts(self) -> Contacts:
         """Who touches whom at present."""
         if self._contacts is None:
-            self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.fixtures)
+            self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.boundaries)
         return self._contacts
 
     def neighbours(self) -> NDArray[np.int64]:
@@ -310,8 +310,8 @@ class LammpsEngine:
             "time_step": self.time_step,
             "seconds": self._seconds,
             "thrown": self._thrown,
-            "fixtures": self.fixtures.memory,
-            "account": [self.account.added, self.account.dissipated],
+            "fixtures": self.boundaries.memory,
+            "account": [self.ledger.added, self.ledger.dissipated],
         }
         saved = Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
         self.load(saved, scratch)
@@ -341,8 +341,8 @@ class LammpsEngine:
             raise InputError(msg) from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
         self._seconds, self._thrown = memory["seconds"], memory["thrown"]
-        self.account.added, self.account.dissipated = memory["account"]
-        self.fixtures.restore(memory["fixtures"])
+        self.ledger.added, self.ledger.dissipated = memory["account"]
+        self.boundaries.restore(memory["fixtures"])
         self._frames, self._fresh, self._contacts = None, True, None
         if self._box:
             self._begin_anew(files)

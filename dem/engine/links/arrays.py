@@ -133,7 +133,7 @@ class Cells(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Spring, dashpot and friction of a contact: between links, or of a link and a fixture.
+    """Spring, dashpot and friction of a contact: between links, or of a link and a boundary.
 
     Args:
         stiffness: kn [N/m].
@@ -165,7 +165,7 @@ class Kept(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """Fixtures that ends of links meet, and how they all move. Parts: floor, wall, lower hook, upper hook.
+    """Boundaries that ends of links meet, and how they all move. Parts: floor, wall, lower hook, upper hook.
 
     Args:
         bottoms: (tiers,) where each tier of the wall begins, from the lowest up, above the wall's place [m].

@@ -18,10 +18,10 @@ from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
-from dem.engine.links.account import LinksAccount
+from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
-from dem.engine.links.fixtures import LinksFixtures, ground_for
 from dem.engine.links.forces import contact_forces
+from dem.engine.links.ledger import LinksLedger
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
 from dem.engine.links.strings import LinksStrings
@@ -55,7 +55,7 @@ class LinksEngine:
         time_step: dt [s], until another is set.
         shaken: whether the container will move.
         motor_law: what all motors have in common; None where smarticles stay welded.
-        account: whether to add up what contacts dissipate.
+        keep_ledger: whether to add up what contacts dissipate.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
@@ -71,7 +71,7 @@ class LinksEngine:
         time_step: float,
         shaken: bool,
         motor_law: MotorLaw | None = None,
-        account: bool = False,
+        keep_ledger: bool = False,
         hooks: tuple[Cross, Cross] | None = None,
         channel: Channel | None = None,
         strengths: Array | None = None,
@@ -90,7 +90,7 @@ class LinksEngine:
             ground=ground_for(cylinder, hooks, channel),
             gravity=gravity,
             planar=channel is not None,
-            account=account,
+            keep_ledger=keep_ledger,
         )
         if hooks is not None:
             self._world.add_hooks([cross.bars for cross in hooks])
@@ -98,9 +98,9 @@ class LinksEngine:
             self._world.add_rim(height, radius)
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
-        self.account = LinksAccount(self._world)
+        self.ledger = LinksLedger(self._world)
         """See the interface."""
-        self.fixtures = LinksFixtures(self._world, cylinder, shaken=shaken, removed=self.account.removed)
+        self.boundaries = LinksBoundaries(self._world, cylinder, shaken=shaken, removed=self.ledger.removed)
         """See the interface."""
         self.motors = LinksMotors(self._world, motor_law, strengths)
         """See the interface."""
@@ -153,7 +153,7 @@ class LinksEngine:
         """See the interface."""
         self._world.add(poses, speed=speed)
         mass, new = self.particle.boxes.mass, len(poses.positions)
-        self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
 
     def still(self) -> None:
@@ -231,8 +231,8 @@ class LinksEngine:
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
-        """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m]."""
-        parts = self.fixtures.parts() if deep.any() else {}
+        """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m]."""
+        parts = self.boundaries.parts() if deep.any() else {}
         found = []
         for k in np.flatnonzero(deep):
             touched = [name for name, (part, _) in parts.items() if held[k, part]]
@@ -252,7 +252,7 @@ class LinksEngine:
         memory: dict[str, Any] = {
             "format": FORMAT,
             "world": self._world.memory,
-            "added": self.account.added,
+            "added": self.ledger.added,
             "smarticle_seconds": self._smarticle_seconds,
             "thrown": self._thrown,
         }
@@ -279,6 +279,6 @@ class LinksEngine:
         self._world.restore(arrays, saved.memory["world"])
         prefix = "motors."
         self.motors.restore({name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)})
-        self.account.added = saved.memory["added"]
+        self.ledger.added = saved.memory["added"]
         self._smarticle_seconds = saved.memory["smarticle_seconds"]
         self._thrown = saved.memory.get("thrown", 0.0)  # there was no such thing once

@@ -74,7 +74,7 @@ class LinksKind:
             )
             if scene.actuates
             else None,
-            account=scene.recording.dissipation_interval_s is not None,
+            keep_ledger=scene.recording.dissipation_interval_s is not None,
             hooks=None if scene.hooks is None else scene.hooks.crosses,
             channel=scene.channel,
             strengths=scene.motor_strengths,

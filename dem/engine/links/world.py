@@ -62,7 +62,7 @@ class Contacts:
         pairs: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once.
         touches: (N,) points of contact of each smarticle.
         depths: (N,) deepest contact of each [m].
-        held: (N, 6) whether each touches each part of the fixtures, see `Ground`.
+        held: (N, 6) whether each touches each part of the boundaries, see `Ground`.
         elastic_energy: in all springs [J].
     """
 
@@ -80,10 +80,10 @@ class World:
     Args:
         particle: one smarticle.
         contact: the contact law.
-        ground: the fixtures.
+        ground: the boundaries.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to the plane z = 0.
-        account: whether to add up what contacts dissipate.
+        keep_ledger: whether to add up what contacts dissipate.
     """
 
     particle: Particle
@@ -91,7 +91,7 @@ class World:
     ground: Ground
     gravity: float
     planar: bool
-    account: bool
+    keep_ledger: bool
     steps: int = 0
     time_step: float = math.nan
     motors: Motoring | None = None
@@ -119,7 +119,7 @@ class World:
         self.pairs: Pairs = pairs_for(0, self.kinds, 256)
         self.cells: Cells = cells_for(0, 0, 256)
         self.kept = no_contacts(0, END_SLOTS)
-        self.ledger: Array | None = np.zeros((256, LEDGER)) if self.account else None
+        self.ledger: Array | None = np.zeros((256, LEDGER)) if self.ledger else None
         self.meeting, self.plane = np.zeros((meeting.ROWS, meeting.COLUMNS)), np.zeros(PLANE)
         diameter = 2 * self.shape.radius
         self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])

@@ -1,4 +1,4 @@
-"""What contacts and hinges dissipate, sampled: YADE's viscoelastic law does not keep an account of it.
+"""What contacts and hinges dissipate, sampled: YADE's viscoelastic law does not keep a ledger of it.
 
 A sample works out, for every contact, how much of the work done on it in one step is neither stored in its springs at
 the end of the step nor given back, from the force that acts in the step and the velocity that moves the bodies in it.

@@ -17,12 +17,12 @@ from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Saved
-from dem.engine.yade.account import YadeAccount
 from dem.engine.yade.assembly import Assembly
+from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.construction import ADDS, add_engines, add_materials
-from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.forces import contact_forces
 from dem.engine.yade.hinges import HingeLaw
+from dem.engine.yade.ledger import YadeLedger
 from dem.engine.yade.library import load_yade
 from dem.engine.yade.motors import YadeMotors
 from dem.engine.yade.overlaps import measure_overlaps
@@ -100,18 +100,18 @@ class YadeEngine:
         }
         adds = Adds.together(ADDS[effect] for effect, on in called_for.items() if on)
         add_materials(self._yade, adds, law)
-        self.fixtures = YadeFixtures(self._yade, cylinder, hooks, channel)
+        self.boundaries = YadeBoundaries(self._yade, cylinder, hooks, channel)
         """The container and the hooks, or the channel."""
-        self.account = YadeAccount(
+        self.ledger = YadeLedger(
             self._yade,
             self._assembly,
-            self.fixtures,
+            self.boundaries,
             works=track_work,
             dissipation_interval=dissipation_interval,
         )
         """Work and dissipation since the start."""
-        self.fixtures.book_removal = self.account.removed
-        self.motors = YadeMotors(self._yade, self._assembly, self.account, motor_law, strengths)
+        self.boundaries.book_removal = self.ledger.removed
+        self.motors = YadeMotors(self._yade, self._assembly, self.ledger, motor_law, strengths)
         """What moves the barbs."""
         self.strings = YadeStrings(self._yade, self._assembly)
         """What pulls a chain."""
@@ -124,7 +124,7 @@ class YadeEngine:
             radius=particle.radius,
         )
         self.set_time_step(time_step)
-        self.fixtures.bind()
+        self.boundaries.bind()
         self._assembly.bind()
 
     def _store(self, file: Path) -> None:
@@ -151,9 +151,9 @@ class YadeEngine:
                 "motors": self.motors.memory,
                 "smarticle_seconds": self._smarticle_seconds,
                 "thrown": self._thrown,
-                "fixtures": self.fixtures.memory,
+                "fixtures": self.boundaries.memory,
                 "strings": self.strings.memory,
-                "account": self.account.memory,
+                "account": self.ledger.memory,
                 "unbalanced": self.unbalanced_force(),
             }
             saved = Saved(content=file.read_bytes(), memory=memory)
@@ -177,11 +177,11 @@ class YadeEngine:
         self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
         self._thrown = memory.get("thrown", 0.0)  # there was no such thing once
-        self.fixtures.restore(memory["fixtures"])
+        self.boundaries.restore(memory["fixtures"])
         self.strings.restore(memory["strings"])
-        self.account.restore(memory["account"])
+        self.ledger.restore(memory["account"])
         self.motors.restore(memory["motors"])
-        self.fixtures.bind()
+        self.boundaries.bind()
         self._assembly.bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
@@ -189,12 +189,12 @@ class YadeEngine:
         """See the interface."""
         self._assembly.add(poses, speed=speed)
         mass, new = self.particle.boxes.mass, len(poses.positions)
-        self.account.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
 
     def still(self) -> None:
         """See the interface."""
-        self.account.dissipated += self.state().kinetic_energy
+        self.ledger.dissipated += self.state().kinetic_energy
         self._assembly.still()
 
     def set_time_step(self, time_step: float) -> None:
@@ -204,7 +204,7 @@ class YadeEngine:
         acceleration at this moment, next to nothing in a pile at rest.
         """
         self.time_step = self._omega.dt = time_step
-        self.account.count_in(time_step)
+        self.ledger.count_in(time_step)
 
     @property
     def time(self) -> float:
@@ -224,16 +224,16 @@ class YadeEngine:
         """
         if steps <= 0:
             return
-        step, target, felt = self._omega.step, self.steps + steps, bool(self.fixtures.felt)
+        step, target, felt = self._omega.step, self.steps + steps, bool(self.boundaries.felt)
         strings = self.strings.taut
         # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
             if strings is not None:
-                self.account.container_work += strings.pull(self.time_step)
-            self.account.step(number, step)
+                self.ledger.container_work += strings.pull(self.time_step)
+            self.ledger.step(number, step)
             if felt:
-                self.fixtures.feel()
+                self.boundaries.feel()
         if self._assembly.hinges is not None:
             self._assembly.hinges.moved()
         if self.steps != target:
@@ -285,11 +285,11 @@ class YadeEngine:
 
     def overlaps(self, limit: float) -> Overlaps:
         """See the interface."""
-        return measure_overlaps(self._yade, self._assembly, self.fixtures, self._law, limit)
+        return measure_overlaps(self._yade, self._assembly, self.boundaries, self._law, limit)
 
     def contact_forces(self) -> ContactForces:
         """See the interface; those of the last step."""
-        return contact_forces(self._yade, self._assembly, self.fixtures)
+        return contact_forces(self._yade, self._assembly, self.boundaries)
 
     def glance(self, state: State) -> None:
         """See the interface: there is none."""
@@ -297,7 +297,7 @@ class YadeEngine:
     def container_force(self) -> Array:
         """(3,) [N]: force of the smarticles on the container in the last step."""
         force = np.zeros(3)
-        for body in self.fixtures.container:
+        for body in self.boundaries.container:
             force += self._omega.forces.f(body)
         return force
 

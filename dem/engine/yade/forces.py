@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from dem.body.forces import ContactForces, at_fixtures, at_links, contacts_of_points
+from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_points
 from dem.engine.yade.assembly import Assembly
+from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.dissipation import contacts_of
-from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.library import Yade
 
 
-def contact_forces(yade: Yade, assembly: Assembly, fixtures: YadeFixtures) -> ContactForces:
+def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -> ContactForces:
     """Forces at all contacts; those of spheres of one pair of links are one contact.
 
     Args:
         yade: the simulation.
         assembly: the smarticles in it.
-        fixtures: what does not give way.
+        boundaries: what does not give way.
     """
     smarticles = {sphere: at_links(*told) for sphere, told in assembly.link_of.items()}
-    parts = {body: at_fixtures(part) for body, part in fixtures.part_of.items()}
+    parts = {body: at_boundaries(part) for body, part in boundaries.part_of.items()}
     rows = []
     for contact in contacts_of(yade, assembly):
         geom, phys = contact.geom, contact.phys

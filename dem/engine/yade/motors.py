@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.engine.interface import MotorReadings
-from dem.engine.yade.account import YadeAccount
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.hinges import Hinges
+from dem.engine.yade.ledger import YadeLedger
 from dem.engine.yade.library import Yade
 from dem.physics.motor import MotorLaw, Motors
 
@@ -24,7 +24,7 @@ class YadeMotors:
     Args:
         yade: the simulation.
         assembly: the smarticles.
-        account: told of what welding dissipates.
+        ledger: gets what welding dissipates.
         law: what all motors have in common; None in scenes without any.
         strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
     """
@@ -33,13 +33,13 @@ class YadeMotors:
         self,
         yade: Yade,
         assembly: Assembly,
-        account: YadeAccount,
+        ledger: YadeLedger,
         law: MotorLaw | None,
         strengths: Array | None,
     ) -> None:
         self._yade = yade
         self._assembly = assembly
-        self._account = account
+        self._ledger = ledger
         self._law = law
         self._strengths = strengths
         self.deciding: Motors | None = None
@@ -72,7 +72,7 @@ class YadeMotors:
 
     def weld(self) -> None:
         """See the interface: motors that hold, at a third of the cost."""
-        self._account.dissipated += self._assembly.weld()
+        self._ledger.dissipated += self._assembly.weld()
 
     @property
     def looks_at_once(self) -> int:

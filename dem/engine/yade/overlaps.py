@@ -9,20 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.engine.yade.assembly import Assembly
+from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.dissipation import contacts_of
-from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.library import Yade
 from dem.physics.contact import ContactLaw
 from dem.physics.overlaps import APART, Held, Overlaps
 
 
-def measure_overlaps(yade: Yade, assembly: Assembly, fixtures: YadeFixtures, law: ContactLaw, limit: float) -> Overlaps:
+def measure_overlaps(
+    yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, law: ContactLaw, limit: float
+) -> Overlaps:
     """Look at all contacts and hinges of a running simulation.
 
     Args:
         yade: the simulation.
         assembly: the smarticles in it.
-        fixtures: what does not give way.
+        boundaries: what does not give way.
         law: of all contacts.
         limit: overlap [m] of contacts whose smarticles are to be named.
     """
@@ -38,7 +40,7 @@ def measure_overlaps(yade: Yade, assembly: Assembly, fixtures: YadeFixtures, law
             if not contact.geom.penetrationDepth <= limit:
                 number = map(assembly.smarticle_of.get, (contact.id1, contact.id2))
                 deep[[k for k in number if k is not None]] = True
-        held = _held(yade, assembly, fixtures, deep, APART * limit)
+        held = _held(yade, assembly, boundaries, deep, APART * limit)
     normal = law.normal_stiffness / 2 * float((np.fmax(depths, 0.0) ** 2).sum())
     # Friction bounds what tangential springs hold by what normal ones do.
     friction = max(law.friction, law.wall_friction)
@@ -47,10 +49,10 @@ def measure_overlaps(yade: Yade, assembly: Assembly, fixtures: YadeFixtures, law
 
 
 def _held(
-    yade: Yade, assembly: Assembly, fixtures: YadeFixtures, deep: NDArray[np.bool_], least: float
+    yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: NDArray[np.bool_], least: float
 ) -> tuple[Held, ...]:
-    """Smarticles among the `deep` ones (N,) that touch two fixtures which have moved apart by `least` [m] or more."""
-    parts = fixtures.parts()
+    """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m] or more."""
+    parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)
     for contact in contacts_of(yade, assembly) if parts else ():

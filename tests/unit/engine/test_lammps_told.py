@@ -11,8 +11,8 @@ from scenes import SMALL, changed, small
 from scipy.spatial.transform import Rotation
 
 from dem.body.state import State
+from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.engine.lammps.contacts import Contacts
-from dem.engine.lammps.fixtures import LammpsFixtures
 from dem.engine.lammps.text import Moving, contact_terms
 from dem.errors import InputError
 from dem.physics.contact import contact_law
@@ -93,49 +93,49 @@ def clock() -> list[float]:
 
 
 @pytest.fixture
-def fixtures(told: list[str], clock: list[float]) -> LammpsFixtures:
+def boundaries(told: list[str], clock: list[float]) -> LammpsBoundaries:
     cylinder = Cylinder(radius=0.02, height=0.05, facets=64)
-    return LammpsFixtures(cylinder, told.extend, lambda: (int(clock[0]), clock[1]))
+    return LammpsBoundaries(cylinder, told.extend, lambda: (int(clock[0]), clock[1]))
 
 
 def test_floor_and_wall_are_where_lammps_s_variables_put_them(
-    fixtures: LammpsFixtures, told: list[str], clock: list[float]
+    boundaries: LammpsBoundaries, told: list[str], clock: list[float]
 ) -> None:
     clock[0] = 30
-    fixtures.shake(amplitude=1e-3, frequency=25.0)
+    boundaries.shake(amplitude=1e-3, frequency=25.0)
     values = dict(line.split()[1::2] for line in told)
     assert values["begun"] == "30"
     clock[0] = 90  # 6 ms later
     omega, t = 2 * math.pi * 25, 6e-3
-    assert fixtures.floor == pytest.approx(1e-3 * math.sin(omega * t), rel=1e-12)
-    assert fixtures.velocity == pytest.approx(1e-3 * omega * math.cos(omega * t), rel=1e-12)
-    assert fixtures.wall_bottom == pytest.approx(-0.002 + fixtures.floor, rel=1e-12)
-    assert fixtures.moving
-    assert fixtures.enclosed
-    height = fixtures.floor
-    fixtures.stop()
+    assert boundaries.floor == pytest.approx(1e-3 * math.sin(omega * t), rel=1e-12)
+    assert boundaries.velocity == pytest.approx(1e-3 * omega * math.cos(omega * t), rel=1e-12)
+    assert boundaries.wall_bottom == pytest.approx(-0.002 + boundaries.floor, rel=1e-12)
+    assert boundaries.moving
+    assert boundaries.enclosed
+    height = boundaries.floor
+    boundaries.stop()
     clock[0] = 500
-    assert (fixtures.floor, fixtures.velocity, fixtures.moving) == (height, 0.0, False)
+    assert (boundaries.floor, boundaries.velocity, boundaries.moving) == (height, 0.0, False)
     del told[:]
-    fixtures.remove_wall()
+    boundaries.remove_wall()
     assert told == ["unfix wall", "region wall delete"]
-    assert (fixtures.walled, fixtures.enclosed, fixtures.raised) == (False, False, None)
-    fixtures.shake(amplitude=1e-3, frequency=25.0, walls=True)
+    assert (boundaries.walled, boundaries.enclosed, boundaries.raised) == (False, False, None)
+    boundaries.shake(amplitude=1e-3, frequency=25.0, walls=True)
     assert "variable wall_amplitude equal 0" in told
-    again = LammpsFixtures(fixtures.cylinder, told.extend, lambda: (510, 1e-4))
-    again.restore(fixtures.memory)
+    again = LammpsBoundaries(boundaries.cylinder, told.extend, lambda: (510, 1e-4))
+    again.restore(boundaries.memory)
     clock[0] = 510
-    assert again.floor == fixtures.floor != height
+    assert again.floor == boundaries.floor != height
 
 
-def test_contacts_are_those_of_all_pairs_of_spheres(fixtures: LammpsFixtures) -> None:
+def test_contacts_are_those_of_all_pairs_of_spheres(boundaries: LammpsBoundaries) -> None:
     # Spheres of one smarticle overlap.
     scene, rng = small({"fidelity": {"base": "draft", "pitch": 0.7}}), np.random.default_rng(3)
     count, radius = 12, scene.particle.radius
     places = np.column_stack([rng.uniform(-0.009, 0.009, (count, 2)), rng.uniform(0.005, 0.012, count)])
     turns, still = Rotation.random(count, random_state=rng).as_matrix(), np.zeros((count, 3))
     spheres = State.rigid(scene.particle.boxes, places, turns, still, still).spheres(scene.particle)
-    found = Contacts.of(spheres, radius, fixtures)
+    found = Contacts.of(spheres, radius, boundaries)
     touches, neighbours, depths = np.zeros(count, int), np.zeros(count, int), []
     for k in range(count):
         beside = [radius - spheres[k, :, 2], radius - (0.02 - np.hypot(spheres[k, :, 0], spheres[k, :, 1]))]
@@ -159,4 +159,4 @@ def test_contacts_are_those_of_all_pairs_of_spheres(fixtures: LammpsFixtures) ->
     assert 0 < told.deep.sum() < count
     normal = 250 / 2 * sum(depth**2 for depth in depths)
     assert told.elastic_energy == pytest.approx(normal * (1 + 0.4**2 / 0.82), rel=1e-12)
-    assert Contacts.of(np.zeros((0, 18, 3)), radius, fixtures).touches().shape == (0,)
+    assert Contacts.of(np.zeros((0, 18, 3)), radius, boundaries).touches().shape == (0,)

@@ -22,15 +22,15 @@ def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDo
     """
     phase = PullHook(type="pull-hook", distance_m=DISTANCE, speed_m_per_s=SPEED, **keys)
     engine, pulling = EngineDouble.of(small({"hooks": {}}), DT), Pulling(phase)
-    engine.fixtures.hook_stiffness = stiffness
-    start = engine.fixtures.upper_height
+    engine.boundaries.hook_stiffness = stiffness
+    start = engine.boundaries.upper_height
     while wait := pulling.proceed(engine):
         engine.advance(max(1, round(wait / DT)))
         if anew:
             memory, pulling = pulling.memory, Pulling(phase)
             pulling.memory = dict(memory)
     assert engine.told == [("raise_upper", SPEED), ("stop",)]
-    return engine, engine.fixtures.upper_height - start, pulling
+    return engine, engine.boundaries.upper_height - start, pulling
 
 
 @pytest.mark.parametrize("limit", [None, 0.0401])

@@ -145,8 +145,8 @@ def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     top = engine.state().vertices[..., 2].max() + scene.particle.radius
     stage, bottoms = scene.phases[1].begin(scene, 1), []
     while wait := stage.proceed(engine):
-        if engine.fixtures.walled:
-            bottoms.append(engine.fixtures.wall_bottom)
+        if engine.boundaries.walled:
+            bottoms.append(engine.boundaries.wall_bottom)
         engine.advance(round(wait / DT))
     assert engine.told == [("lift_wall", 0.1), ("remove_wall",)]
     assert bottoms[-1] < top < bottoms[-1] + 0.1 * CHECK_INTERVAL * 1.01
@@ -156,7 +156,7 @@ def test_a_wall_that_is_not_clear_stays_and_a_shake_after_it_is_refused() -> Non
     scene, engine = begin({"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, {"type": "shake"})
     run_phase(scene, engine)
     assert engine.told == [("lift_wall", 0.01), ("stop",)]
-    assert engine.fixtures.walled
+    assert engine.boundaries.walled
     with pytest.raises(RunError, match=r"the wall is still around the pile, its edge .* lengthen that phase's"):
         run_phase(scene, engine, 2)
 

@@ -258,7 +258,7 @@ def test_what_overlaps_is_stopped_until_it_flies_no_more(pour: Path, stops: int)
     assert engine.told == [("add", 10), *[("still",)] * stops]
     # A difference of energies, exact to rounding of what was added.
     lost = stops * 0.5 * 10 * engine.particle.boxes.mass * 0.3**2
-    assert engine.account.dissipated >= lost - 1e-12 * engine.account.added
+    assert engine.ledger.dissipated >= lost - 1e-12 * engine.ledger.added
     assert ("warning" in memory) == (stops > 0)
     if stops:
         assert f"smarticles were stopped {stops} times in {(1 + STRIDE * (stops + 1)) * DT:.3g} s" in memory["warning"]

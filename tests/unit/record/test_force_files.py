@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from dem.body.forces import FIXTURES, FLOOR, NONE, at_fixtures, at_links, contacts_of_points
+from dem.body.forces import BOUNDARIES, FLOOR, NONE, at_boundaries, at_links, contacts_of_points
 from dem.record.columns import FORCE_FIELDS
 from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter
@@ -19,7 +19,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def some() -> dict[str, np.ndarray]:
     """Two points of links 0 of 3 and 1 of 1, told once each way; one on the floor; one without a load."""
-    high, low, floor = int(at_links(3, 0)), int(at_links(1, 1)), int(at_fixtures(FLOOR))
+    high, low, floor = int(at_links(3, 0)), int(at_links(1, 1)), int(at_boundaries(FLOOR))
     return {
         "first": np.array([high, low, low, low]),
         "second": np.array([low, high, floor, at_links(2, 2)]),
@@ -35,7 +35,7 @@ def test_points_of_one_pair_of_links_are_one_contact() -> None:
     order = np.argsort(found.normal)
     assert found.smarticles[order].tolist() == [[1, 3], [1, NONE]]
     assert found.links[order].tolist() == [[1, 0], [1, NONE]]
-    assert found.fixtures[order].tolist() == [NONE, FIXTURES.index("floor")]
+    assert found.boundaries[order].tolist() == [NONE, BOUNDARIES.index("floor")]
     assert found.normal[order] == pytest.approx([4.0, 5.0])
     # The one with the lower number is first: what acts on it is what the other way round acts on the other.
     np.testing.assert_allclose(found.forces[order[0]], [0.3, 0, -4.0])
@@ -51,7 +51,7 @@ def test_a_file_has_a_line_per_contact_with_all_fields(tmp_path: Path) -> None:
     mesh = pv.read(tmp_path / "forces" / "force_000000.vtu")
     assert set(mesh.cell_data.keys()) == set(FORCE_FIELDS)
     ends = mesh.points.reshape(-1, 2, 3)
-    pair = found.fixtures == NONE
+    pair = found.boundaries == NONE
     np.testing.assert_allclose(ends[pair], [[centres[1], centres[3]]])
     np.testing.assert_allclose(ends[~pair], [[centres[1], [7.0, 0, 0]]])
     np.testing.assert_allclose(mesh.cell_data["normal_force_N"], found.normal)

@@ -143,12 +143,12 @@ def test_where_a_glance_is_enough_nobody_is_asked_but_the_energy(
     seen = Glance(**told, elastic_energy=0.0)
     monkeypatch.setattr(engine, "glance", lambda state: seen)
     engine.deepest = recorder.watchdog.depth * 1.1
-    monkeypatch.setattr(engine.fixtures, "floor", 0.99)
+    monkeypatch.setattr(engine.boundaries, "floor", 0.99)
     recorder.watch(engine)  # by the glance all is well
-    monkeypatch.setattr(engine.fixtures, "floor", 1.01)
+    monkeypatch.setattr(engine.boundaries, "floor", 1.01)
     with pytest.raises(RunError, match="left through the wall or the floor"):
         recorder.watch(engine)
-    monkeypatch.setattr(engine.fixtures, "floor", 0.99)
+    monkeypatch.setattr(engine.boundaries, "floor", 0.99)
     engine.velocities[:, 2] = 3.0
     with pytest.raises(RunError, match="an energy that has risen by"):
         recorder.watch(engine)

@@ -25,7 +25,7 @@ def engine_with(
 ) -> EngineDouble:
     """An engine with smarticles on the axis, all flat, that are still in the air."""
     engine = EngineDouble.of(scene or small(), DT)
-    engine.time, engine.fixtures.floor = time, floor
+    engine.time, engine.boundaries.floor = time, floor
     positions = np.array([[0.0, 0.0, height] for height in heights]).reshape(-1, 3)
     engine.add(Poses(positions, (Rotation.identity(),) * len(heights)))
     return engine
@@ -41,7 +41,7 @@ def sample(sampler: Sampler, engine: EngineDouble) -> dict[str, np.ndarray]:
 
 def test_columns_hold_what_the_engine_says() -> None:
     engine = engine_with([0.01, 0.03, 0.02], time=0.5, floor=-0.002)
-    engine.fixtures.velocity = 0.1
+    engine.boundaries.velocity = 0.1
     engine.velocities[:] = [[3, 0, 4], [0, 1, 0], [0, 0, 0]]
     boxes = engine.particle.boxes
     row = sample(Sampler(RADIUS), engine)
@@ -87,13 +87,13 @@ def test_forces_on_hooks_are_means_and_no_part_of_the_containers() -> None:
     assert np.isnan(sample(sampler, engine)["hook_upper_force_N"]).all()
     engine.advance(10)
     # A row is of the ten steps, and of them alone; the double's own hooks feel nothing by themselves.
-    engine.fixtures.hook_sums = np.array([[0.0, 0.0, -1.0], [2.0, 0.0, -3.0]])
+    engine.boundaries.hook_sums = np.array([[0.0, 0.0, -1.0], [2.0, 0.0, -3.0]])
     row = sample(sampler, engine)
     assert row["hook_lower_force_N"] == pytest.approx([0, 0, -0.1])
     assert row["hook_upper_force_N"] == pytest.approx([0.2, 0, -0.3])
     weight = engine.particle.boxes.mass * 9.81
     assert row["container_force_N"] == pytest.approx([-0.2, 0, 0.4 - weight])
-    assert row["hook_upper_z_m"] == engine.fixtures.upper_height == 0.01
+    assert row["hook_upper_z_m"] == engine.boundaries.upper_height == 0.01
     engine.advance(5)
     assert sample(sampler, engine)["hook_upper_force_N"] == pytest.approx([0, 0, 0])
 
@@ -104,7 +104,7 @@ def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside(
     row = sample(sampler, engine)
     assert row["outside_count"] == 1
     assert row["packing_fraction"] > 0
-    engine.fixtures.remove_wall()
+    engine.boundaries.remove_wall()
     assert math.isnan(sample(sampler, engine)["packing_fraction"])
 
 
@@ -142,7 +142,7 @@ def test_the_account_of_energies_closes_over_fall_impact_and_shaking() -> None:
     moved = []
     for steps, shaken in ((300, False), (2000, False), (500, True)):
         if shaken:
-            engine.fixtures.shake(amplitude=1e-3, frequency=30)
+            engine.boundaries.shake(amplitude=1e-3, frequency=30)
         engine.advance(steps)
         row = sample(sampler, engine)
         moved.append((row["dissipated_energy_J"], row["container_work_J"]))

@@ -117,7 +117,7 @@ def test_deep_contacts_are_named() -> None:
         (("the upper hook", "the wall"), "give the hook more room: a smaller hooks.length_m or a wider container"),
     ],
 )
-def test_who_is_held_by_two_fixtures_is_named_and_stiffness_is_no_way_out(
+def test_who_is_held_by_two_boundaries_is_named_and_stiffness_is_no_way_out(
     between: tuple[str, str], way_out: str
 ) -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)

@@ -1,4 +1,4 @@
-"""A sweep to expand, and the types of the fixtures."""
+"""A sweep to expand, and the types of the boundaries."""
 
 from __future__ import annotations
 

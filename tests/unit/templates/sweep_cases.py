@@ -1,4 +1,4 @@
-"""A small sweep, and the types of the fixtures that write it."""
+"""A small sweep, and the types of the boundaries that write it."""
 
 from __future__ import annotations
 

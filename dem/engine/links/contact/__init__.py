@@ -1,1 +1,1 @@
-"""Kernels of forces: links on links, fixtures and strings on links."""
+"""Kernels of forces: links on links, boundaries and strings on links."""

@@ -129,7 +129,7 @@ def forces_of_boundaries(
         out: scratch of `meet`.
         contacts: scratch.
         slip: (4,) scratch.
-        rows: (…, WIDTH) written; the second one as `dem.body.forces.at_fixtures` has it.
+        rows: (…, WIDTH) written; the second one as `dem.body.forces.at_boundaries` has it.
     """
     segments, links, count = bodies.segments, shape.kinds.shape[0], 0
     for p in range(segments.shape[0]):

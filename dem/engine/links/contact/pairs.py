@@ -55,8 +55,8 @@ def put_down(
 
     Args:
         ledger: (n, LEDGER); row 0 begins with the number of rows in use.
-        rows: of the two bodies in `Bodies.motion`; -1 for a fixture.
-        owners: the two smarticles; -1 for a fixture.
+        rows: of the two bodies in `Bodies.motion`; -1 for a boundary.
+        owners: the two smarticles; -1 for a boundary.
         x: point of contact [m].
         y: the same.
         z: the same.

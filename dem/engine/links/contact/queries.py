@@ -125,12 +125,12 @@ def glance(
         bodies: the smarticles, posed.
         pairs: as in `look_at_pairs`.
         kept: what contacts with boundaries remember.
-        ground: the fixtures.
+        ground: the boundaries.
         channel: as in `look_at_boundaries`.
         hooks: the same.
         rims: the same.
         stiffness: kn between smarticles [N/m].
-        wall_stiffness: kn with fixtures [N/m].
+        wall_stiffness: kn with boundaries [N/m].
         velocities: (N, 3, 3) of the links' centres [m/s].
         met: scratch.
         touches: scratch.

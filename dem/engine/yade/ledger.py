@@ -1,4 +1,4 @@
-"""The account of energy: what was brought in, and what was dissipated."""
+"""The energy ledger: what was brought in, and what was dissipated."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import math
 from collections.abc import Callable, Mapping
 
 from dem.engine.yade.assembly import Assembly
+from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.dissipation import Meter
-from dem.engine.yade.fixtures import YadeFixtures
 from dem.engine.yade.library import Yade
 
 
-class YadeAccount:
+class YadeLedger:
     """Energies that have to be added up step by step, each only where it is asked for.
 
     Args:
         yade: the simulation.
         assembly: the smarticles.
-        fixtures: what moves and does work.
-        works: whether to add up the work of moving fixtures.
+        boundaries: what moves and does work.
+        works: whether to add up the work of moving boundaries.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
     """
 
@@ -26,19 +26,19 @@ class YadeAccount:
         self,
         yade: Yade,
         assembly: Assembly,
-        fixtures: YadeFixtures,
+        boundaries: YadeBoundaries,
         *,
         works: bool,
         dissipation_interval: float | None,
     ) -> None:
         self.container_work = 0.0
-        """Work of moving fixtures, and of strings, on the smarticles since the start [J]."""
+        """Work of moving boundaries, and of strings, on the smarticles since the start [J]."""
         self.added = 0.0
         """Energy of smarticles when they were added, in height and in contacts that were taken in [J]."""
         self.dissipated = 0.0
         """Energy dissipated since the start, by contacts, hinges and welding [J]; sampled, see `Meter`."""
         self._assembly = assembly
-        self._fixtures = fixtures
+        self._boundaries = boundaries
         self._works = works
         self._interval = dissipation_interval
         self._time_step, self._every = 0.0, 0
@@ -62,8 +62,8 @@ class YadeAccount:
             before = self._meter.velocities()
             advance()
             self.dissipated += self._every * self._meter.dissipated(before, self._time_step)
-        if self._works and self._fixtures.moving:
-            self.container_work += self._fixtures.power() * self._time_step
+        if self._works and self._boundaries.moving:
+            self.container_work += self._boundaries.power() * self._time_step
 
     def elastic(self) -> tuple[float, float]:
         """Energy in the springs of contacts and of hinges [J]."""
@@ -76,8 +76,8 @@ class YadeAccount:
 
     @property
     def given(self) -> float:
-        """Energy added and work of fixtures since the start [J]; NaN while one moves whose work is not added up."""
-        return math.nan if self._fixtures.moving and not self._works else self.added + self.container_work
+        """Energy added and work of boundaries since the start [J]; NaN while one moves whose work is not added up."""
+        return math.nan if self._boundaries.moving and not self._works else self.added + self.container_work
 
     def removed(self, remove: Callable[[], None]) -> None:
         """Do something that takes contacts away; what their springs held is dissipated."""

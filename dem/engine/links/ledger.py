@@ -1,4 +1,4 @@
-"""The account of energy on the links engine: kernels add up, exactly and in every step."""
+"""The energy ledger on the links engine: kernels add up, exactly and in every step."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dem.engine.links.stepping import LOST, WORK
 from dem.engine.links.world import World
 
 
-class LinksAccount:
-    """See `dem.engine.interface.Account`.
+class LinksLedger:
+    """See `dem.engine.interface.EnergyLedger`.
 
     Args:
         world: the simulation.

@@ -30,8 +30,8 @@ class Part:
 
 
 @dataclass
-class LammpsFixtures:
-    """See `dem.engine.interface.Fixtures`. Heights are sines of the step, as LAMMPS's variables are.
+class LammpsBoundaries:
+    """See `dem.engine.interface.Boundaries`. Heights are sines of the step, as LAMMPS's variables are.
 
     Args:
         cylinder: the container.

@@ -20,7 +20,7 @@ from dem.setting.plane import Channel
 Array = NDArray[np.float64]
 
 
-class YadeFixtures:
+class YadeBoundaries:
     """The fixed bodies of a simulation, how they move, and what they feel.
 
     Args:
@@ -49,7 +49,7 @@ class YadeFixtures:
         """Ids of the bodies that move at present, all at one velocity."""
         self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
         self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
-        """Called with what takes contacts away, by whoever keeps an account of energy."""
+        """Called with what takes contacts away, by whoever keeps an energy ledger."""
 
     def bind(self) -> None:
         """Take hold of YADE's objects; loading replaces them all."""
@@ -78,12 +78,12 @@ class YadeFixtures:
 
     @property
     def floor(self) -> float:
-        """See `dem.engine.interface.Fixtures`."""
+        """See `dem.engine.interface.Boundaries`."""
         return float(self._floor.pos[2])
 
     @property
     def velocity(self) -> float:
-        """See `dem.engine.interface.Fixtures`."""
+        """See `dem.engine.interface.Boundaries`."""
         return float(self._floor.vel[2])
 
     # -- motion ------------------------------------------------------------------------------------------------
@@ -94,7 +94,7 @@ class YadeFixtures:
         self.moving = list(bodies)
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """See `dem.engine.interface.Fixtures`."""
+        """See `dem.engine.interface.Boundaries`."""
         if self._shaker is None:
             msg = "the engine was built without a shaker"
             raise RunError(msg)
@@ -109,7 +109,7 @@ class YadeFixtures:
         self._shaker.dead = False
 
     def stop(self) -> None:
-        """See `dem.engine.interface.Fixtures`."""
+        """See `dem.engine.interface.Boundaries`."""
         if self._shaker is not None:
             self._shaker.dead = True
         self._move(self.bodies, 0.0)
@@ -141,7 +141,7 @@ class YadeFixtures:
         self._move(self.container[:-1], speed)
 
     def remove_wall(self) -> None:
-        """See `dem.engine.interface.Fixtures`."""
+        """See `dem.engine.interface.Boundaries`."""
         self.book_removal(self._remove_wall)
 
     def _remove_wall(self) -> None:
@@ -204,7 +204,7 @@ class YadeFixtures:
 
     @property
     def part_of(self) -> Mapping[int, int]:
-        """Place in `dem.body.forces.FIXTURES` by id of body."""
+        """Place in `dem.body.forces.BOUNDARIES` by id of body."""
         *walls, floor = self.container
         numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
         found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}

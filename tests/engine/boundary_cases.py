@@ -32,9 +32,9 @@ def damped(engine: YadeEngine, damping: float) -> None:
 
 def mean_hook_forces(engine: YadeEngine, steps: int) -> np.ndarray:
     """(2, 3) mean over steps, lower and upper hook."""
-    before = engine.fixtures.hook_sums
+    before = engine.boundaries.hook_sums
     engine.advance(steps)
-    return (engine.fixtures.hook_sums - before) / steps
+    return (engine.boundaries.hook_sums - before) / steps
 
 
 def elastic(engine: YadeEngine) -> float:
@@ -71,16 +71,16 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     engine.advance(round(settle / engine.time_step))
     rest = mean_hook_forces(engine, 200)
     speed = float(np.linalg.norm(engine.state().velocities))
-    start = engine.fixtures.upper_height
+    start = engine.boundaries.upper_height
     height = engine.state().positions[0, 2]
-    engine.fixtures.raise_upper(scene.smarticle.middle_length_m)
+    engine.boundaries.raise_upper(scene.smarticle.middle_length_m)
     engine.advance(round(pull / engine.time_step))
     moving = mean_hook_forces(engine, 200)
     return {
         "rest": rest,
         "moving": moving,
         "speed": speed,
-        "raised": engine.fixtures.upper_height - start,
+        "raised": engine.boundaries.upper_height - start,
         "carried": engine.state().positions[0, 2] - height,
         "expected": scene.smarticle.middle_length_m * round(pull / engine.time_step) * engine.time_step
         + scene.smarticle.middle_length_m * 200 * engine.time_step,
@@ -102,13 +102,13 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
     scene = scene_of(data)
     engine = build(scene)
     _pour(engine, scene, count, settle)
-    wall = set(engine.fixtures.container[:-1])
+    wall = set(engine.boundaries.container[:-1])
 
     def with_wall() -> int:
         return sum(1 for i in engine._omega.interactions if {i.id1, i.id2} & wall)
 
     contacts, before, state = with_wall(), energies(engine), engine.state()
-    engine.fixtures.remove_wall()
+    engine.boundaries.remove_wall()
     after, same = energies(engine), engine.state()
     stale = with_wall()
     totals = [sum(after.values())]

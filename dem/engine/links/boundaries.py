@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None) -> Ground:
-    """The fixtures at the start: floor at z = 0, or the table of a plane."""
+    """The boundaries at the start: floor at z = 0, or the table of a plane."""
     place = np.zeros(4)
     if channel is not None:
         place[FLOOR] = channel.table
@@ -40,14 +40,14 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
     )
 
 
-class LinksFixtures:
-    """See `dem.engine.interface.Fixtures`.
+class LinksBoundaries:
+    """See `dem.engine.interface.Boundaries`.
 
     Args:
         world: the simulation.
         cylinder: the container.
         shaken: whether the scene shakes it.
-        removed: called with what takes contacts away, to keep the account.
+        removed: called with what takes contacts away, to keep the energy ledger.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Energies on LAMMPS: what is added and stopped is known; what contacts and fixtures do is not added up."""
+"""Energies on LAMMPS: what is added and stopped is known; what contacts and boundaries do is not added up."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 
 
-class LammpsAccount:
-    """See `dem.engine.interface.Account`.
+class LammpsLedger:
+    """See `dem.engine.interface.EnergyLedger`.
 
     Args:
-        moving: whether a fixture moves at present.
+        moving: whether a boundary moves at present.
         stored: what springs of contacts hold at most [J].
     """
 
