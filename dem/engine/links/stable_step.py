@@ -42,8 +42,8 @@ def links_stable_time_step(
     """Largest stable time step [s] over the stiffest modes of a smarticle among others.
 
     A barb's tip against another such tip, and against a boundary; a pile of smarticles that lie flat on each other,
-    with contacts at all ends of all links, which move against those above and below, or roll against them; and a string at a
-    tip. Prescribed rates add no stiffness, whatever the motor does; free angles make tips lighter.
+    with contacts at all ends of all links, which move against those above and below, or roll against them; and a
+    string at a tip. Prescribed rates add no stiffness, whatever the motor does; free angles make tips lighter.
 
     Args:
         particle: one smarticle.
