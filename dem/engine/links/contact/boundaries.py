@@ -16,7 +16,7 @@ from typing import Any
 from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, WALL, Array, Bodies, Ground, Hooks, Kept, Law, Rims
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import Step, resolve, stretch
-from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import POINTS, meet
 from dem.engine.links.contact.pairs import push, put_down
 from dem.engine.links.shape import Shape
@@ -299,9 +299,11 @@ def _rub(
     part_of, slip = int(contact[1]), kept.slip[p, int(contact[0])]
     x, y, z, vx, vy, vz, speed, turning = place_and_motion(shape, bodies, ground, i, row, contact)
     u, slope, hardening = stretch(depth, room)
-    load, stored, twist = law.stiffness * u * slope * weight, slip[3], 0.5 * step.past * turning
+    closing = (speed - vz) * nz - vx * nx - vy * ny
+    load = law.stiffness * u * slope * weight * share_of_step(depth, closing, step.past)
+    stored, twist = slip[3], 0.5 * step.past * turning
     fx, fy, fz = resist(law, load, weight, hardening, nx, ny, nz, vx, vy, vz - speed, twist, step.past, slip)
-    resolve(step, depth, room, (speed - vz) * nz - vx * nx - vy * ny)
+    resolve(step, depth, room, closing)
     # As a share of the room, which is not that of two links.
     bodies.deepest[i] = max(bodies.deepest[i], 2 * shape.radius * depth / room)
     if ledger is not None:

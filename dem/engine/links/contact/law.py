@@ -9,6 +9,23 @@ from dem.engine.links.compiler import inlined
 
 
 @inlined
+def share_of_step(depth: float, closing: float, dt: float) -> float:
+    """Return the share of the spring's force that acts where a contact begins or ends within a step [1].
+
+    The leapfrog scheme keeps kn/2 δ_n δ_n+1 of consecutive overlaps. With this share, 1 inside of a contact, the sum of
+    a contact's work is zero however its first and last overlap lie between 0 and a step's way; with the whole force a
+    contact takes (ω dt)²/12 of its energy away, ω its frequency.
+
+    Args:
+        depth: overlap [m].
+        closing: rate at which it grows [m/s].
+        dt: time step [s].
+    """
+    way = abs(closing) * dt
+    return 1.0 if depth >= way else 0.5 + 0.5 * depth / way
+
+
+@inlined
 def resist(
     law: Law,
     load: float,

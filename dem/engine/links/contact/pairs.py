@@ -8,8 +8,8 @@ from typing import Any
 from dem.engine.links.arrays import Array, Bodies, Law, Pairs
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import Step, resolve, stretch
-from dem.engine.links.contact.law import resist
-from dem.engine.links.contact.meeting import BARE, HARDENING, POINTS, meet_at, meets_elsewhere
+from dem.engine.links.contact.law import resist, share_of_step
+from dem.engine.links.contact.meeting import BARE, DISTANCE, HARDENING, POINTS, meet_at, meets_elsewhere
 from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
 
@@ -127,6 +127,8 @@ def push_apart(
             inverse, load = 1 / distance, law.stiffness * u * slope
             nx, ny, nz = x * inverse, y * inverse, z * inverse
             mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
+            closing, depth = -(mx * nx + my * ny + mz * nz), diameter - distance
+            load *= share_of_step(depth, closing, step.past)
             slip, twist = pairs.slip[pair, 0], 0.5 * step.past * turning
             stored = slip[3]
             fx, fy, fz = resist(law, load, 1.0, hardening, nx, ny, nz, mx, my, mz, twist, step.past, slip)
@@ -139,9 +141,7 @@ def push_apart(
             if pairs.used[pair] & ~1:
                 lost += _forget(pairs, pair, pairs.used[pair] & ~1)
             pairs.used[pair] = 1
-            closing = -(mx * nx + my * ny + mz * nz)
-            resolve(step, diameter - distance, diameter, closing)
-            depth = diameter - distance
+            resolve(step, depth, diameter, closing)
             bodies.deepest[i] = max(bodies.deepest[i], depth)
             bodies.deepest[j] = max(bodies.deepest[j], depth)
             continue
@@ -159,7 +159,10 @@ def push_apart(
             nx, ny, nz = out[slot, 3], out[slot, 4], out[slot, 5]
             load, carried = out[slot, 6], out[slot, 7]
             mx, my, mz, turning = motion_at(bodies, i, j, row_i, row_j, px, py, pz, nx, ny, nz)
-            closing = max(closing, -(mx * nx + my * ny + mz * nz))
+            rate = -(mx * nx + my * ny + mz * nz)
+            closing = max(closing, rate)
+            acting = share_of_step(diameter - out[slot, DISTANCE], rate, step.past)
+            load, carried = load * acting, carried * acting
             twist = 0.5 * step.past * turning
             fx, fy, fz = 0.0, 0.0, 0.0
             stored = pairs.slip[pair, slot, 3]
@@ -196,8 +199,8 @@ def push_apart(
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
-        resolve(step, diameter - distance, diameter, closing)
         depth = diameter - distance
+        resolve(step, depth, diameter, closing)
         bodies.deepest[i] = max(bodies.deepest[i], depth)
         bodies.deepest[j] = max(bodies.deepest[j], depth)
     return lost
