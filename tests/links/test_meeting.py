@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 
+import builds
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine.links.contact.boundaries import nearest_to_circle
-from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS, meet, meets_elsewhere
-from dem.engine.links.vectors import between, lines, nearest
+from dem.engine.links import vectors
+from dem.engine.links.contact import boundaries, meeting
+from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS
 
 D, KN = 1.127e-3, 500.0
+between, lines, nearest, nearest_to_circle, meet, meets_elsewhere = (
+    builds.callable_from_python(part)
+    for part in (
+        vectors.between, vectors.lines, vectors.nearest, boundaries.nearest_to_circle, meeting.meet,
+        meeting.meets_elsewhere,
+    )
+)  # fmt: skip
 
 
 def segment(rng: np.random.Generator, scale: float = 1e-2) -> np.ndarray:
@@ -54,7 +62,7 @@ def test_nearest_point_to_a_circle_against_brute_force() -> None:
 def look(p: np.ndarray, q: np.ndarray, bend: tuple[bool, bool]) -> tuple[float, np.ndarray, np.ndarray, int]:
     """Energy, force on the first, torque on the first about the origin, and the number of contacts."""
     out = np.zeros((ROWS, COLUMNS))
-    found = meet.py_func(p, q, D, KN, *bend, out)
+    found = meet(p, q, D, KN, *bend, out)
     if not found:
         return 0.0, np.zeros(3), np.zeros(3), 0
     force, torque, points = np.zeros(3), np.zeros(3), 0

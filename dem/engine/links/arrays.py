@@ -286,6 +286,7 @@ class Motoring(NamedTuple):
         period: the same in steps.
         targets: (looks, N, 2) angles at the ends of the periods to come according to the schedule [rad].
         due: (2,) the row of `targets` that the next look goes by, and the steps until then; -1: no look is due.
+        jump: (N, 2) by how much the prescribed rates have changed at a control update before the next kick [rad/s].
         over: (N,) how often in a row a barb of each smarticle was found at τ_max, one after the other, for ease.
     """
 
@@ -308,6 +309,7 @@ class Motoring(NamedTuple):
     period: int
     targets: Array
     due: NDArray[np.int64]
+    jump: Array
     over: NDArray[np.int64]
 
 

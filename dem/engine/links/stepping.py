@@ -114,10 +114,13 @@ def act(
     if cords is not None:
         pulling = pull(shape, bodies, cords, motors, step)
     resolve_speeds(shape, bodies, motors is not None, system.gravity, step)
+    if motors is not None and tick == 0 and motors.due[1] == 0:
+        # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
+        look(shape, bodies, motors)
     totals[MOST] = max(totals[MOST], need[0])
     ticks = ticks_for(need[0], tick)
     length = dt * (ticks / FINEST)
-    acting = 0.5 * (totals[PAST] + length)
+    past, acting = totals[PAST], 0.5 * (totals[PAST] + length)
     totals[PAST] = length
     totals[WORK] += acting * pulling
     weight = length / dt
@@ -126,7 +129,7 @@ def act(
             ground.sums[k, d] += weight * ground.force[k, d]
         if k < 4:
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
-    kick(shape, bodies, motors, system.gravity, system.planar, acting)
+    kick(shape, bodies, motors, system.gravity, system.planar, past, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:
@@ -139,13 +142,6 @@ def act(
         for k in range(cords.anchor.shape[0]):
             cords.anchor[k, 0] += cords.speed[k] * length
     return ticks
-
-
-@part
-def update_motors(shape: Shape, bodies: Bodies, motors: Any, starts: bool) -> None:
-    """Make a control update where one is due and a step starts."""
-    if motors is not None and starts and motors.due[1] == 0:
-        look(shape, bodies, motors)
 
 
 @part
@@ -174,7 +170,6 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
         tick = int(totals[TICK])
         while tick < FINEST:
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
-            update_motors(shape, bodies, system.motors, tick == 0)
             pose(shape, bodies, system.motors)
             if update_lists(shape, bodies, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick

@@ -152,6 +152,8 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
         if motors.law < SLIP:
             row, normal = bodies.plane[i], along_normal(bodies, i)
             p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+            motors.jump[i, 0] += bodies.rate[i, 0] - r1
+            motors.jump[i, 1] += bodies.rate[i, 1] - r2
             motors.work[i, 0] += 0.5 * (r1 + bodies.rate[i, 0]) * (p[0] - motors.momentum[i, 0])
             motors.work[i, 1] += 0.5 * (r2 + bodies.rate[i, 1]) * (p[1] - motors.momentum[i, 1])
             motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]

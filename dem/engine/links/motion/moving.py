@@ -23,7 +23,7 @@ from dem.engine.links.vectors import along, dot, vector
 
 
 @part
-def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
+def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, past: float, dt: float) -> None:
     """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
@@ -32,7 +32,8 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
-        dt: time over which they act [s].
+        past: length of the last sub-step [s].
+        dt: time over which they act [s], half of the last and half of the next sub-step.
     """
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
@@ -51,6 +52,10 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
             if motors.law < SLIP:
                 motors.impulse[i, 0] += dt * q1
                 motors.impulse[i, 1] += dt * q2
+                # Half a sub-step of these forces went along the rates before the control update.
+                motors.work[i, 0] += 0.5 * past * q1 * motors.jump[i, 0]
+                motors.work[i, 1] += 0.5 * past * q2 * motors.jump[i, 1]
+                motors.jump[i, 0] = motors.jump[i, 1] = 0.0
             else:
                 row, normal = bodies.plane[i], along_normal(bodies, i)
                 p1, p2 = motors.momentum[i, 0] + dt * q1, motors.momentum[i, 1] + dt * q2
