@@ -302,7 +302,7 @@ def test_what_contacts_remember_survives_a_new_list() -> None:
 
     before = memory()
     assert len(before) > 10
-    build(world.shape, world.bodies, world.pairs, world.cells, world.skins)
+    builds.callable_from_python(build)(world.shape, world.bodies, world.pairs, world.cells, world.skins)
     assert memory() == before
 
 

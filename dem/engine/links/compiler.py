@@ -36,7 +36,7 @@ NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper
 
 
 def part(function: F) -> F:
-    """Compile a function as a part of the kernels that call it."""
+    """Compile a function as a part of the kernels that call it; Python cannot call it, and crashes if it tries."""
     return numba.njit(**OPTIONS, **NOT_FROM_PYTHON)(function)  # type: ignore[no-any-return]
 
 
