@@ -25,7 +25,7 @@ from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
 from validation.bench import add, advance_watched, body_rotations, scene_of
-from validation.yade_access import YadeAccess
+from validation.access import YadeAccess
 
 
 def build(

@@ -21,7 +21,7 @@ from dem.engine.demand import contact_law_of
 from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
 from validation.bench import Targets, drive
-from validation.yade_access import bodies_of as bodies
+from validation.access import bodies_of as bodies
 
 
 def gait(
