@@ -56,17 +56,18 @@ class _Access:
         gravity: float = 0.0,
         height: float = 0.2,
         **motors: Any,
-    ) -> Any:
+    ) -> Engine:
         """Build an engine with a floor at z = 0 and a wall far away."""
         cylinder = Cylinder(radius=0.5, height=height, facets=16)
         keys = {"particle": particle, "cylinder": cylinder, "law": law, "gravity": gravity, "time_step": dt}
-        return self.engine(**keys, shaken=False, **motors)
+        engine: Engine = self.engine(**keys, shaken=False, **motors)
+        return engine
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
         """Return the arguments of the engine for the motors of a scene."""
         raise NotImplementedError
 
-    def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Any:
+    def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
         """Build the engine for articulated smarticles of a scene, by default at its time step."""
         law, dt = contact_law_of(scene), dt or time_step(scene)
         height, motors = scene.cylinder.height, self.motors_of(scene)

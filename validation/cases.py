@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
+import pytest
+from _pytest.mark.structures import ParameterSet
+
 from validation.access import ENGINES
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -82,72 +85,17 @@ def says(text: str | None, *parts: str) -> Check:
     return Check("the error says", text or "nothing", " … ".join(parts), good)
 
 
-@dataclass(frozen=True)
-class Case:
-    """A small simulation whose answer is on paper.
-
-    Args:
-        run: simulates with the access that it is given, and returns answers.
-        about: what happens in it.
-        theory: formula, and its source.
-        absent: why it has no meaning, by engine.
-    """
-
-    run: Callable[..., list[Answer]]
-    about: str
-    theory: str
-    absent: Mapping[str, str]
+# Parameters of `test_known_answer`, `test_order_is_the_schemes` and `test_hard_case`, in the order of the arguments.
+CASES: list[ParameterSet] = []
+LADDERS: list[ParameterSet] = []
+HARD: list[ParameterSet] = []
 
 
-@dataclass(frozen=True)
-class Ladder:
-    """A trajectory at several time steps: how its error falls with the step.
-
-    Args:
-        errors: returns the error of each of some steps [unit], by access.
-        about: what moves.
-        quantity: the error that is measured, with its unit.
-        size: of the motion, to which errors are compared [unit].
-        steps: from coarse to fine [s].
-        scheme: order of the scheme in this motion [1], and its reason; by engine.
-        phases: of the onset within a step, in the quick form; None: the function has no such option.
-    """
-
-    errors: Callable[..., list[float]]
-    about: str
-    quantity: str
-    size: float
-    steps: tuple[float, ...]
-    scheme: Mapping[str, tuple[int, str]]
-    phases: int | None
-
-
-@dataclass(frozen=True)
-class Hard:
-    """A hard case.
-
-    Args:
-        run: simulates with the access and in the folder that it is given, and returns checks.
-        short: its size in continuous integration; None: the long form only.
-        long: what differs from that in the long form.
-        absent: why it has no meaning, by engine.
-    """
-
-    run: Callable[..., list[Check]]
-    short: Mapping[str, Any] | None
-    long: Mapping[str, Any]
-    absent: Mapping[str, str]
-
-
-CASES: dict[str, Case] = {}
-LADDERS: dict[str, Ladder] = {}
-HARD: dict[str, Hard] = {}
-
-
-def _register(table: dict[str, Any], name: str, make: Callable[[Any], Any]) -> Callable[[Function], Function]:
+def _register(
+    table: list[ParameterSet], name: str, options: Mapping[str, Any], *values: Any
+) -> Callable[[Function], Function]:
     def register(function: Function) -> Function:
-        assert name not in table, name
-        table[name] = make(function)
+        table.append(pytest.param(name, partial(function, **options), *values, id=name))
         return function
 
     return register
@@ -156,37 +104,57 @@ def _register(table: dict[str, Any], name: str, make: Callable[[Any], Any]) -> C
 def case(
     name: str, about: str, theory: str, *, absent: Mapping[str, str] | None = None, **options: Any
 ) -> Callable[[Function], Function]:
-    """Register a function, called with options, as a known answer; see `Case`."""
-    return _register(CASES, name, lambda function: Case(partial(function, **options), about, theory, absent or {}))
+    """Register a function as a known answer: it simulates with the access that it is given, and returns answers.
+
+    Args:
+        name: unique.
+        about: what happens in it.
+        theory: formula, and its source.
+        absent: why it has no meaning, by engine.
+        options: of the function.
+    """
+    return _register(CASES, name, options, about, theory, absent or {})
 
 
-def ladder(
+def ladder(  # noqa: PLR0917 # a row of a table
     name: str,
     about: str,
     quantity: str,
-    *,
     size: float,
     steps: tuple[float, ...],
-    scheme: Mapping[str, tuple[int, str]],
+    scheme: tuple[int, str] | dict[str, tuple[int, str]],
+    *,
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function, called with options, as a ladder; see `Ladder`."""
-    rest = (about, quantity, size, steps, scheme, phases)
-    return _register(LADDERS, name, lambda function: Ladder(partial(function, **options), *rest))
+    """Register a function as a ladder: it returns the error of a trajectory at each of some time steps.
 
-
-def on_both(order: int, why: str) -> dict[str, tuple[int, str]]:
-    """Return the same order on both engines, for the same reason."""
-    return dict.fromkeys(ENGINES, (order, why))
+    Args:
+        name: unique.
+        about: what moves.
+        quantity: the error that is measured, with its unit.
+        size: of the motion, to which errors are compared [unit].
+        steps: from coarse to fine [s].
+        scheme: its order in this motion [1], and the reason; of all engines, or by engine.
+        phases: of the onset within a step, in the quick form; None: the function has no such option.
+        options: of the function.
+    """
+    by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
+    return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)
 
 
 def hard(
     name: str,
     short: Mapping[str, Any] | None,
     long: Mapping[str, Any] | None = None,
-    *,
     absent: Mapping[str, str] | None = None,
 ) -> Callable[[Function], Function]:
-    """Register a function as a hard case; see `Hard`."""
-    return _register(HARD, name, lambda function: Hard(function, short, long or {}, absent or {}))
+    """Register a function as a hard case: it simulates with an access and in a folder, and returns checks.
+
+    Args:
+        name: unique.
+        short: its options in continuous integration; None: the long form only.
+        long: what differs from that in the long form.
+        absent: why it has no meaning, by engine.
+    """
+    return _register(HARD, name, {}, short, long or {}, absent or {})

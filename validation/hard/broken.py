@@ -183,5 +183,5 @@ def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity
 
 for _fidelity in ("draft", "standard"):
     for _activity in ("at rest", "shaken", "swinging")[: 3 if _fidelity == "draft" else 2]:
-        _size = {"fidelity": _fidelity, "count": 100, "activity": _activity, "seconds": 1.0}
-        hard(f"cost of the watchdog, {_activity}, {_fidelity}", None, _size)(cost)
+        _run = {"fidelity": _fidelity, "count": 100, "activity": _activity, "seconds": 1.0}
+        hard(f"cost of the watchdog, {_activity}, {_fidelity}", None, _run)(cost)

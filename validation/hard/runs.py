@@ -63,33 +63,6 @@ class Noting(Watchdog):
 
 
 @dataclass
-class Timing(Recorder):
-    """A recorder that times the watchdog's checks, and spoils what is checked.
-
-    Args:
-        checks: processor time of each [s].
-        spoil: done to the engine before each record; None: nothing is.
-    """
-
-    checks: list[float] = field(default_factory=list)
-    spoil: Callable[[Engine], None] | None = None
-
-    def record(self, engine: Engine, phase: int) -> None:
-        """Spoil the engine, then record."""
-        if self.spoil is not None:
-            self.spoil(engine)
-        super().record(engine, phase)
-
-    def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Check, and note the time it took."""
-        begun = time.process_time()
-        try:
-            super().watch(engine, state)
-        finally:
-            self.checks.append(time.process_time() - begun)
-
-
-@dataclass
 class Watched:
     """A run that has ended.
 
@@ -173,14 +146,29 @@ def whole(
         steps: time step of each phase [s].
         spoil: done to the engine before each record.
     """
-    built: list[tuple[Timing, Noting | None]] = []
+    nearest: dict[str, float] = {}
+    checks: list[float] = []  # processor time of each of the watchdog's [s]
 
     def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-        timing = Timing(**vars(build.build_recorder(scene, out, progress)), spoil=spoil)
-        noting = Noting(**vars(timing.watchdog)) if note else None
-        timing.watchdog = noting or timing.watchdog
-        built.append((timing, noting))
-        return timing
+        made = build.build_recorder(scene, out, progress)
+        if note:
+            made.watchdog = Noting(**vars(made.watchdog), nearest=nearest)
+        record, watch = made.record, made.watch
+
+        def spoil_and_record(engine: Engine, phase: int) -> None:
+            if spoil is not None:
+                spoil(engine)
+            record(engine, phase)
+
+        def watch_timed(engine: Engine, state: State | None = None) -> None:
+            begun = time.process_time()
+            try:
+                watch(engine, state)
+            finally:
+                checks.append(time.process_time() - begun)
+
+        made.record, made.watch = spoil_and_record, watch_timed  # type: ignore[method-assign]
+        return made
 
     scene, error = None, None
     builders = build.Builders(steps=steps, recorder=recorder)
@@ -195,9 +183,7 @@ def whole(
     if (out / "series.h5").exists():
         with h5py.File(out / "series.h5") as file:
             series = {name: dataset[()] for name, dataset in file.items()}
-    nearest = {limit: share for _, noting in built if noting for limit, share in noting.nearest.items()}
-    checks = [check for timing, _ in built for check in timing.checks] or [0.0]
-    return Watched(scene, error, series, nearest, sum(checks[1:]) / total, checks[0])
+    return Watched(scene, error, series, nearest, sum(checks[1:]) / total, checks[0] if checks else 0.0)
 
 
 def timed(run: Callable[..., list[Check]], *arguments: Any, **options: Any) -> tuple[list[Check], float]:

@@ -25,18 +25,28 @@ Call = Callable[..., Any]
 @pytest.mark.filterwarnings("ignore")  # of scenes that ask for trouble
 @pytest.mark.parametrize("engine", ON)
 @pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize(("name", "run", "short", "long", "absent"), HARD)
 def test_hard_case(
-    call: Call, call_alone: Call, tables: Tables, *, tmp_path: Path, name: str, size: str, engine: str
+    call: Call,
+    call_alone: Call,
+    tables: Tables,
+    *,
+    tmp_path: Path,
+    name: str,
+    run: Call,
+    short: dict[str, Any] | None,
+    long: dict[str, Any],
+    absent: dict[str, str],
+    size: str,
+    engine: str,
 ) -> None:
-    case = HARD[name]
-    if reason := case.absent.get(engine):
-        pytest.skip(f"not applicable: {reason}")
-    if case.short is None and size == "short":
+    if engine in absent:
+        pytest.skip(f"not applicable: {absent[engine]}")
+    if short is None and size == "short":
         pytest.skip("only in its long form")
     tables.skip_recorded(engine, "cases", case=name, form=size)
-    options = {**(case.short or {}), **(case.long if size == "long" else {})}
-    arguments = (timed, case.run, engine_access(engine), tmp_path / "run")
+    options = {**(short or {}), **(long if size == "long" else {})}
+    arguments = (timed, run, engine_access(engine), tmp_path / "run")
     # The long form measures memory and time, and runs alone in a fresh process.
     checks, wall = call_alone(*arguments, **options) if size == "long" else call(engine, *arguments, **options)
     rows = [

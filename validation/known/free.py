@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from validation.access import EngineAccess
 from validation.bench import TILTED, Array, G, add, body_rotations, law_of, scene
-from validation.cases import COARSE, MIDDLE, Answer, case, ladder, on_both
+from validation.cases import COARSE, MIDDLE, Answer, case, ladder
 from validation.known.theory import free_rotation
 
 MIDPOINT = "the implicit midpoint rule: second order"
@@ -56,11 +56,9 @@ def free_fall(access: EngineAccess) -> list[Answer]:
     "let go from rest",
     "a smarticle falls, let go as the pour does it",
     "height after 0.1 s [m]",
-    size=9.81 * 0.096**2 / 2,
-    steps=COARSE,
-    scheme=on_both(
-        1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"
-    ),
+    9.81 * 0.096**2 / 2,
+    COARSE,
+    (1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"),
 )
 def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     return [abs(fall(access, dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
@@ -127,9 +125,9 @@ ANY_AXIS = {"yade": (1, TURNS), "links": (2, MIDPOINT)}
     "spin",
     "a smarticle spins about no axis in particular",
     "orientation after 1.4 turns [rad]",
-    size=8.6,
-    steps=COARSE,
-    scheme=ANY_AXIS,
+    8.6,
+    COARSE,
+    ANY_AXIS,
     spin=SPIN,
     time=0.2,
 )
@@ -137,9 +135,9 @@ ANY_AXIS = {"yade": (1, TURNS), "links": (2, MIDPOINT)}
     "spin in the plane",
     "a smarticle spins about the normal of its plane",
     "orientation after 1.3 turns [rad]",
-    size=8.3,
-    steps=(3.2e-4, 1.6e-4, 8e-5, 4e-5),
-    scheme=IN_PLANE,
+    8.3,
+    (3.2e-4, 1.6e-4, 8e-5, 4e-5),
+    IN_PLANE,
     spin=PRINCIPAL,
     time=0.192,
 )
@@ -182,12 +180,7 @@ def flips(access: EngineAccess) -> list[Answer]:
 
 
 @ladder(
-    "flips",
-    "a smarticle about the axis of its middle moment",
-    "time between two flips [s]",
-    size=0.208,
-    steps=MIDDLE,
-    scheme=ANY_AXIS,
+    "flips", "a smarticle about the axis of its middle moment", "time between two flips [s]", 0.208, MIDDLE, ANY_AXIS
 )
 def flip_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     found, exact = _flip_times(access, steps)

@@ -161,8 +161,9 @@ def crossings(time: Array, value: Array) -> Array:
 
 @case("pendulum", "barbs hang from a held middle link, let go at 6°", "2π√(I/mga)(1 + θ²/16)")
 def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]:
-    motor = {"stiffness_N_m_per_rad": 1e-9, "torque_limit_N_m": STRONG}
-    one = hinged(access, aspect_ratio=aspect_ratio, angles=(96, 84), **motor)
+    one = hinged(
+        access, aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG
+    )
     engine = upright(access, one, gravity=G)
     begun = engine.state().angles
     times, angles = [], []
@@ -273,9 +274,9 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     "barbs on their shafts",
     "an articulated smarticle in space, control period 0.2 ms",
     "angle of a barb over 10 ms [rad]",
-    size=0.01,
-    steps=FINE,
-    scheme={
+    0.01,
+    FINE,
+    {
         "yade": (2, f"{LEAPFROG}, in the plane"),
         "links": (2, "the spring's force is the mean over the half steps before and after: second order"),
     },

@@ -15,7 +15,7 @@ from dem.physics.contact import ContactLaw, typical_effective_mass
 from dem.plan.steps import time_step
 from validation.access import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
 from validation.bench import UPRIGHT, Array, G, add, ball_law, law_of, scene
-from validation.cases import COARSE, LEAPFROG, MIDDLE, Answer, case, ladder, on_both
+from validation.cases import COARSE, LEAPFROG, MIDDLE, Answer, case, ladder
 from validation.known.theory import bounced, dashpot_impact
 
 DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
@@ -327,9 +327,9 @@ def _roots(squares: Array) -> list[float]:
     "bounce, e = 0.5",
     "a ball bounces once under gravity",
     "height after 5 ms [m]",
-    size=WAY,
-    steps=COARSE,
-    scheme={"yade": (1, LATE), "links": (1, LAGS)},
+    WAY,
+    COARSE,
+    {"yade": (1, LATE), "links": (1, LAGS)},
     phases=16,
     restitution=0.5,
 )
@@ -337,9 +337,9 @@ def _roots(squares: Array) -> list[float]:
     "bounce, elastic",
     "a ball bounces once under gravity",
     "height after 5 ms [m]",
-    size=WAY,
-    steps=COARSE,
-    scheme=on_both(2, f"{LEAPFROG}, and the force begins from zero"),
+    WAY,
+    COARSE,
+    (2, f"{LEAPFROG}, and the force begins from zero"),
     phases=16,
     restitution=1.0,
 )
@@ -381,9 +381,9 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
     "collision, law of the scene",
     "two tilted smarticles collide once",
     "places of all spheres after 5 ms [m]",
-    size=WAY,
-    steps=COARSE,
-    scheme={"yade": (1, f"{LATE}; so are rotations"), "links": (1, LAGS)},
+    WAY,
+    COARSE,
+    {"yade": (1, f"{LATE}; so are rotations"), "links": (1, LAGS)},
     phases=8,
     smooth=False,
 )
@@ -391,9 +391,9 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
     "collision, elastic and smooth",
     "two smarticles in one plane collide once",
     "places of all spheres after 5 ms [m]",
-    size=WAY,
-    steps=MIDDLE,
-    scheme=on_both(2, f"{LEAPFROG}, also of turns about the normal, and the force begins from zero"),
+    WAY,
+    MIDDLE,
+    (2, f"{LEAPFROG}, also of turns about the normal, and the force begins from zero"),
     phases=8,
     smooth=True,
 )

@@ -82,9 +82,9 @@ def pair_work(access: EngineAccess, *, law: str, damping: float = 0.0) -> list[A
     engine, swinging = free_pair(access, law, damping)
     start = engine.state().kinetic_energy
     gains, works = np.array([(engine.state().kinetic_energy - start, engine.motors.work) for _ in swinging]).T
-    what, worst = "work of the motors less gain of energy, worst [J]", np.abs(gains - works).max()
+    what, worst = "work of the motors less gain of energy, worst [J]", float(np.abs(gains - works).max())
     reason = "second order in the time step where they drive; jumps of a rate are counted exactly"
-    return [Answer(what, 0.0, worst, 1e-3, reason, scale=np.abs(gains).max())]
+    return [Answer(what, 0.0, worst, 1e-3, reason, scale=float(np.abs(gains).max()))]
 
 
 for _law, _damping in (("halt", 0.0), ("stall", 0.0), ("ease", 0.0), ("slip", 0.0), ("servo", 2e-6)):
@@ -109,8 +109,11 @@ def thousand_turns(access: EngineAccess) -> list[Answer]:
         access.push(engine, k, spin=spin)
     before, momentum = engine.state().kinetic_energy, engine.state().angular_momentum
     engine.advance(round(1000 * 2 * math.pi / rate / engine.time_step))
-    after, size = engine.state(), np.linalg.norm(momentum)
-    change, what = np.linalg.norm(after.angular_momentum - momentum), "angular momentum, change of the vector [kg m²/s]"
+    after, size = engine.state(), float(np.linalg.norm(momentum))
+    change, what = (
+        float(np.linalg.norm(after.angular_momentum - momentum)),
+        "angular momentum, change of the vector [kg m²/s]",
+    )
     midpoint = "the midpoint rule keeps it but for what its three iterations leave, (ω dt)³ of a turn"
     return [
         Answer("kinetic energy after a thousand turns [J]", before, after.kinetic_energy, 1e-4, midpoint),

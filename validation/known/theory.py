@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from validation.bench import Array
 
 
 def _impact(
-    *, stiffness: float, damping: float, mass: float, gravity: float, speed: float
+    *, stiffness: float, damping: float, mass: float, gravity: float, speed: float, depth: float = 0.0
 ) -> tuple[float, float, float]:
     """Integrate m x'' = −k x − c x' − m g from first touch until the force would pull.
 
@@ -32,8 +32,7 @@ def _impact(
     solution = solve_ivp(
         lambda _, y: [y[1], push(y) / mass - gravity],
         (0, 10 * math.sqrt(mass / stiffness)),
-        # A little below, so that an elastic contact does not end where it begins.
-        [-1e-12, -speed],
+        [-depth, -speed],
         method="DOP853",
         events=parts,
         rtol=1e-12,
@@ -43,17 +42,13 @@ def _impact(
     return float(solution.t_events[0][0]), float(height), float(velocity)
 
 
-@dataclass(frozen=True)
-class Impact:
-    """A body on a spring and dashpot that never pulls, thrown at them.
-
-    Args:
-        restitution: speed after over speed before [1].
-        duration: from first touch until the force is zero [s].
-    """
+class Impact(NamedTuple):
+    """A body on a spring and dashpot that never pulls, thrown at them."""
 
     restitution: float
+    """Speed after over speed before [1]."""
     duration: float
+    """From first touch until the force is zero [s]."""
 
 
 def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
@@ -76,7 +71,8 @@ def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs:
         springs: stiffness [N/m], damping [N s/m] and mass [kg].
     """
     met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
-    contact, height, velocity = _impact(**springs, gravity=gravity, speed=speed + gravity * met)
+    # A little below first touch, so that an elastic contact does not end where it begins.
+    contact, height, velocity = _impact(**springs, gravity=gravity, speed=speed + gravity * met, depth=1e-12)
     flight = time - met - contact
     return height + velocity * flight - gravity * flight**2 / 2
 
