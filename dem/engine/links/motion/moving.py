@@ -14,10 +14,12 @@ from typing import Any
 from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
+from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import along, dot, vector
 
 
 @part
@@ -96,18 +98,14 @@ def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, s
 @part
 def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
     """Greatest speed of an end of a link's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
-    links, position, segments, motion = shape.kinds.shape[0], bodies.position, bodies.segments, bodies.motion
-    each, most = links * shape.offsets.shape[0], 0.0
+    links, segments, most = shape.kinds.shape[0], bodies.segments, 0.0
+    each = links * shape.offsets.shape[0]
     for p in range(each * i, each * (i + 1)):
         row = 3 * i + shape.kinds[p % links] if hinged else i
         for end in range(2):
-            x = segments[p, 0] + end * segments[p, 3] - position[i, 0]
-            y = segments[p, 1] + end * segments[p, 4] - position[i, 1]
-            z = segments[p, 2] + end * segments[p, 5] - position[i, 2]
-            vx = motion[row, 0] + motion[row, 4] * z - motion[row, 5] * y
-            vy = motion[row, 1] + motion[row, 5] * x - motion[row, 3] * z
-            vz = motion[row, 2] + motion[row, 3] * y - motion[row, 4] * x
-            most = max(most, vx * vx + vy * vy + vz * vz)
+            place = along(vector(segments[p], 0), end, vector(segments[p], 3))
+            velocity = velocity_at(bodies, i, row, place)
+            most = max(most, dot(velocity, velocity))
     return math.sqrt(most)
 
 
