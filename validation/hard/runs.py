@@ -43,9 +43,7 @@ class Noting(Watchdog):
         return False
 
     def check(self, state: State, **options: Any) -> None:
-        """Note speed and gaps, then check."""
-        if state.count:
-            self._note("speed", np.linalg.norm(state.link_velocities, axis=-1).max() / self.speed)
+        """Note gaps, then check."""
         if (gaps := options.get("gaps")) is not None:
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -113,44 +112,35 @@ def test_flat_impacts_over_the_number_of_points(call: Call, tables: Tables, engi
     assert [row["measured"] for row in rows] == pytest.approx([row["theory"] for row in rows], abs=0.02)
 
 
-OTHER: dict[str, Callable[..., list[Answer]]] = {
-    **{f"bar on its end, e = {e:g}": partial(impact.bar_rebound, restitution=e) for e in (0.2, 0.9)},
-    **{f"bars end to end, e = {e:g}": partial(impact.bars_rebound, restitution=e) for e in (0.2, 0.9)},
-    **{f"typical mass, e = {e:g}": partial(impact.bar_rebound, restitution=e, resized=True) for e in (0.05, 0.2, 0.8)},
-    **{
-        f"slide, l/w = {aspect:g}, mu = {mu:g}": partial(floor.slide, aspect_ratio=aspect, friction=mu)
-        for aspect, mu in ((0.7, 0.2), (0.3, 0.4))
-    },
-    **{
-        f"barb droops, {name}, l/w = {aspect:g}": partial(hinge.droop, aspect_ratio=aspect, fidelity=name)
+BOTH, YADE = ("yade", "links"), ("yade",)
+OTHER: list[tuple[Call, dict[str, Any], tuple[str, ...]]] = [
+    *((run, {"restitution": e}, BOTH) for run in (impact.bar_rebound, impact.bars_rebound) for e in (0.2, 0.9)),
+    *((impact.bar_rebound, {"restitution": e, "resized": True}, BOTH) for e in (0.05, 0.2, 0.8)),
+    *((floor.slide, {"aspect_ratio": aspect, "friction": mu}, BOTH) for aspect, mu in ((0.7, 0.2), (0.3, 0.4))),
+    *(
+        (hinge.droop, {"aspect_ratio": aspect, "fidelity": name}, BOTH)
         for name in ("draft", "standard")
         for aspect in (0.4, 1.0)
-    },
-    **{f"pendulum, l/w = {aspect:g}": partial(hinge.pendulum, aspect_ratio=aspect) for aspect in (0.4, 1.0)},
-}
-"""Other parameters of the cases."""
-OTHER_ON_YADE: dict[str, Callable[..., list[Answer]]] = {
-    **{
-        f"hinge pulled, {name}, l/w = {aspect:g}": partial(
-            hinge.pull, aspect_ratio=aspect, fidelity=name, largest=largest
-        )
+    ),
+    *((hinge.pendulum, {"aspect_ratio": aspect}, BOTH) for aspect in (0.4, 1.0)),
+    *(
+        (hinge.pull, {"aspect_ratio": aspect, "fidelity": name, "largest": largest}, YADE)
         for name, largest in (("standard", 0.01), ("draft", 0.03))
         for aspect in (0.4, 0.7, 1.0)
-    },
-    "barb out of plane after three sweeps": partial(hinge.tilt, sweeps=3),
-}
+    ),
+    (hinge.tilt, {"sweeps": 3}, YADE),
+]
+"""Other parameters of the cases: function, options, engines."""
 
 
 @pytest.mark.parametrize("engine", ON)
-@pytest.mark.parametrize("name", OTHER)
-def test_other_parameters(call: Call, name: str, engine: str) -> None:
-    assert failed(call(engine, OTHER[name], engine_access(engine))) == []
-
-
-@pytest.mark.engine
-@pytest.mark.parametrize("name", OTHER_ON_YADE)
-def test_other_parameters_of_pins(call: Call, name: str) -> None:
-    assert failed(call("yade", OTHER_ON_YADE[name], engine_access("yade"))) == []
+@pytest.mark.parametrize(("run", "options", "engines"), OTHER, ids=[f"{run.__name__}-{keys}" for run, keys, _ in OTHER])
+def test_other_parameters(
+    call: Call, run: Call, options: dict[str, Any], engines: tuple[str, ...], engine: str
+) -> None:
+    if engine not in engines:
+        pytest.skip("not applicable")
+    assert failed(call(engine, run, engine_access(engine), **options)) == []
 
 
 # -- the theory itself, without an engine ------------------------------------------------------------------------------
