@@ -186,50 +186,30 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]
     return checks
 
 
-def _free_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
-    """Return mass and stiffness matrices of a free U whose barbs turn the same way, (5, 5).
-
-    Coordinates: the middle link along itself and its turn, the barbs' turn, and how far barb 1 has come off its hinge
-    along and across the middle link (barb 2: the same along, the opposite across); these two where pins give way.
-    """
-    boxes = one.smarticle.boxes
-    middle, own_middle = float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2])
-    mass, own, lever = _barb(one)
-    along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
-    across = np.array([0.0, boxes.middle_length / 2, 0.0, 0.0, -1.0])
-    masses = np.diag([middle, own_middle, 2 * own, 0.0, 0.0])
-    masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
-    twist = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
-    if pin == math.inf:
-        masses, twist, pins = masses[:3, :3], twist[:3], np.zeros(3)
-    else:
-        pins = np.array([0, 0, 0, 2 * pin, 2 * pin])
-    return masses, 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist) + np.diag(pins)
-
-
-def _held_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
-    """Return those of a barb on a held middle link, (2, 2): its turn, and how far it came off the hinge across it."""
-    mass, own, lever = _barb(one)
-    shaft = one.motor.stiffness_N_m_per_rad
-    if pin == math.inf:
-        return np.array([[own + mass * lever**2]]), np.array([[shaft]])
-    return np.array([[own + mass * lever**2, mass * lever], [mass * lever, mass]]), np.diag([shaft, pin])
-
-
 def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
     """Compute the vibration of barbs on their shafts, above the rigid motions and below the vibrations of the pins.
 
+    Coordinates of a U whose barbs turn alike: the middle link along itself and its turn, the barbs' turn, and how far
+    barb 1 has come off its hinge along and across the middle link (barb 2: as far along, the opposite across). Only
+    those are free that the pins and a held middle link leave.
+
     Returns:
-        Angular frequency [rad/s], and its shape in the coordinates of the matrices, all five or two of them, for a
-        twist of 1 rad.
+        Angular frequency [rad/s], and its shape (5,) for a twist of 1 rad.
     """
-    masses, stiffness = (_held_matrices if held else _free_matrices)(one, pin)
-    squares, shapes = eigh(stiffness, masses)
-    pins = 0 if pin == math.inf else 1 if held else 2
-    place = len(squares) - 1 - pins
-    shape = np.zeros(2 if held else 5)
-    shape[: len(squares)] = shapes[:, place]
-    return math.sqrt(squares[place]), shape / (shape[0] if held else shape[2] - shape[1])
+    boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
+    along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
+    across = np.array([0.0, boxes.middle_length / 2, 0.0, 0.0, -1.0])
+    masses = np.diag([float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2]), 2 * own, 0.0, 0.0])
+    masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
+    twist, parts = np.array([0.0, -1.0, 1.0, 0.0, 0.0]), pin < math.inf
+    stiffness = 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist)
+    stiffness += np.diag([0, 0, 0, 2 * pin, 2 * pin] if parts else np.zeros(5))
+    pins = [] if not parts else [3] if held else [3, 4]
+    free = [2, *pins] if held else [0, 1, 2, *pins]
+    squares, shapes = eigh(stiffness[np.ix_(free, free)], masses[np.ix_(free, free)])
+    place, shape = len(free) - 1 - len(pins), np.zeros(5)
+    shape[free] = shapes[:, place]
+    return math.sqrt(squares[place]), shape / (shape[2] - shape[1])
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
@@ -238,14 +218,12 @@ def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None =
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
     frequency, shape = shaft_mode(one, access.pin_stiffness(one), held=held)
-    rates, lever, half = 0.01 * frequency * shape, _barb(one)[2], one.smarticle.middle_length_m / 2
     if held:
         access.hold(engine)
-        along, across, middle, turn = -(lever * rates[0] + rates[1]), 0.0, (0.0, 0.0), rates[0]
-    else:
-        along, across = rates[0] - lever * rates[2] + rates[3], half * rates[1] - rates[4]
-        middle, turn = (rates[0], rates[1]), rates[2]
-    access.swing(engine, ((along, -across, turn), (middle[0], 0.0, middle[1]), (along, across, turn)))
+    middle, spin, turn, off, off_across = 0.01 * frequency * shape
+    along = middle - _barb(one)[2] * turn + off
+    across = one.smarticle.middle_length_m / 2 * spin - off_across
+    access.swing(engine, ((along, -across, turn), (middle, 0.0, spin), (along, across, turn)))
     return engine
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.state import State
@@ -18,6 +17,7 @@ from dem.plan.steps import time_step
 from validation.access import EngineAccess
 from validation.bench import Array, add, drive, law_of, scene, scene_data, shape_change
 from validation.cases import Answer, case
+from validation.extremes import crossings
 from validation.hard.runs import whole
 
 YADES_TURNS = {"yade": "its turns are of first order: ladder `spin`"}
@@ -155,25 +155,6 @@ def ledger(access: EngineAccess, *, count: int = 100, seconds: float = 0.5) -> l
 # -- links are solid ---------------------------------------------------------------------------------------------------
 
 
-def _sides(vertices: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return on which side each link of a smarticle passes each of another's, and whether it does so.
-
-    Args:
-        vertices: (2, 4, 3) [m].
-
-    Returns:
-        (3, 3) signed volumes, and whether both nearest points are inside the links.
-    """
-    starts, along = vertices[:, :3], vertices[:, 1:] - vertices[:, :3]
-    u, v = along[0][:, None], along[1][None]
-    apart = starts[0][:, None] - starts[1][None]
-    normal = np.cross(u, v)
-    square = (normal**2).sum(axis=-1)
-    s = -(np.cross(apart, v) * normal).sum(axis=-1) / square
-    t = -(np.cross(apart, u) * normal).sum(axis=-1) / square
-    return (apart * normal).sum(axis=-1), (s > 0) & (s < 1) & (t > 0) & (t < 1)
-
-
 @case(
     "10 m/s and 60 rad/s, contacts of 250 N/m",
     "smarticles thrown at others, which linear contacts so soft could not hold",
@@ -200,11 +181,11 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
         add(engine, (0.03, across, 0.1 + up), Rotation.random(random_state=rng))
         axis = rng.normal(size=3)
         access.push(engine, 1, velocity=(-10, 0, 0), spin=60 * axis / np.linalg.norm(axis))
-        before, passed = _sides(engine.state().vertices), False
+        before, passed = engine.state().vertices, False
         for _ in range(math.ceil(0.06 / 10 / dt)):
             engine.advance(1)
-            now = _sides(engine.state().vertices)
-            passed |= bool((before[1] & now[1] & (before[0] * now[0] < 0)).any())
+            now = engine.state().vertices
+            passed |= bool(crossings(before, now))
             before = now
         crossed += passed
         met += abs(engine.state().velocities[0, 0]) > 1e-3
