@@ -82,7 +82,7 @@ def nothing(what: str, text: str | None) -> Check:
 def says(text: str | None, *parts: str) -> Check:
     """Check that an error contains some words."""
     good = text is not None and all(part in text for part in parts)
-    return Check("the error says", text or "nothing", " … ".join(parts), good)
+    return Check("the error", text or "nothing", " … ".join(parts), good)
 
 
 # Parameters of `test_known_answer`, `test_order_is_the_schemes` and `test_hard_case`, in the order of the arguments.

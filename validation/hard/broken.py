@@ -59,7 +59,7 @@ def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, step
     if what == "overlap" and rigid:
         # On links they have pushed each other apart by the next check; then their energy shows it.
         expected = " smarticle(s) (0, 1"
-    return [nothing("the look before says", before), says(said, expected)]
+    return [nothing("the check before reports", before), says(said, expected)]
 
 
 for _what in SPOILT:
@@ -176,8 +176,8 @@ def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity
     run = whole(scene_data(access, phase, count=count, per_layer=10, fidelity=fidelity), out, note=False)
     return [
         Check("ends", run.text or "done", "done", run.error is None),
-        below("share of the processor time, but for the first look [1]", run.cost, 0.01),
-        below("processor time of the first look [s]", run.first_check, 0.2),
+        below("share of the processor time, but for the first check [1]", run.cost, 0.01),
+        below("processor time of the first check [s]", run.first_check, 0.2),
     ]
 
 

@@ -269,7 +269,7 @@ def oscillation(access: EngineAccess, out: Path, *, seconds: float, count: int =
     most, thirds = kinetic.max(), kinetic[late].mean() / kinetic[middle].mean()
     gain, trend = height[late].max() - height[time < seconds / 6].max(), abs(np.polyfit(time, gap, 1)[0])
     return [
-        nothing("the watchdog says", said),
+        nothing("the watchdog reports", said),
         above("largest kinetic energy over that of swinging barbs [1]", most / scale, 0.05),
         below("largest kinetic energy over that of swinging barbs and a fall [1]", most / (5 * scale + fall), 1.0),
         below("kinetic energy of the last third over that of the second [1]", thirds, 2.0),

@@ -1,7 +1,7 @@
 """Kill runs at random moments and resume them: they give the bits of the run that was never killed.
 
 SIGKILL meets a run after a random share of the processor time that the whole run took, loading and closing included.
-Processor time, since it is the same however busy the machine is.
+Processor time does not depend on how busy the machine is.
 """
 
 from __future__ import annotations

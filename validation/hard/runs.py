@@ -109,7 +109,7 @@ class Watched:
         rise = self.nearest.get("energy", 0.0)
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any look [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            below("deepest contact at any check [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
             near("height of the centre of mass at the end [m]", height, half, half),
             below("energy from nowhere over the watchdog's limit [1]", rise, 0.5),
         ]

@@ -70,7 +70,7 @@ def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
         hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / described.torque_limit)
         said = watchdog_error(engine, recorder)
     return [
-        nothing("the watchdog says", said),
+        nothing("the watchdog reports", said),
         above("largest torque over τ_max [1]", hardest, 3.0),
         below("energy from nowhere over the watchdog's limit [1]", noting.nearest["energy"], 0.25),
     ]
@@ -188,7 +188,7 @@ def mass_ratio(
 ) -> list[Check]:
     """Make one of two smarticles that lie on each other heavier; by hand, since a scene has one density for all.
 
-    The contacts of draft cannot carry it, which the watchdog must say; contacts stiffer by the same ratio must.
+    The contacts of draft cannot carry it, which the watchdog must report; contacts stiffer by the same ratio must.
     """
     carries = stiffness > 250 * ratio / 10
     data = scene_data(access, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
@@ -215,7 +215,7 @@ def mass_ratio(
     low, high = np.mean(heights, axis=0)
     floor, other = (depth / d * 1e6 for depth in sunk)
     return [
-        nothing("the watchdog says", said),
+        nothing("the watchdog reports", said),
         below("speed at the end [m/s]", fastest(engine), 0.01),
         near("depth of the lower one in the floor [1e-6 d]", 1e6 * (flat - low) / d, floor, floor / 10),
         near("depth of one in the other [1e-6 d]", 1e6 * (2 * flat - high + low) / d, other, other / 10),

@@ -113,7 +113,7 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
 
 @case(
     "barb hanging out of plane",
-    "the same lying, after the barbs have turned through 105°",
+    "a smarticle lies, its middle link held, after the barbs have turned through 105°",
     "tilt M/k of the shaft",
     absent=NO_TILT,
 )

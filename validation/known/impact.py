@@ -22,7 +22,7 @@ DASHPOT = "Schwager and Pöschel, Granular Matter 9, 465 (2007)"
 OBLIQUE = "impulse theory with Coulomb friction, as in MFiX DEM-05 and Chung and Ooi (2011), tests 5 to 8"
 RIGID = "rigid-body impulse theory: 1/m_eff = 1/m + (r × n)·I⁻¹(r × n), impulse (1 + e) m_eff v"
 TIP = "a welded U meets a smooth floor with one sphere"
-UNLIMITED = "the same, with cs/cn = 0.9: the dashpot acts without limit until the spring has reached Coulomb's"
+UNLIMITED = "a ball at 82°, cs/cn = 0.9: the dashpot acts without limit until the spring has reached Coulomb's"
 WINDING = f"μ(1 + e)mv + (cs s − μ cn v/2) μ cn v/(ks s − μ kn v); {OBLIQUE}, and YADE's law"
 SLIDES = f"tangential impulse μ(1 + e)mv; {OBLIQUE}"
 
@@ -111,7 +111,7 @@ for _e in (0.2, 0.5, 0.9):
     )(damped_rebound)
 
 
-@case("two balls", "head on, in free space, e = 0.5", "the same at the reduced mass; momentum")
+@case("two balls", "head on, in free space, e = 0.5", "spring and dashpot at the reduced mass; momentum")
 def pair_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]:
     speed, dt = 0.2, CONTACT_TIME / RESOLVED
     engine = access.build(access.ball(), ball_law(restitution=restitution), dt=dt)
@@ -158,8 +158,8 @@ def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool
 
 @case(
     "bars end to end",
-    "the same, two bars in free space",
-    f"the same at the reduced mass; {DASHPOT}, integrated",
+    "two bars in free space meet end to end, with the law of a scene",
+    f"spring and dashpot at the reduced mass; {DASHPOT}, integrated",
 )
 def bars_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]:
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
@@ -228,12 +228,12 @@ FRICTION = 0.4
 
 
 @case("oblique, sliding, elastic", "a ball at 82° from the normal, μ = 0.4", SLIDES, restitution=1.0, dashpot=0.9)
-@case("oblique, sliding, e = 0.7", "the same, without a tangential dashpot", SLIDES, restitution=0.7, dashpot=0.0)
+@case("oblique, sliding, e = 0.7", "a ball at 82°, without a tangential dashpot", SLIDES, restitution=0.7, dashpot=0.0)
 @case("oblique, sliding, e = 0.7, dashpot of a scene", UNLIMITED, WINDING, restitution=0.7, dashpot=0.9)
 @case("oblique, sliding, e = 0.3, dashpot of a scene", UNLIMITED, WINDING, restitution=0.3, dashpot=0.9)
 @case(
     "oblique, sliding, e = 0.7, dashpot and step of a scene",
-    "the same with 22 steps in a contact, as in a scene: longer than the dashpot acts",
+    "a ball at 82°, 22 steps in a contact, as in a scene: longer than the dashpot acts",
     SLIDES,
     restitution=0.7,
     dashpot=0.9,

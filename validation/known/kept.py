@@ -21,7 +21,7 @@ from validation.extremes import crossings
 from validation.hard.runs import whole
 
 YADES_TURNS = {"yade": "its turns are of first order: ladder `spin`"}
-NOT_EACH_STEP = {"yade": "chains are looked at now and then, not in every step: results/stability/README.md"}
+NOT_EACH_STEP = {"yade": "chains are checked now and then, not in every step: results/stability/README.md"}
 SAMPLED = {"yade": "dissipation is sampled there, not added up: tests/engine has its error"}
 GAIT = "two smarticles in space swing their barbs, spinning"
 MOMENTA = "nothing acts from outside: momentum and angular momentum about the centre of mass"
@@ -91,7 +91,7 @@ for _law, _damping in (("halt", 0.0), ("stall", 0.0), ("ease", 0.0), ("slip", 0.
     _options: dict[str, Any] = {"absent": YADES_TURNS, "law": _law, "damping": _damping}
     case(f"free gait, {_law}", GAIT, MOMENTA, **_options)(free_gait)
     if _law != "stall":
-        case(f"work on a free pair, {_law}", "the same", WORK, **_options)(pair_work)
+        case(f"work on a free pair, {_law}", GAIT, WORK, **_options)(pair_work)
 
 
 @case(
@@ -144,7 +144,7 @@ def ledger(access: EngineAccess, *, count: int = 100, seconds: float = 0.5) -> l
     stores = "that there is something to account for: a pile that swings stores next to nothing"
     over = "residual of the ledger, over all that was dissipated since the pour [J]"
     during = "residual, its change while motors are at work, over their work [J]"
-    share = "dissipated over work of the motors, all told [1]"
+    share = "dissipated over work of the motors [1]"
     return [
         Answer(over, 0.0, largest, 0.01, first, scale=lost[-1]),
         Answer(during, 0.0, change, 0.03, first, scale=done),
