@@ -118,7 +118,7 @@ def test_a_pile_comes_to_rest() -> None:
 
 
 @pytest.mark.parametrize("law", ["halt", "stall", "slip", "servo"])
-def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
+def test_the_energy_ledger_closes_in_an_actuated_pile(law: str) -> None:
     more = {"damping": 1e-6} if law == "servo" else {}
     made = builds.engine(
         gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), keep_ledger=True
@@ -132,10 +132,10 @@ def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
     stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
     given = made.ledger.given + made.motors.work
     assert made.motors.work > 0.1 * made.ledger.added
-    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
+    assert abs(given - stored - made.ledger.dissipated) < 0.004 * given
 
 
-def test_the_account_closes_in_a_shaken_pile() -> None:
+def test_the_energy_ledger_closes_in_a_shaken_pile() -> None:
     made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, keep_ledger=True)
     builds.pile(made, 20, settle=0.1)
     made.boundaries.shake(amplitude=2 * 9.81 / (2 * math.pi * 30) ** 2, frequency=30.0)
@@ -144,7 +144,7 @@ def test_the_account_closes_in_a_shaken_pile() -> None:
     stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
     given = made.ledger.given
     assert made.ledger.container_work > 0.1 * made.ledger.added
-    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
+    assert abs(given - stored - made.ledger.dissipated) < 0.004 * given
 
 
 def test_a_motor_that_halts_holds_and_may_give_way() -> None:
