@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -343,7 +344,7 @@ def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
             break
         if child.returncode:
             cause = (child.stderr.strip().splitlines() or [f"status {child.returncode}"])[-1]
-            known = "Traceback" not in child.stderr and child.returncode in {1, 2}
+            known = child.returncode in {1, 2} and not re.search("Traceback|internal error", child.stderr)
             end = WRONG if not known else REJECTED if what == "plan" or child.returncode == 2 else STOPPED
             break
     row |= {"end": end, "cause": cause, "wall time [s]": round(time.monotonic() - begun, 1)}
