@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,7 @@ from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.engine.demand import Demand
-from dem.engine.doing import Doing
+from dem.engine.demand import Activity, Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
@@ -393,6 +392,8 @@ class KindDouble:
     workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
+    adds: Mapping[EffectName, Adds] = {}
+    order: tuple[str, ...] = ()
     built: list[EngineDouble]
 
     def __init__(self) -> None:
@@ -404,16 +405,10 @@ class KindDouble:
     def threads(self) -> int:
         return 1
 
-    def adds(self, effect: EffectName) -> Adds:
-        return Adds()
-
-    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
-        return tuple(engines)
-
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
+    def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         return 1e-6 / time_step
 
     def build(self, scene: Demand, time_step: float) -> EngineDouble:

@@ -10,8 +10,8 @@ from lammps_builds import Build
 
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
-from dem.engine.lammps.kind import contact_law_of
-from dem.engine.lammps.ranks import most_ranks
+from dem.engine.demand import contact_law_of
+from dem.engine.cores import most_ranks
 from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.engine.lammps.engine import LammpsEngine
-from dem.engine.lammps.kind import contact_law_of
+from dem.engine.demand import contact_law_of
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from validation.known.theory import dashpot_impact

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dem.engine.yade.dissipation import Contacts
+from dem.engine.yade.ledger import Contacts
 
 KN, KS, MASS = 500.0, 400.0, 1e-4
 

@@ -90,7 +90,7 @@ def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(program
     with pytest.raises(
         RunError, match=r"^LAMMPS ended: rank 1 was ended by signal 9 \(Killed\); .*; its log: /"
     ) as told:
-        child.tell("run 1")
+        child.send("run 1")
     assert not child.scratch.exists()
     kept = Path(str(told.value).rpartition("its log: ")[2])
     assert "signal 9 (Killed)" in kept.read_text()

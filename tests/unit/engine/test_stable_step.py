@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import small
 
-from dem.engine.yade.kind import contact_law_of
+from dem.engine.demand import contact_law_of
 from dem.engine.yade.stable_step import CONTACTS_AT_A_TIP, stable_time_step
 from dem.scene.scene import Scene
 

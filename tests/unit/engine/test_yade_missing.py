@@ -28,7 +28,7 @@ def test_missing_yade_says_how_to_get_it() -> None:
     assert str(caught.value) == (
         "YADE cannot be imported (import of yade halted; None in sys.modules); install it with `make setup` or "
         "`apt-get install yade`, see environment.md, or run the scene on the engine that needs none: --engine links; "
-        "`smarticles doctor` tells what is missing"
+        "`smarticles doctor` reports what is missing"
     )
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scenes import small
 from scipy.integrate import solve_ivp
 
-from dem.engine.yade.kind import contact_law_of
+from dem.engine.demand import contact_law_of
 from dem.physics.contact import damping_ratio, restitution_of, typical_effective_mass
 
 
