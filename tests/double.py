@@ -27,8 +27,8 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
+from dem.physics.contact import StringLaw
 from dem.physics.overlaps import Glance, Overlaps
-from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]

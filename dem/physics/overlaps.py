@@ -1,4 +1,4 @@
-"""How deep contacts are, and how far all goes: what the watchdog asks of an engine."""
+"""Overlaps of contacts and extremes of a pile, which the watchdog checks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ APART = 0.1  # of the depth that is too deep; boundaries that have moved against
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between two boundaries that have moved apart: what gives way is the contact alone.
+    """A smarticle between two boundaries that have moved apart, so that only its contacts can give way.
 
     Args:
         smarticle: its number.
@@ -31,8 +31,8 @@ class Overlaps:
 
     Args:
         deepest: overlap of the deepest contact [m].
-        deep: (N,) bool, smarticles with a contact that is deeper than asked for.
-        elastic_energy: no less than what the springs of all contacts and hinges hold [J].
+        deep: (N,) smarticles with a contact deeper than the limit asked for.
+        elastic_energy: upper bound of what the springs of all contacts and hinges hold [J].
         held: those of the deep ones that two boundaries hold.
     """
 
@@ -44,14 +44,14 @@ class Overlaps:
 
 @dataclass(frozen=True, kw_only=True)
 class Glance:
-    """The extremes of all smarticles at one instant. What is no number is within no limit.
+    """The extremes of all smarticles at one instant; NaN is within no limit.
 
     Args:
         fastest: speed of the fastest link's centre [m/s].
         lowest: height of the lowest point that must stay inside [m].
-        highest: the same of the highest one [m].
-        widest: the farthest one's distance from the vertical axis [m].
-        gap: how far the links of a hinge are apart at most [m].
+        highest: height of the highest one [m].
+        widest: largest distance of such a point from the vertical axis [m].
+        gap: largest distance between the links of a hinge [m].
         deepest: overlap of the deepest contact [m].
         elastic_energy: as in `Overlaps` [J].
     """

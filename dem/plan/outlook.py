@@ -1,7 +1,8 @@
-"""What a run would do: phases, effects and why each is on or off, engines, time step, cost. Simulates nothing."""
+"""What a run would do: phases, effects and why each is on or off, engines, time step, cost, warnings."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
@@ -9,12 +10,21 @@ from typing import Any, Self
 from dem.engine.demand import Activity
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
-from dem.plan.advice import expected_overlaps, warnings_of
+from dem.phases.shake import Shake
+from dem.physics.contact import typical_effective_mass
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
+from dem.setting.fidelity import Fidelity, fidelities
 from dem.setting.protocol import PARTS, PROTOCOLS, leaves_alone
+
+# Diameters: overlaps above the one cause a warning, contacts are linear up to the other.
+SOFT, LINEAR = 0.5, 0.25
+_LEFT_OUT = {
+    "series_interval_s": "one sample is taken, at the start",
+    "frame_interval_s": "no frame is written",
+    "sphere_interval_s": "no spheres are written",
+}
 
 
 @dataclass(frozen=True)
@@ -184,6 +194,71 @@ def _activity(scene: Scene, index: int) -> Activity:
     if phase.actuates:
         return Activity.ACTUATE
     return Activity.SHAKE if EffectName.CONTAINER_MOTION in phase.calls(scene, index) else Activity.REST
+
+
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """Return all warnings of a scene, for `plan` and the beginning of a run: what, where, value with unit, way out."""
+    of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
+    # Several phases may give the warning about one thing.
+    return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene), *stiffness_warnings(scene))
+
+
+def expected_overlaps(scene: Scene) -> tuple[float, float]:
+    """Estimate overlaps [m]: of an impact at the scene's greatest speed on one contact, and under the pile's weight.
+
+    The impact is that of `typical_effective_mass` after a fall by w, at the greatest speed that a phase gives besides.
+    The weight, times 1 + Γ, is borne by as many contacts as smarticles can lie on the floor.
+    """
+    gravity, width, boxes = scene.gravity_m_per_s2, scene.smarticle.middle_length_m, scene.smarticle.boxes
+    stiffness = scene.fidelity.stiffness_N_per_m
+    given = max(phase.peak_speed(gravity) for phase in scene.phases)
+    speed = math.sqrt(given**2 + 2 * gravity * width)
+    shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
+    bearing = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
+    weight = scene.count * boxes.mass * gravity * (1 + shaken) / bearing
+    return speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness), weight / stiffness
+
+
+def stiffness_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of contacts that are likely to be deeper than half a diameter, with the stiffness that they need."""
+    diameter = scene.sphere_diameter
+    impact, weight = (depth / diameter for depth in expected_overlaps(scene))
+    if max(impact, weight) <= SOFT:
+        return ()
+    # The overlap of an impact falls with the root of the stiffness.
+    factor = max((impact / LINEAR) ** 2, weight / LINEAR)
+    cause = "the hardest impact" if impact > weight else "the pile's weight"
+    return (
+        f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {cause} presses contacts in by about "
+        f"{max(impact, weight):.2g} of their thickness; use about {factor * scene.fidelity.stiffness_N_per_m:.2g} N/m "
+        f"for {LINEAR:g} of it",
+    )
+
+
+def engine_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
+    fidelity = scene.fidelity
+    named = fidelities(scene.engine)[fidelity.base]
+    usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
+    idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
+    if not idle:
+        return ()
+    mean = "has no meaning" if len(idle) == 1 else "have no meaning"
+    return (f"fidelity: {', '.join(idle)} {mean} on the engine {scene.engine}; leave out what does nothing",)
+
+
+def recording_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of intervals of recording that are longer than the run."""
+    known = all(phase.known_duration is not None for phase in scene.phases)
+    length = sum(phase.expected_duration(scene.count) for phase in scene.phases)
+    run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
+    intervals = {key: getattr(scene.recording, key) for key in _LEFT_OUT}
+    return tuple(
+        f"recording.{key}: {interval:g} s is longer than {run}, so that {_LEFT_OUT[key]}; shorten it, or lengthen "
+        "the run"
+        for key, interval in intervals.items()
+        if interval is not None and interval > length
+    )
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:

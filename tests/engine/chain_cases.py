@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
 from dem.engine.yade.engine import YadeEngine
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
 from dem.scene.scene import Scene

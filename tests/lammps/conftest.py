@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from lammps_builds import Build
 
+from dem.engine.cores import most_ranks
+from dem.engine.demand import contact_law_of
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
-from dem.engine.demand import contact_law_of
-from dem.engine.cores import most_ranks
 from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene

@@ -12,8 +12,8 @@ from scenes import small
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
-from dem.engine.lammps.engine import LammpsEngine
 from dem.engine.demand import contact_law_of
+from dem.engine.lammps.engine import LammpsEngine
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from validation.known.theory import dashpot_impact

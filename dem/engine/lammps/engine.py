@@ -26,9 +26,8 @@ from dem.engine.lammps.child import Child
 from dem.engine.lammps.contacts import Contacts
 from dem.engine.lammps.text import Moving
 from dem.errors import InputError, RunError
-from dem.physics.contact import ContactLaw
+from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
-from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]

@@ -7,7 +7,6 @@ energy as well; welding dissipates that of the links' motion against each other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,33 +22,6 @@ from dem.engine.yade.library import Yade, rows_of
 from dem.errors import refuse
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Body:
-    """A rigid body that is to be made of existing spheres, with a mass and an inertia of its own.
-
-    Args:
-        members: ids of its spheres and hinge nodes.
-        local: (k, 3) their centres in the body's principal frame [m].
-        mass: [kg].
-        inertia: (3,) principal moments [kg m²].
-        position: (3,) centre of mass [m].
-        rotation: (3, 3) principal frame to laboratory frame.
-        velocity: (3,) of the centre of mass [m/s].
-        angular_momentum: (3,) about the centre of mass [kg m²/s].
-        planar: whether it only moves along x and y and turns about z, which is then its third principal axis.
-    """
-
-    members: Sequence[int]
-    local: Array
-    mass: float
-    inertia: Array
-    position: Array
-    rotation: Array
-    velocity: Array
-    angular_momentum: Array
-    planar: bool = False
 
 
 class Assembly:
@@ -128,17 +100,14 @@ class Assembly:
             self.smarticle_of.update(dict.fromkeys(spheres, len(self._spheres)))
             self._spheres.append(spheres)
             self._clump(
-                Body(
-                    members=spheres,
-                    local=particle.centres,
-                    mass=particle.boxes.mass,
-                    inertia=particle.boxes.inertia,
-                    position=position,
-                    rotation=rotation.as_matrix(),
-                    velocity=falling,
-                    angular_momentum=still,
-                    planar=self._planar,
-                )
+                members=spheres,
+                local=particle.centres,
+                mass=particle.boxes.mass,
+                inertia=particle.boxes.inertia,
+                position=position,
+                rotation=rotation.as_matrix(),
+                velocity=falling,
+                angular_momentum=still,
             )
         new = len(poses.positions)
         boxes = particle.boxes
@@ -211,17 +180,14 @@ class Assembly:
                 nodes[k].append(add_nodes(self._yade, len(own)))
                 spheres = np.flatnonzero(self._particle.links == link)
                 self._clump(
-                    Body(
-                        members=[*(self._spheres[k][s] for s in spheres), *nodes[k][link]],
-                        local=np.concatenate([self._particle.local_centres[spheres], own]),
-                        mass=boxes.link_masses[link],
-                        inertia=inertias[link],
-                        position=state.link_positions[k, link],
-                        rotation=rotation,
-                        velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
-                        angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
-                        planar=self._planar,
-                    )
+                    members=[*(self._spheres[k][s] for s in spheres), *nodes[k][link]],
+                    local=np.concatenate([self._particle.local_centres[spheres], own]),
+                    mass=boxes.link_masses[link],
+                    inertia=inertias[link],
+                    position=state.link_positions[k, link],
+                    rotation=rotation,
+                    velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
+                    angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
                 )
         self.hinges = Hinges(self._yade, self._hinge_law, nodes, state.angles)
         self.hinges.make(self._strengths)
@@ -252,17 +218,14 @@ class Assembly:
         self._dissolve()
         for k in range(state.count):
             self._clump(
-                Body(
-                    members=self._spheres[k],
-                    local=spheres[k] @ axes[k],
-                    mass=boxes.mass,
-                    inertia=moments[k],
-                    position=state.positions[k],
-                    rotation=axes[k],
-                    velocity=state.velocities[k],
-                    angular_momentum=momenta[k],
-                    planar=self._planar,
-                )
+                members=self._spheres[k],
+                local=spheres[k] @ axes[k],
+                mass=boxes.mass,
+                inertia=moments[k],
+                position=state.positions[k],
+                rotation=axes[k],
+                velocity=state.velocities[k],
+                angular_momentum=momenta[k],
             )
         self._arms = np.einsum("nji,nkj->nki", axes, arms)
         self._turns = np.einsum("nji,nkjm->nkim", axes, state.link_rotations)
@@ -274,8 +237,8 @@ class Assembly:
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])
 
-    def _clump(self, body: Body) -> None:
-        number, to_body = clump(self._yade, body)
+    def _clump(self, **body: Any) -> None:
+        number, to_body = clump(self._yade, planar=self._planar, **body)
         self._ids.append(number)
         self._to_body.append(to_body)
         self._states.append(self._yade.omega.bodies[number].state)
@@ -333,8 +296,32 @@ def _tensors(state: State) -> tuple[Array, Array]:
     return own + offset, arms
 
 
-def clump(yade: Yade, body: Body) -> tuple[int, Any]:
-    """Make a clump in YADE of a body's members.
+def clump(
+    yade: Yade,
+    *,
+    members: Sequence[int],
+    local: Array,
+    mass: float,
+    inertia: Array,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    angular_momentum: Array,
+    planar: bool,
+) -> tuple[int, Any]:
+    """Make a rigid body of existing spheres, with a mass and an inertia of its own.
+
+    Args:
+        yade: the simulation.
+        members: ids of its spheres and hinge nodes.
+        local: (k, 3) their centres in the body's principal frame [m].
+        mass: [kg].
+        inertia: (3,) principal moments [kg m²].
+        position: (3,) centre of mass [m].
+        rotation: (3, 3) principal frame to laboratory frame.
+        velocity: (3,) of the centre of mass [m/s].
+        angular_momentum: (3,) about the centre of mass [kg m²/s].
+        planar: whether it only moves along x and y and turns about z, which is then its third principal axis.
 
     Returns:
         Its id, and the quaternion that takes YADE's own principal frame of the clump to the body's: q_body =
@@ -345,37 +332,36 @@ def clump(yade: Yade, body: Body) -> tuple[int, Any]:
     # inertia and is erased again, which leaves the clump's state alone.
     omega, classes, vector = yade.omega, yade.classes, yade.vector
     upright = yade.quaternion(1, 0, 0, 0)
-    for member, centre in zip(body.members, body.local, strict=True):
+    for member, centre in zip(members, local, strict=True):
         state = omega.bodies[member].state
         state.pos, state.ori = vector(*centre), upright
     ballast = classes.Body()
     ballast.shape = classes.Box()
-    ballast.material = omega.bodies[body.members[0]].material
-    ballast.state.mass = body.mass
-    # Where it turns about the third axis alone, the other moments do not matter. All alike, the axes keep their order,
-    # and YADE's integration of spheres, which it falls back to where a rotation is blocked, is right.
-    inertia = np.full(3, body.inertia[2]) if body.planar else body.inertia
+    ballast.material = omega.bodies[members[0]].material
+    ballast.state.mass = mass
+    # Where it turns about the third axis alone, the other moments do not matter. All equal, the axes keep their order,
+    # and YADE's integration of spheres, which it uses where a rotation is blocked, is right.
+    inertia = np.full(3, inertia[2]) if planar else inertia
     ballast.state.inertia = vector(*inertia)
     ballast_id = omega.bodies.append(ballast)
-    clump_id = omega.bodies.clump([*body.members, ballast_id], discretization=0)
+    clump_id = omega.bodies.clump([*members, ballast_id], discretization=0)
     omega.bodies.erase(ballast_id)
     state = omega.bodies[clump_id].state
     # YADE sorts the principal axes: a permutation of ours.
     principal = state.ori
-    x, y, z, w = Rotation.from_matrix(body.rotation).as_quat()
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
     turned = yade.quaternion(w, x, y, z)
-    spin = body.rotation @ ((body.rotation.T @ body.angular_momentum) / inertia)
+    spin = rotation @ ((rotation.T @ angular_momentum) / inertia)
     state.ori = turned * principal
-    state.pos = vector(*body.position)
-    state.vel = vector(*body.velocity)
+    state.pos = vector(*position)
+    state.vel = vector(*velocity)
     state.angVel = vector(*spin)
-    state.angMom = vector(*body.angular_momentum)
-    if body.planar:
+    state.angMom = vector(*angular_momentum)
+    if planar:
         state.blockedDOFs = "zXY"
-    arms = body.local @ body.rotation.T
-    for member, arm in zip(body.members, arms, strict=True):
+    for member, arm in zip(members, local @ rotation.T, strict=True):
         own = omega.bodies[member].state
-        own.pos, own.ori = vector(*(body.position + arm)), turned
+        own.pos, own.ori = vector(*(position + arm)), turned
         # Contact laws read the members' own velocities, before the integrator has moved them for the first time.
-        own.vel, own.angVel = vector(*(body.velocity + np.cross(spin, arm))), state.angVel
+        own.vel, own.angVel = vector(*(velocity + np.cross(spin, arm))), state.angVel
     return clump_id, principal.inverse()

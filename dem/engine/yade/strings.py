@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dem.body.chain import Tie
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.library import Yade, rows_of
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 
 
 def test_a_string_pulls_and_never_pushes() -> None:

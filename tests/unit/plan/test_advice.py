@@ -7,8 +7,7 @@ import json
 import pytest
 from scenes import small
 
-from dem.plan.advice import warnings_of
-from dem.plan.outlook import plan
+from dem.plan.outlook import plan, warnings_of
 
 
 def test_a_plain_scene_has_no_warnings() -> None:
