@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from lammps_builds import Build
 
 from dem.engine.cores import most_ranks
 from dem.engine.demand import contact_law_of
@@ -29,8 +28,8 @@ def _installed() -> None:
 
 
 @pytest.fixture
-def build() -> Iterator[Build]:
-    """Builds engines of scenes, on two ranks unless told otherwise, that end with the test."""
+def build() -> Iterator[Callable[..., LammpsEngine]]:
+    """Builds engines of scenes, by default on two ranks, that end with the test."""
     built: list[LammpsEngine] = []
 
     def make(scene: Scene, *, ranks: int = 2, **instead: Any) -> LammpsEngine:

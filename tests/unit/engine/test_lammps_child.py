@@ -1,7 +1,8 @@
-"""LAMMPS that is missing, another one, or dies: cause and way out, in one line, and nothing written."""
+"""LAMMPS that is missing or ends: cause and way out in one line, and nothing written."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,36 +64,31 @@ UNKNOWN = "ERROR: Unknown fix style nonsense (../modify.cpp:899)\nLast command: 
         ("", KILLED, "rank 1 was ended by signal 9 (Killed)", "if memory ran out.*fewer --ranks; go on .*resume"),
         ("", KILLED.replace("9 (Killed)", "11 (Segmentation fault)"), "signal 11 (Segm", "^go on from the last check"),
         (UNKNOWN, "", "Unknown fix style nonsense (command: fix bogus all nonsense)", "does not know .*setup-mpi"),
-        (
-            "ERROR: Lost atoms: original 180 current 179 (../thermo.cpp:438)",
-            "",
-            "Lost atoms: original",
-            "fly apart.*low",
-        ),
+        ("ERROR: Lost atoms: original 180 (../thermo.cpp:438)", "", "Lost atoms: original", "fly apart.*low"),
         ("", "ERROR on proc 1: Failed to allocate 8 bytes for array x (../memory.cpp:66)", "Failed", "memory is short"),
         ("", "There are not enough slots available in the system", "fewer cores than ranks", "fewer --ranks"),
         ("units si", "", "exit status 3 (it says nothing)", "see its log"),
     ],
 )
 def test_why_it_ended_is_read_from_its_own_log(log: str, printed: str, cause: str, way_out: str) -> None:
-    import re  # noqa: PLC0415
-
-    told = explain(log, printed, 3)
-    assert cause in told[0]
-    assert "cpp" not in told[0]
-    assert re.search(way_out, told[1])
+    found = explain(log, printed, 3)
+    assert cause in found[0]
+    assert "cpp" not in found[0]
+    assert re.search(way_out, found[1])
 
 
-def test_a_child_that_dies_is_told_with_its_log_kept_and_its_folder_gone(programs: Programs, tmp_path: Path) -> None:
+def test_the_error_of_a_child_that_ends_names_its_log_and_its_folder_is_gone(
+    programs: Programs, tmp_path: Path
+) -> None:
     echo = "\n".join(f"echo '{line}'" for line in KILLED.splitlines())
     programs(mpirun=f"read -r line\n{echo}\nexit 137")
     child = Child(2)
     with pytest.raises(
         RunError, match=r"^LAMMPS ended: rank 1 was ended by signal 9 \(Killed\); .*; its log: /"
-    ) as told:
+    ) as error:
         child.send("run 1")
     assert not child.scratch.exists()
-    kept = Path(str(told.value).rpartition("its log: ")[2])
+    kept = Path(str(error.value).rpartition("its log: ")[2])
     assert "signal 9 (Killed)" in kept.read_text()
     kept.unlink()
     kept.parent.rmdir()
