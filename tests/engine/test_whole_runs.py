@@ -1,4 +1,4 @@
-"""Whole runs: what a run directory holds when a run has ended well, badly, or by Ctrl-C; and that bits repeat."""
+"""Whole runs: what a run directory contains after a good end, a full disk, or Ctrl-C; and that bits repeat."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import meshio
 import numpy as np
 import pytest
 import yaml
-from run_files import frame_files, series
+from processes import frame_files, series
 
 from dem.scene.reading import load_scene, scene_hash
 
@@ -39,14 +39,8 @@ def start(data: dict[str, Any], folder: Path, out: Path) -> subprocess.Popen[str
     scene.write_text(yaml.safe_dump(data))
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", RUN, str(scene), str(out)]
-    return subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=ROOT, env=environment, **pipes)
 
 
 def finish(process: subprocess.Popen[str]) -> str:
@@ -64,7 +58,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def finished(worker: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """One small run, looked at by several tests that change nothing."""
+    """One small run, read by several tests."""
     out = tmp_path_factory.mktemp("finished") / "run"
     data = {
         "schema_version": 1,
@@ -138,7 +132,7 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
     rows, scene = series(out), cases.scene_of(data)
     settle, weight = scene.phases[0].settle, 10 * scene.smarticle.boxes.mass * 9.81
     settled_at = read_json(out / "done.json")["phases"][0]["end_s"]
-    # The criterion holds at one look; the pile may stir once more. Later it lies still.
+    # The criterion holds at one check; the pile may move once more. Later it lies still.
     resting = (rows["time_s"] >= settled_at + 0.1) & (rows["phase"] == 1)
     assert resting.sum() > 5
     assert rows["max_speed_m_per_s"][resting].max() < settle.speed_m_per_s
@@ -153,15 +147,15 @@ def test_pour_ends_settled_and_weighs_what_it_weighs(finished: tuple[Path, dict[
     assert rows["max_speed_m_per_s"][shaken].max() > 0.05
 
 
-def test_same_seed_gives_the_same_bits_and_another_seed_others(
-    worker: Any, scene_data: SceneData, tmp_path: Path
+def test_same_seed_gives_the_same_bits_in_another_process_and_another_seed_others(
+    simulate: Callable[..., Any], scene_data: SceneData, tmp_path: Path
 ) -> None:
-    del worker  # skips where YADE is missing
     phases = [{"type": "deposit", "per_layer": 3}, {"type": "shake", "duration_s": 0.1}]
     data = scene_data({"count": 6, "phases": phases})
     outs = [tmp_path / name for name in ("first", "again", "other")]
-    for out in outs:
-        assert finish(start({**data, "seed": 2 if out.name == "other" else 1}, tmp_path, out)) == ""
+    simulate(cases.run, data, str(outs[0]))
+    assert finish(start(data, tmp_path, outs[1])) == ""
+    simulate(cases.run, {**data, "seed": 2}, str(outs[2]))
     files = [{path.name: path.read_bytes() for path in frame_files(out)} for out in outs]
     assert files[0] == files[1]
     assert len(files[0]) > 4
@@ -173,8 +167,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_others(
     assert (outs[0] / "frames.pvd").read_bytes() == (outs[1] / "frames.pvd").read_bytes()
 
 
-def test_ctrl_c_leaves_a_usable_run_directory(worker: Any, scene_data: SceneData, tmp_path: Path) -> None:
-    del worker
+def test_ctrl_c_leaves_a_usable_run_directory(scene_data: SceneData, tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start(scene_data({"phases.1.duration_s": 1000}), tmp_path, out)
     deadline = time.monotonic() + TIMEOUT
@@ -198,17 +191,10 @@ def test_ctrl_c_leaves_a_usable_run_directory(worker: Any, scene_data: SceneData
     assert not [path for path in out.rglob("*") if "partial" in path.name]
 
 
-@pytest.fixture
-def small_disk(mount_disk: Callable[[str], Path]) -> Path:
-    """A file system of 192 KiB: room for the start of a run."""
-    return mount_disk("192k")
-
-
 def test_disk_that_fills_up_ends_the_run_with_one_line(
-    worker: Any, scene_data: SceneData, tmp_path: Path, small_disk: Path
+    scene_data: SceneData, tmp_path: Path, mount_disk: Callable[[str], Path]
 ) -> None:
-    del worker
-    out = small_disk / "run"
+    out = mount_disk("192k") / "run"  # room for the start of a run
     process = start(scene_data({"recording.frame_interval_s": 0.004}), tmp_path, out)
     message = finish(process)
     assert process.returncode == 1

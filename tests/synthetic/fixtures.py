@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from dem.record.frames import FrameWriter
-from synthetic import SyntheticRun, mesh_of, write_manifest
-from synthetic.series import write_series
+from synthetic import SyntheticRun, mesh_of, write_manifest, write_series
 from synthetic.shapes import W, bent, random_scene
 
 PHASES = ("deposit", "relax", "shake", "relax")
