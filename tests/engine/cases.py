@@ -7,8 +7,10 @@ returns plain numbers and arrays; the tests compare them with the answer. SI thr
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,6 +21,7 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.library import yade_version
 from dem.errors import InputError, RunError
 from dem.plan.steps import time_step
+from dem.run.recorder import Recorder
 from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
@@ -181,3 +184,36 @@ def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
+
+
+def watched(data: dict[str, Any], out: str, each: Callable[[YadeEngine, int], None]) -> None:
+    """A whole run; `each` gets engine and phase at every sample."""
+    record = Recorder.record
+
+    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
+        record(recorder, engine, phase)
+        each(engine, phase)
+
+    with patch.object(Recorder, "record", look):
+        answer = run(data, out)
+    assert answer["error"] is None, answer
+
+
+def noted(data: dict[str, Any], out: str) -> list[dict[str, Any]]:
+    """Run a scene; the engine's own numbers at every sample."""
+    notes: list[dict[str, Any]] = []
+
+    def note(engine: YadeEngine, phase: int) -> None:
+        notes.append(
+            {
+                "time": engine.time,
+                "phase": phase,
+                "floor": engine.boundaries.floor,
+                "state": engine.state(),
+                "contacts": engine.neighbours(),
+                "torques": engine.motors.readings.torques.copy() if engine.motors.articulated else None,
+            }
+        )
+
+    watched(data, out, note)
+    return notes

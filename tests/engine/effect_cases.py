@@ -1,11 +1,10 @@
-"""What runs are made of, read from YADE's own lists and from the files that runs leave; see `cases.py`."""
+"""What runs consist of, read from YADE's own lists and from the files of runs; see `cases.py`."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import cases
 import h5py
@@ -17,7 +16,6 @@ from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
-from dem.run.recorder import Recorder
 
 # What every run directory holds, whatever the scene calls for.
 OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
@@ -28,15 +26,7 @@ def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
     scene = cases.scene_of(data)
     declared = Adds.together(decision.adds for decision in decide(scene))
     found: dict[str, set[Any]] = defaultdict(set)
-    record = Recorder.record
-
-    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
-        record(recorder, engine, phase)
-        _look(engine, found)
-
-    with patch.object(Recorder, "record", look):
-        answer = cases.run(data, out)
-    assert answer["error"] is None, answer
+    cases.watched(data, out, lambda engine, _: _look(engine, found))
     folder = Path(out)
     found["files"] = {path.name for path in folder.iterdir()} - OWN_FILES
     with h5py.File(folder / "series.h5") as file:
@@ -75,8 +65,8 @@ def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
                 found["caps"].add(phys.maxTwistPl)
 
 
-def account_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
-    """The energy account of a pile right before and right after the simulation is saved and loaded."""
+def ledger_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """Energies of a pile right before and right after the simulation is saved and loaded."""
     scene = cases.scene_of(data)
     engine = build_engine(scene, time_step(scene))
     cases.pour(engine, scene, scene.count)

@@ -140,7 +140,7 @@ def test_the_comparison_sees_the_smallest_change(run: Callable[[dict[str, Any]],
 def test_energies_of_contacts_are_known_right_after_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
     # YADE does not save overlaps; a wall that goes away at a checkpoint must not make the ledger NaN.
     scene = data(REMOVE, recording={"dissipation_interval_s": 1e-3})
-    ledger = simulate(effect_cases.account_after_reload, scene, str(tmp_path))
+    ledger = simulate(effect_cases.ledger_after_reload, scene, str(tmp_path))
     assert ledger["before"][0] > 1e-9
     assert ledger["after"] == pytest.approx(ledger["before"], rel=1e-12)
     assert np.isfinite(ledger["dissipated"])
