@@ -49,12 +49,7 @@ class EngineKind(Protocol):
         """Return the number of threads, or ranks, that it runs with here."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Return the largest stable time step [s] of a scene.
-
-        Args:
-            scene: the scene.
-            articulated: whether barbs may turn, or have turned before.
-        """
+        """Return the largest stable time step [s]; articulated where barbs may turn, or have turned before."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         """Estimate the wall seconds that a simulated second costs on one core, with a time step [s]."""

@@ -69,10 +69,7 @@ class Measured:
     """One named fidelity of an engine as the table has it.
 
     Args:
-        fidelity: its name.
-        errors: of the quantities asked for.
-        engine: its name.
-        others: errors of the other quantities.
+        errors: of the quantities asked for; `others` are those of the others.
         seeds: how many runs it was measured with.
         ratio: measured processor time over the planned wall time [1].
         is_reference: whether the errors of the others are against it.
@@ -104,11 +101,8 @@ class AccuracyTable:
     """What was measured, and of which scene.
 
     Args:
-        path: the file.
-        fidelities: those with finished runs, engine by engine in the order of their names, coarse to fine.
-        reference: what errors are against, as the table calls it.
-        aspect_ratio: l/w [1].
-        count: number of smarticles.
+        fidelities: those with finished runs, engine by engine, coarse to fine.
+        reference: name of what errors are against.
         activity: types of phase, separated by spaces.
     """
 
@@ -124,8 +118,8 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
     """Read a table of `smarticles accuracy`.
 
     Args:
-        path: the file; None: the one that ships.
-        of: what errors are asked for, keys of `QUANTITIES`.
+        path: None: the one that ships.
+        of: keys of `QUANTITIES`, of which errors are asked for.
         engine: the only one that may be chosen; None: any.
 
     Raises:
@@ -214,14 +208,7 @@ def _measured(engine: str, name: str, row: dict[str, str], of: Sequence[str]) ->
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The engine and fidelity chosen.
-
-    Args:
-        planned: the plan of the scene with it, its wall times corrected by what was measured.
-        expected: its errors on the table's scene, its hours on this one.
-        why: which limit it answers.
-        notes: caveats, one line each.
-    """
+    """The engine and fidelity chosen: the scene's plan with corrected wall times, errors, reason, caveats."""
 
     planned: Plan
     expected: Measured
@@ -293,15 +280,13 @@ def choose(
 
 
 def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
-    """Return a fidelity that keeps the limits, and in words which one; arguments and errors as `choose`.
+    """Return one of some fidelities, coarse to fine, that keeps the limits of `choose`, and in words which limit.
 
     Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
     engines' finest the one whose error is known and least.
 
-    Args:
-        expected: with their hours, coarse to fine.
-        max_error: as `choose`.
-        max_hours: as `choose`.
+    Raises:
+        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

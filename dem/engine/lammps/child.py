@@ -70,10 +70,7 @@ def _version(program: str) -> str:
 
 
 class Child:
-    """A LAMMPS that reads commands, on some processors, until it is closed or its parent ends.
-
-    Args:
-        ranks: processes.
+    """A LAMMPS that reads commands, on some ranks, until it is closed or its parent ends.
 
     Raises:
         RunError: it does not start.
@@ -154,13 +151,7 @@ class Child:
 
 
 def explain(log: str, said: str, status: int | None) -> tuple[str, str]:
-    """Return why LAMMPS ended, and the way out.
-
-    Args:
-        log: LAMMPS's log.
-        said: what it and mpirun printed.
-        status: exit status of mpirun.
-    """
+    """Return why LAMMPS ended, and the way out, from its log, what was printed, and mpirun's exit status."""
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{said}", re.MULTILINE)
     if errors:
         cause = re.sub(r"\s*\([^()]*\.(?:cpp|h):\d+\)\s*$", "", errors[0]).strip()

@@ -84,12 +84,7 @@ class NoStrings:
 
 
 class LammpsLedger:
-    """`dem.engine.interface.EnergyLedger`; what contacts and boundaries do is not added up.
-
-    Args:
-        moving: returns whether a boundary moves at present.
-        stored: returns what springs of contacts hold at most [J].
-    """
+    """`dem.engine.interface.EnergyLedger`; what contacts and boundaries do is not added up."""
 
     container_work = 0.0
 
@@ -115,12 +110,9 @@ class LammpsEngine:
     after each advance.
 
     Args:
-        particle: one smarticle.
         cylinder: the container; its floor is at z = 0 at the start.
-        law: contact law.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
-        ranks: processes.
     """
 
     def __init__(

@@ -72,12 +72,7 @@ def sphere_lines(
 ) -> Iterator[str]:
     """Yield all spheres, for `read_data`: number, type, place, diameter, density, smarticle.
 
-    Args:
-        particle: one smarticle.
-        cylinder: the container, for the box.
-        spheres: (N, S, 3) their centres [m].
-        title: the first line.
-        first: number of the first smarticle.
+    Their centres are (N, S, 3) [m], `first` is the number of the first smarticle; the container gives the box.
     """
     count, each = spheres.shape[:2]
     d = particle.chain.diameter
@@ -156,12 +151,7 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
 
 
 def writing(dump: str, *, when: str) -> Iterator[str]:
-    """Yield the commands that write bodies to a file.
-
-    Args:
-        dump: the file.
-        when: how often, as `dump_modify every` has it.
-    """
+    """Yield the commands that write bodies to a file; `when` is that of `dump_modify every`."""
     count = len(WRITTEN.split())
     yield f"compute          where all rigid/local bodies {WRITTEN}"
     yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"

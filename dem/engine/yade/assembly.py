@@ -28,8 +28,6 @@ class Assembly:
     """All smarticles as bodies of YADE.
 
     Args:
-        yade: the simulation.
-        particle: one smarticle.
         hinge_law: stiffness of the hinges; None: smarticles stay welded.
         planar: whether all motion is confined to the plane z = 0.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.

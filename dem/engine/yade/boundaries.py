@@ -24,11 +24,7 @@ Array = NDArray[np.float64]
 class YadeBoundaries:
     """`dem.engine.interface.Boundaries` on YADE.
 
-    Args:
-        yade: the simulation.
-        cylinder: the container; its floor is at z = 0 at the start.
-        hooks: the lower and the upper hook; None: nothing of a hook exists.
-        channel: table and walls instead of the container, for motion in a plane.
+    Hooks are the lower and the upper one; a channel takes the place of the container. The floor is at z = 0 at first.
     """
 
     def __init__(

@@ -92,16 +92,7 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
 def add_engines(
     yade: Yade, adds: Adds, law: ContactLaw, *, hinges: HingeLaw | None, gravity: float, radius: float
 ) -> None:
-    """Make the engines and give them to the simulation.
-
-    Args:
-        yade: the simulation.
-        adds: what is to be made, of `ADDS`.
-        law: contact law.
-        hinges: their law; None where there are none.
-        gravity: g, downwards [m/s²].
-        radius: of the spheres [m].
-    """
+    """Make the engines and give them to the simulation; g is downwards [m/s²], the spheres have a radius [m]."""
     classes = yade.classes
     # The materials of smarticles and wall are the first two.
     friction = classes.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))

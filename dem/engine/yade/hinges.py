@@ -94,8 +94,6 @@ class Hinges:
     """All hinges of N articulated smarticles.
 
     Args:
-        yade: the simulation.
-        law: their stiffness.
         nodes: per smarticle the node ids of its links, as `hinge_nodes` orders them.
         angles: (N, 2) angles of the barbs where the bonds were made [rad].
     """

@@ -91,9 +91,6 @@ class YadeLedger:
     """`dem.engine.interface.EnergyLedger` on YADE.
 
     Args:
-        yade: the simulation.
-        assembly: the smarticles.
-        boundaries: what moves and does work.
         works: whether to add up the work of moving boundaries.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
     """

@@ -19,15 +19,7 @@ Array = NDArray[np.float64]
 
 
 class YadeMotors:
-    """`dem.engine.interface.Motors` on YADE.
-
-    Args:
-        yade: the simulation.
-        assembly: the smarticles.
-        ledger: gets what welding dissipates.
-        law: what all motors have in common; None in scenes without any.
-        strengths: (N, 2) factors on torque limit and stiffness [1]; None: all are equal.
-    """
+    """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
 
     looks_at_once = 1  # between two control updates YADE comes back to Python anyhow
 

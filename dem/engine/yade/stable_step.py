@@ -99,11 +99,7 @@ def planar_stable_time_step(
     among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it,
     of a thicker one those of its outer row; and a barb with a string at its tip.
 
-    Args:
-        particle: one smarticle.
-        law: contact law.
-        hinges: their law.
-        strings: stiffness [N/m] and damping [N s/m] of each.
+    Strings have a stiffness [N/m] and a damping [N s/m] each.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)

@@ -40,12 +40,7 @@ class End:
 
 
 class YadeStrings:
-    """`dem.engine.interface.Strings` on YADE.
-
-    Args:
-        yade: the simulation.
-        assembly: the smarticles.
-    """
+    """`dem.engine.interface.Strings` on YADE."""
 
     def __init__(self, yade: Yade, assembly: Assembly) -> None:
         self._yade = yade
@@ -79,10 +74,7 @@ class YadeStrings:
         self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
 
     def pull(self, time_step: float) -> float:
-        """Set the forces of the step that begins, and move the anchors on.
-
-        Args:
-            time_step: dt [s].
+        """Set the forces of the step that begins, of a length dt [s], and move the anchors on.
 
         Returns:
             Work of the strings on the links in the step [J], to first order in dt.
