@@ -33,7 +33,7 @@ hooks: {lower_height_m: 0.003, upper_height_m: 0.006}
 phases:
   - {type: deposit, per_layer: 4}
   - {type: shake, duration_s: 0.1}
-  - {type: pull-hook, speed_m_per_s: 0.06, duration_s: 0.3, force_limit_N: 10}
+  - {type: pull-hook, speed_m_per_s: 0.08, distance_m: 0.02, duration_s: 0.25, force_limit_N: 10}
   - {type: remove-container, speed_m_per_s: 0.05, duration_s: 0.2}
   - {type: relax, duration_s: 0.06}
 """,
