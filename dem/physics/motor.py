@@ -110,7 +110,7 @@ class Motors:
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)
 
-    def look(
+    def update(
         self, angles: Array, targets: Array, interval: float, time_step: float, rates: Array | None = None
     ) -> Array:
         """Return the torques (N, 2) on the barbs in the control period that begins now [N m].
@@ -126,7 +126,7 @@ class Motors:
         # A torque that is set now acts from the middle of the step on: the leapfrog scheme changes velocities there. In
         # between the torque is linear in the angle, so that the trapezium is exact.
         middle = angles + (angles - self.angles) * (time_step / interval / 2)
-        self.work += self._work_since_look(middle)
+        self.work += self._work_since_update(middle)
         self._begun = middle
         law, over = LAWS.index(self.law.law), np.abs(before) >= self._limit
         most = self.law.speed_limit * interval * speed_factor(law, over)
@@ -146,9 +146,9 @@ class Motors:
 
     def work_until(self, angles: Array) -> float:
         """Return the work of all motors since the start, up to (N, 2) angles between two control updates [J]."""
-        return float((self.work + self._work_since_look(angles)).sum())
+        return float((self.work + self._work_since_update(angles)).sum())
 
-    def _work_since_look(self, angles: Array) -> Array:
+    def _work_since_update(self, angles: Array) -> Array:
         work: Array = (self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun)
         return work
 

@@ -34,7 +34,7 @@ ADDS: Mapping[EffectName, Adds] = {
     ),
     EffectName.HOOKS: Adds(series=tuple(HOOK_COLUMNS)),
     EffectName.WALL_REMOVAL: Adds(
-        series=tuple(RELEASE_COLUMNS), python="looks at the pile's top every 10 ms while the wall is lifted"
+        series=tuple(RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
     ),
     EffectName.ENERGIES: Adds(series=tuple(ENERGY_COLUMNS)),
     EffectName.ENERGY_ACCOUNT: Adds(series=tuple(LEDGER_COLUMNS)),
@@ -160,7 +160,7 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         welded = (False, f"{off[1]}; each smarticle is one welded clump")
         return {EffectName.ARTICULATION: welded, EffectName.MOTORS: off, EffectName.TORQUE_CAP: off}
     motor, fidelity, share = scene.motor, scene.fidelity, overshoot(scene)
-    beyond = f", by one look gone beyond by up to {share:.2g} τ_max" if share else ""
+    beyond = f", exceeded by up to {share:.2g} τ_max between control updates" if share else ""
     return {
         EffectName.ARTICULATION: (
             True,
@@ -169,7 +169,7 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, a look every {fidelity.control_interval_s:g} s",
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, a control update every {fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
     }

@@ -49,7 +49,7 @@ ADDS: Mapping[EffectName, Adds] = {
         shapes=("GridNode",),
         python="while articulated three bodies and four bonds per smarticle; a shorter time step throughout",
     ),
-    EffectName.MOTORS: Adds(python="two readings per smarticle and look"),
+    EffectName.MOTORS: Adds(python="two readings per smarticle and control update"),
     EffectName.HOOKS: Adds(
         functors=("Bo1_Box_Aabb", "Ig2_Box_Sphere_ScGeom"),
         shapes=("Box",),

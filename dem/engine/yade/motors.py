@@ -64,7 +64,7 @@ class YadeMotors:
         assert self.control is not None  # only articulated smarticles are actuated
         time_step = float(self._yade.omega.dt)
         rates = self._hinges.rates() if self.control.law.damping else None
-        torques = self.control.look(self._hinges.angles(), targets[0], interval, time_step, rates)
+        torques = self.control.update(self._hinges.angles(), targets[0], interval, time_step, rates)
         self._hinges.set_torques(torques, time_step)
 
     @property
