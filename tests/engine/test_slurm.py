@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from processes import complete, differing, gate, results
-from slurm_here import SlurmHere, slurm_here
+from slurm_here import SlurmHere, slurm_here, wait_until
 
 SCENE = """\
 schema_version: 1
@@ -53,7 +51,6 @@ cores_per_node = 6
 memory_per_node_mib = 6000
 max_time = "00:10:00"
 """
-WAIT_S = 600.0
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +65,6 @@ def smarticles(slurm: SlurmHere) -> Callable[..., str]:
         return slurm.call(sys.executable, "-m", "smarticles", *map(str, words))
 
     return call
-
-
-def wait_until(condition: Callable[[], object], what: Callable[[], str]) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline, what()
-        time.sleep(0.05)
 
 
 def waits(process: int, number: signal.Signals) -> bool:
@@ -166,7 +156,7 @@ def test_a_rejected_job_is_reported_and_nothing_is_lost(
     )
     words = ["sweep", tmp_path / "sweep.yaml", "--out", tmp_path / "out", "--submit", "slurm", "--cluster"]
     command = [sys.executable, "-m", "smarticles", *words, tmp_path / "here.toml"]
-    done = subprocess.run(command, env=slurm.environment, capture_output=True, text=True, check=False)
+    done = slurm.ask(*map(str, command))
     assert done.returncode == 1
     assert "sbatch refused it: " in done.stderr
     assert "invalid partition specified: absent" in done.stderr

@@ -82,8 +82,8 @@ def test_slipping_motor_never_exceeds_its_limit(angles: list[float]) -> None:
 
 @pytest.mark.parametrize("law", [replace(HALT, torque_limit=1.0), SLIP])
 def test_work_is_the_energy_that_a_barb_gains(law: MotorLaw) -> None:
-    # A barb of its own, integrated as YADE does: velocities half a step after angles, the torque at every step, an update
-    # every five. The motor's work must be the kinetic energy at the half step after the update.
+    # A barb of its own, integrated as YADE does: velocities half a step after angles, the torque at every step, an
+    # update every five. The motor's work must be the kinetic energy at the half step after the update.
     inertia, steps = 9e-10, 5
     motors, angle, speed, energies, works = Motors(law, np.zeros((1, 2))), 0.0, 0.0, [], []
     for look in range(1000):
