@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,3 +65,19 @@ class Glance:
     gap: float
     deepest: float
     elastic_energy: float
+
+
+def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
+    """Return smarticles that touch two boundaries which have moved apart by more than `least` [m].
+
+    Args:
+        touched: names of the boundaries that a smarticle touches, by its number.
+        raised: how far each boundary was raised since the start [m], by name.
+        least: distance [m].
+    """
+    return tuple(
+        Held(k, (first, second), apart)
+        for k, names in sorted(touched.items())
+        for first, second in combinations([name for name in raised if name in names], 2)
+        if (apart := abs(raised[first] - raised[second])) > least
+    )

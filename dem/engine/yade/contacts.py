@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.library import Yade
 from dem.physics.contact import ContactLaw
-from dem.physics.overlaps import APART, Held, Overlaps
+from dem.physics.overlaps import APART, Held, Overlaps, held_between
 
 
 def contacts_of(yade: Yade, assembly: Assembly) -> Iterator[Any]:
@@ -97,10 +96,4 @@ def _held(
             k, name = assembly.smarticle_of.get(one), part_of.get(other)
             if k is not None and name is not None and deep[k]:
                 touched[k].add(name)
-    found = []
-    for k, names in sorted(touched.items()):
-        for first, second in combinations([name for name in parts if name in names], 2):
-            apart = abs(parts[first][1] - parts[second][1])
-            if apart > least:
-                found.append(Held(k, (first, second), apart))
-    return tuple(found)
+    return held_between(touched, {name: raised for name, (_, raised) in parts.items()}, least)
