@@ -7,20 +7,27 @@ returns plain numbers and arrays; the tests compare them with the answer. SI thr
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import h5py
+import meshio
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
 from dem.engine.demand import contact_law_of
+from dem.engine.effect import Adds
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.library import yade_version
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
+from dem.plan.outlook import plan
 from dem.plan.steps import time_step
+from dem.run.build import build_engine
 from dem.run.recorder import Recorder
 from dem.run.run import run_scene
 from dem.run.sampler import Sampler
@@ -217,3 +224,89 @@ def noted(data: dict[str, Any], out: str) -> list[dict[str, Any]]:
 
     watched(data, out, note)
     return notes
+
+
+def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every: int) -> dict[str, Any]:
+    """A layer of random poses thrown at the floor of a container that is shaken: vertices, touches at every look."""
+    scene = scene_of(data)
+    engine = build_engine(scene, time_step(scene))
+    rng = np.random.default_rng(scene.seed)
+    poses = place_layer(
+        scene.particle, count=count, radius=0.012, bottom=3e-3, height=5e-3, obstacles=np.empty((0, 3)), rng=rng
+    )
+    engine.add(poses, speed=speed)
+    vertices, touches = [np.array(engine.state().vertices)], []
+    engine.boundaries.shake(amplitude=5e-4, frequency=30.0)
+    for _ in range(steps // every):
+        engine.advance(every)
+        vertices.append(np.array(engine.state().vertices))
+        touches.append(int(engine.touches().sum()))
+    return {
+        "vertices": np.array(vertices),
+        "touches": touches,
+        "diameter": scene.sphere_diameter,
+        "floor": engine.boundaries.floor,
+        "time": engine.time,
+        "impulse": engine.impulse,
+    }
+
+
+# What every run directory holds, whatever the scene calls for.
+OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
+
+
+def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """Run a scene; what it was declared to be made of, and what was found at every sample and on the disk."""
+    scene = scene_of(data)
+    declared = Adds.together(decision.adds for decision in decide(scene))
+    found: dict[str, set[Any]] = defaultdict(set)
+    watched(data, out, lambda engine, _: _look(engine, found))
+    folder = Path(out)
+    found["files"] = {path.name for path in folder.iterdir()} - OWN_FILES
+    with h5py.File(folder / "series.h5") as file:
+        found["series"] = set(file)
+    for path in (folder / "frames").iterdir():
+        found["arrays"] |= set(meshio.read(path).cell_data)
+    kinds = ("engines", "functors", "materials", "shapes", "series", "arrays", "files")
+    return {
+        "declared": {kind: set(getattr(declared, kind)) for kind in kinds if kind != "engines"},
+        "found": {kind: found[kind] for kind in kinds if kind != "engines"},
+        "planned": set(plan(scene).engines),
+        "engines": found["engines"],
+        "contacts": found["contacts"],
+        "caps": found["caps"],
+    }
+
+
+def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
+    omega = engine._omega
+    found["engines"].add(tuple(type(one).__name__ for one in omega.engines))
+    _, collider, loop, *_ = omega.engines
+    for functors in (
+        collider.boundDispatcher.functors,
+        loop.geomDispatcher.functors,
+        loop.physDispatcher.functors,
+        loop.lawDispatcher.functors,
+    ):
+        found["functors"] |= {type(functor).__name__ for functor in functors}
+    found["materials"] |= {material.label for material in omega.materials}
+    found["shapes"] |= {type(body.shape).__name__ for body in omega.bodies}
+    for contact in omega.interactions:
+        if contact.isReal:
+            phys = contact.phys
+            found["contacts"].add((type(contact.geom).__name__, type(phys).__name__))
+            if type(phys).__name__ == "CohFrictPhys":
+                found["caps"].add(phys.maxTwistPl)
+
+
+def ledger_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """Energies of a pile right before and right after the simulation is saved and loaded."""
+    scene = scene_of(data)
+    engine = build_engine(scene, time_step(scene))
+    pour(engine, scene, scene.count)
+    engine.advance(2500)
+    before, folder = engine.ledger.elastic(), Path(out)
+    engine.load(engine.save(folder), folder)
+    after = engine.ledger.elastic()
+    engine.boundaries.remove_wall()
+    return {"before": before, "after": after, "dissipated": engine.ledger.dissipated}

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import cases
-import effect_cases
 import meshio
 import numpy as np
 import pytest
@@ -60,7 +59,7 @@ SCENES = {
 def test_a_run_is_made_of_what_its_scene_calls_for_and_of_nothing_else(
     simulate: Simulate, tmp_path: Path, name: str
 ) -> None:
-    made = simulate(effect_cases.inventory, SCENES[name], str(tmp_path / "run"))
+    made = simulate(cases.inventory, SCENES[name], str(tmp_path / "run"))
     # Found in YADE's lists at every sample, in the datasets, in the frames and in the folder, against the declaration.
     assert made["found"] == made["declared"]
     moves, hinges = name == "all", name != "plain"
@@ -140,7 +139,7 @@ def test_the_comparison_sees_the_smallest_change(run: Callable[[dict[str, Any]],
 def test_energies_of_contacts_are_known_right_after_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
     # YADE does not save overlaps; a wall that goes away at a checkpoint must not make the ledger NaN.
     scene = data(REMOVE, recording={"dissipation_interval_s": 1e-3})
-    ledger = simulate(effect_cases.ledger_after_reload, scene, str(tmp_path))
+    ledger = simulate(cases.ledger_after_reload, scene, str(tmp_path))
     assert ledger["before"][0] > 1e-9
     assert ledger["after"] == pytest.approx(ledger["before"], rel=1e-12)
     assert np.isfinite(ledger["dissipated"])

@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import beside_cases
+import cases
 import numpy as np
 import pytest
 import taking
@@ -62,9 +62,7 @@ def test_smarticles_thrown_at_the_floor_move_as_on_yade(
     # Steps so short that what two schemes of integration make of an impact is the same.
     how = {"count": 3, "speed": 0.5, "steps": 900, "every": 50}
     fine = {"fidelity": {"base": "draft", "time_step_fraction": 0.15}}
-    one, other = (
-        simulate(beside_cases.thrown, scene_data({"engine": name, **fine}), **how) for name in ("yade", "lammps")
-    )
+    one, other = (simulate(cases.thrown, scene_data({"engine": name, **fine}), **how) for name in ("yade", "lammps"))
     assert np.abs(one["vertices"][0] - other["vertices"][0]).max() < 1e-15
     apart = np.abs(one["vertices"] - other["vertices"]).max(axis=(1, 2, 3)) / one["diameter"]
     # They have met the floor, bounced and turned: they are far from where they would be in free fall.

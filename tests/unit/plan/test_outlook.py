@@ -1,4 +1,4 @@
-"""Effects: each says whether a scene calls for it and why, and a plan is made of what the called ones add."""
+"""A plan: which effects a scene calls for, warnings, costs on the links engine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenes import small
 
 from dem.engine.effect import Adds
 from dem.plan.effects import ADDS, decide
-from dem.plan.outlook import plan
+from dem.plan.outlook import Plan, plan, warnings_of
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
@@ -20,6 +20,7 @@ from dem.record.columns import (
     RELEASE_COLUMNS,
     STRAIN_COLUMNS,
 )
+from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 
 DEPOSIT = {"type": "deposit"}
@@ -72,3 +73,61 @@ def test_every_column_belongs_to_one_effect() -> None:
     tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
     assert sorted(declared) == sorted(name for table in tables for name in table)
     assert len(set(declared)) == len(declared)
+
+
+def test_a_plain_scene_has_no_warnings() -> None:
+    assert warnings_of(small()) == ()
+    assert plan(small()).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
+)
+def test_an_interval_longer_than_the_run_gives_a_warning(key: str, left_out: str) -> None:
+    assert warnings_of(small({f"recording.{key}": 0.88})) == ()
+    scene = small({f"recording.{key}": 10.0})
+    (warning,) = plan(scene).warnings
+    assert warning == (
+        f"recording.{key}: 10 s is longer than the whole run, about 0.9 s, so that {left_out}; shorten it, or lengthen "
+        "the run"
+    )
+    assert warning == warnings_of(scene)[0]
+    assert f"warning: {warning}" in plan(scene).to_text().splitlines()
+    assert json.loads(json.dumps(plan(scene).to_dict()))["warnings"] == [warning]
+
+
+def test_knobs_that_do_nothing_on_links_give_a_warning_where_they_are_set() -> None:
+    assert warnings_of(small({"engine": "links"})) == ()
+    knobs = {"base": "draft", "pitch": 0.5, "wall_facets": 128}
+    assert warnings_of(small({"fidelity": knobs})) == ()
+    (warning,) = warnings_of(small({"engine": "links", "fidelity": knobs}))
+    assert warning == (
+        "fidelity: pitch (0.5), wall_facets (128) have no meaning on the engine links; leave out what does nothing"
+    )
+
+
+def rates(made: Plan) -> dict[str, float]:
+    """Seconds per simulated second by type of phase."""
+    return {phase.type: phase.wall_s / phase.estimate_s for phase in made.phases}
+
+
+def bench(activity: dict[str, object], count: int = 270) -> Plan:
+    """A scene of `benchmarks.engines`, in a container as wide as keeps the pile's height."""
+    radius = 0.0234 * (count / 270) ** 0.5
+    phases = [{"type": "deposit", "per_layer": max(4, count // 27)}, {"duration_s": 2.0, **activity}]
+    data = {"schema_version": 1, "engine": "links", "seed": 1, "count": count, "container": {"radius_m": radius}}
+    return plan(parse_scene({**data, "phases": phases}, source="test"))
+
+
+@pytest.mark.parametrize(
+    ("made", "kind", "measured"),
+    [
+        # results/bench: idle, three seeds each.
+        (bench({"type": "shake"}), "shake", 0.98),
+        (bench({"type": "internal-oscillation", "theta_deg": 10.0}), "internal-oscillation", 1.74),
+        # results/bench/cost.csv, by what a busy machine adds, 0.63.
+        (bench({"type": "relax"}), "relax", 0.63 * 1.83),
+    ],
+)
+def test_costs_are_those_measured(made: Plan, kind: str, measured: float) -> None:
+    assert rates(made)[kind] == pytest.approx(measured, rel=0.25)
