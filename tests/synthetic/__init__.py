@@ -119,9 +119,9 @@ def mesh_of(
     )
 
 
-def write_frame(path: Path, vertices: NDArray[np.float64], **told: Any) -> None:
+def write_frame(path: Path, vertices: NDArray[np.float64], **content: Any) -> None:
     """One frame file; keywords as `mesh_of`."""
-    meshio.vtu.write(str(path), mesh_of(vertices, **told))
+    meshio.vtu.write(str(path), mesh_of(vertices, **content))
 
 
 def write_series(directory: Path, columns: Mapping[str, ArrayLike], *, seed: int, scene_sha256: str = "0" * 64) -> None:

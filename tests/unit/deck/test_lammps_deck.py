@@ -1,4 +1,4 @@
-"""A scene as a deck of LAMMPS: what is in it, what is refused, and what the distribution's LAMMPS makes of it."""
+"""A scene as a deck of LAMMPS: what is in it, what is rejected, and what the distribution's LAMMPS makes of it."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
     masses = (rows[:, 6] * math.pi / 6 * rows[:, 5] ** 3).reshape(2, count)
     assert masses.min() > 0
     assert masses.sum(axis=1) == pytest.approx(particle.boxes.mass, rel=1e-12)
-    # Weight turns nobody: spheres are balanced about the centre of mass, which equal ones are not.
+    # Weight turns no smarticle: spheres are balanced about the centre of mass, which equal ones are not.
     levers = rows[:, 2:5].reshape(2, count, 3) - given.state.positions[:, None]
     balance = np.einsum("ns,nsi->ni", masses, levers) / particle.boxes.mass
     assert np.abs(balance).max() < 1e-15
@@ -111,7 +111,7 @@ OPEN, SWING = {"type": "shape-change"}, {"type": "internal-oscillation", "theta_
         ([{"type": "pull-hook"}], HOOKS, ["hooks", "phases.1 (pull-hook)"]),
     ],
 )
-def test_what_cannot_be_carried_over_is_refused_by_name(
+def test_what_cannot_be_carried_over_is_rejected_by_name(
     tmp_path: Path, phases: list[dict[str, Any]], changes: dict[str, Any], named: list[str]
 ) -> None:
     scene = scene_of(source(tmp_path / "run"), *phases, **changes)

@@ -39,7 +39,7 @@ def limit_by_iteration(stiffness: float, damping: float, mass: float) -> float:
 
 
 def limit_of_a_flat_pile(scene: Scene, layers: int, *, rolling: bool = False) -> float:
-    """The same for smarticles lying flat on each other, on the floor: eigenvalues of the damped leapfrog map.
+    """Largest stable step of smarticles lying flat on each other: eigenvalues of the damped leapfrog map.
 
     They move up and down, or all roll about the axis about which they have the least inertia.
     """
