@@ -266,7 +266,8 @@ class LammpsEngine:
         added = Moving(poses.positions, turns, thrown, zero, zero, weight)
         spheres = State.rigid(boxes, poses.positions, turns, thrown, zero).spheres(self.particle)
         lines = text.sphere_lines(self.particle, self.cylinder, spheres, title="smarticles", first=self.count)
-        self._moving = Moving(*(np.concatenate([getattr(one, name) for one in (before, added)]) for name in _FIELDS))
+        pairs = zip(vars(before).values(), vars(added).values(), strict=True)
+        self._moving = Moving(*(np.concatenate(pair) for pair in pairs))
         self._write(SPHERES, lines)
         self._write(BODIES, text.body_lines(self.particle, self._moving))
         if self._box:
@@ -339,7 +340,7 @@ class LammpsEngine:
             for name in (RESTART, f"{RESTART}.rigid"):
                 files[name] = (self.child.scratch / name).read_bytes()
         arrays = io.BytesIO()
-        np.savez(arrays, **{name: getattr(self._moving, name) for name in _FIELDS})
+        np.savez(arrays, **vars(self._moving))
         files[STATE] = arrays.getvalue()
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
@@ -377,8 +378,8 @@ class LammpsEngine:
                 files = {name: archive.read(name) for name in archive.namelist()}
                 self._box = RESTART in files
                 with np.load(io.BytesIO(files[STATE])) as arrays:
-                    self._moving = Moving(*(arrays[name] for name in _FIELDS))
-        except (zipfile.BadZipFile, KeyError, ValueError) as error:
+                    self._moving = Moving(**arrays)
+        except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
             msg = f"checkpoint: not readable by the lammps engine ({error}); start the run anew"
             raise InputError(msg) from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
@@ -398,9 +399,6 @@ class LammpsEngine:
         self.child = Child(self.child.ranks)
         for name, data in files.items():
             (self.child.scratch / name).write_bytes(data)
-
-
-_FIELDS = ("positions", "turns", "velocities", "spins", "momenta", "forces")
 
 
 def _turns(rows: Array) -> Array:
