@@ -18,8 +18,8 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
 from dem.scene.scene import Scene
+from validation.access import bodies_of as bodies
 from validation.bench import Targets, add, drive, scene_of
-from validation.yade_access import bodies_of as bodies
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 

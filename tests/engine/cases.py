@@ -33,8 +33,8 @@ from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
+from validation.access import YadeAccess, bodies_of
 from validation.bench import advance_watched, body_rotations, scene_of
-from validation.yade_access import YadeAccess, bodies_of
 
 
 def build(
