@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.engine.interface import Saved
 from dem.engine.links.engine import LinksEngine
+from dem.engine.links.motion import motoring
 from dem.engine.links.stepping import MOST
 from dem.errors import InputError
 from dem.physics.motor import Motors
@@ -110,14 +111,14 @@ def test_a_foreign_checkpoint_is_refused_in_one_line() -> None:
 def test_a_pile_comes_to_rest() -> None:
     made = poured(30)
     # Among five seeds some still roll at 1e-11 J after half of this time; who does is a matter of last bits.
-    made.advance(12000)
+    made.advance(18000)
     assert made.state().kinetic_energy < 1e-12
     assert made.unbalanced_force() < 1e-3
     assert made.boundaries.container_force[2] == pytest.approx(-30 * builds.boxes().mass * 9.81, rel=1e-3)
 
 
 @pytest.mark.parametrize("law", ["halt", "stall", "slip", "servo"])
-def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
+def test_the_energy_ledger_closes_in_an_actuated_pile(law: str) -> None:
     more = {"damping": 1e-6} if law == "servo" else {}
     made = builds.engine(
         gravity=9.81, radius=0.0234, dt=5e-5, motor_law=builds.motor_law(law, **more), keep_ledger=True
@@ -131,10 +132,10 @@ def test_the_account_closes_in_an_actuated_pile(law: str) -> None:
     stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
     given = made.ledger.given + made.motors.work
     assert made.motors.work > 0.1 * made.ledger.added
-    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
+    assert abs(given - stored - made.ledger.dissipated) < 0.004 * given
 
 
-def test_the_account_closes_in_a_shaken_pile() -> None:
+def test_the_energy_ledger_closes_in_a_shaken_pile() -> None:
     made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, keep_ledger=True)
     builds.pile(made, 20, settle=0.1)
     made.boundaries.shake(amplitude=2 * 9.81 / (2 * math.pi * 30) ** 2, frequency=30.0)
@@ -143,7 +144,7 @@ def test_the_account_closes_in_a_shaken_pile() -> None:
     stored = state.kinetic_energy + state.potential_energy(9.81, 0.0) + sum(made.ledger.elastic())
     given = made.ledger.given
     assert made.ledger.container_work > 0.1 * made.ledger.added
-    assert abs(given - stored - made.ledger.dissipated) < 0.01 * given
+    assert abs(given - stored - made.ledger.dissipated) < 0.004 * given
 
 
 def test_a_motor_that_halts_holds_and_may_give_way() -> None:
@@ -157,12 +158,14 @@ def test_a_motor_that_halts_holds_and_may_give_way() -> None:
     pile.advance(4)
     pile._world.motors.impulse[:] -= 2e-5 * 2e-4
     pile.motors.actuate(bodies.alpha[None] + 1e-3, 2e-4)
+    pile.advance(1)
     readings = pile.motors.readings
     assert readings.halted.all()
     assert (bodies.rate == 0.0).all()
-    pile.advance(4)
+    pile.advance(3)
     pile._world.motors.impulse[:] -= 2e-5 * 2e-4
     pile.motors.actuate(bodies.alpha[None] - 1e-3, 2e-4)
+    pile.advance(1)
     assert not pile.motors.readings.halted.any()
     assert (bodies.rate < 0.0).all()
 
@@ -176,9 +179,10 @@ def test_a_motor_that_stalls_does_not_move_either_way() -> None:
         made.advance(4)
         made._world.motors.impulse[:] -= 2e-5 * 2e-4
         made.motors.actuate(made._world.bodies.alpha[None] + sign * 1e-3, 2e-4)
+        made.advance(1)
         assert made.motors.readings.halted.all()
         assert (made._world.bodies.rate == 0.0).all()
-        made.advance(4)
+        made.advance(3)
 
 
 @pytest.mark.parametrize("law", ["slip", "servo"])
@@ -247,7 +251,7 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
     assert motors is not None
     motors.acceleration[:] = 1e12
     plain = Motors(replace(law, stiffness=1.0), made._world.bodies.alpha)
-    rng = np.random.default_rng(1)
+    update, rng = builds.callable_from_python(motoring.update), np.random.default_rng(1)
     loads = [np.repeat(rng.random((1, 2)) < 0.8, 15, axis=0) for _ in range(40)]
     speeds = set()
     for over in np.concatenate(loads):
@@ -258,6 +262,7 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
         plain.update(before - torque, far, 2e-4, 5e-5)
         motors.schedule[0] = motors.command[0] = made._world.bodies.alpha[0]
         made.motors.actuate((made._world.bodies.alpha + 1.0)[None], 2e-4)
+        update(made._world.shape, made._world.bodies, made._world.motors)
         np.testing.assert_allclose(made._world.bodies.rate * 2e-4, plain.commands - before, atol=1e-15)
         np.testing.assert_array_equal(motors.halted, plain.halted)
         speeds |= set(np.round(made._world.bodies.rate[0], 9))

@@ -137,17 +137,14 @@ def ledger(access: EngineAccess, *, count: int = 100, seconds: float = 0.5) -> l
     names = ("energy_residual_J", "motor_work_J", "dissipated_energy_J")
     residual, work, lost = (run.series[name][run.during(1)] for name in names)
     done, largest, change = work[-1] - work[0], np.nanmax(np.abs(run.series["energy_residual_J"])), np.ptp(residual)
-    first = (
-        "first order: springs of contacts that begin or end within a step do more or less work than they hold; half as "
-        "much at half the step"
-    )
+    second = "second order: a time step's share of springs and motors, a quarter as much at half the step"
     stores = "that there is something to account for: a pile that swings stores next to nothing"
     over = "residual of the ledger, over all that was dissipated since the pour [J]"
     during = "residual, its change while motors are at work, over their work [J]"
     share = "dissipated over work of the motors [1]"
     return [
-        Answer(over, 0.0, largest, 0.01, first, scale=lost[-1]),
-        Answer(during, 0.0, change, 0.03, first, scale=done),
+        Answer(over, 0.0, largest, 0.005, second, scale=lost[-1]),
+        Answer(during, 0.0, change, 0.01, second, scale=done),
         Answer(share, 1.0, (lost[-1] - lost[0]) / done, 0.3, stores),
     ]
 

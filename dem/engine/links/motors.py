@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dem.engine.interface import MotorReadings
 from dem.engine.links.arrays import Motoring
-from dem.engine.links.motion.motoring import engage, look, release, work_so_far
+from dem.engine.links.motion.motoring import engage, release, work_so_far
 from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.motor import MotorLaw
@@ -76,7 +76,7 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """See the interface; the first look is now, the others follow as time is advanced, between two steps."""
+        """Set the schedule; its first control update is in the next step, between forces and kick."""
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
         world.motors = world.motors._replace(
@@ -85,7 +85,6 @@ class LinksMotors:
             targets=np.ascontiguousarray(targets, dtype=np.float64),
         )
         world.motors.due[:] = 0
-        look(world.shape, world.bodies, world.motors)
 
     @property
     def readings(self) -> MotorReadings | None:

@@ -11,7 +11,7 @@ from dem.engine.links.contact.barrier import FINEST, Step, ticks_for
 from dem.engine.links.contact.boundaries import push_boundaries
 from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import GAIN, OWNERS, POINT, POWER, PUSH, ROWS, push_apart, velocity_at
-from dem.engine.links.motion.motoring import look
+from dem.engine.links.motion.motoring import update
 from dem.engine.links.motion.moving import drift, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motion, find_spin, pose
 from dem.engine.links.neighbours.lists import FULL, update_lists
@@ -116,7 +116,7 @@ def act(
     resolve_speeds(shape, bodies, motors is not None, system.gravity, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
-        look(shape, bodies, motors)
+        update(shape, bodies, motors)
     totals[MOST] = max(totals[MOST], need[0])
     ticks = ticks_for(need[0], tick)
     length = dt * (ticks / FINEST)

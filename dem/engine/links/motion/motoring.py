@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from dem.engine.links.arrays import Array, Bodies, Motoring
-from dem.engine.links.compiler import inlined, kernel
+from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.motion.planar import (
     inverses,
     lagrange_force,
@@ -123,8 +123,8 @@ def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
     return total
 
 
-@kernel
-def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+@part
+def update(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """What the motors do in the control period that begins now, by the row of `targets` that is due.
 
     Where nobody has told what comes after the last row they go on by it.
