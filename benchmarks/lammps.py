@@ -23,9 +23,9 @@ import pandas as pd
 
 from benchmarks.runs import PAPER_COUNT, PAPER_RADIUS, folder_of, run_child
 from dem.body.placement import place_layer
+from dem.engine.cores import RANKS
 from dem.engine.interface import Saved
 from dem.engine.lammps.kind import LammpsKind
-from dem.engine.lammps.ranks import RANKS
 from dem.plan.steps import time_step
 from dem.record.run import Run
 from dem.scene.reading import parse_scene

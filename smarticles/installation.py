@@ -80,7 +80,7 @@ import json
 from dem.engine.lammps.child import Child, lammps_version
 answer = {"version": lammps_version()}
 child = Child(1)
-child.tell("print obeyed file obeyed")
+child.send("print obeyed file obeyed")
 answer["obeyed"] = (child.scratch / "obeyed").exists()
 child.close()
 print()

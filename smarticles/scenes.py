@@ -89,8 +89,7 @@ def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, 
     Raises:
         InputError: the engine has none of them, or there are not so many cores.
     """
-    from dem.engine.cores import threads_warning  # noqa: PLC0415
-    from dem.engine.lammps.ranks import RANKS, check_ranks  # noqa: PLC0415
+    from dem.engine.cores import RANKS, check_ranks, threads_warning  # noqa: PLC0415
     from dem.record.names import MANIFEST  # noqa: PLC0415
     from dem.record.run import Run  # noqa: PLC0415
 

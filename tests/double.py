@@ -1,15 +1,15 @@
-"""An engine in memory: what `dem.engine.interface` asks for, with physics that can be worked out by hand.
+"""An engine in memory: `dem.engine.interface` with physics that can be computed by hand.
 
 Smarticles fall freely, without turning, through each other, until they stand on the floor; there they stay and go
-with it. Barbs do not turn whatever motors are told, and whom a string is tied to goes where the string goes. What the
-double was told is in `told`; what it shall tell may be set.
+with it. Barbs never turn, and a smarticle that a string is tied to goes where the string goes. `told` lists the calls;
+answers may be set.
 """
 
 from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,19 +22,18 @@ from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.engine.demand import Demand
-from dem.engine.doing import Doing
+from dem.engine.demand import Activity, Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
+from dem.physics.contact import StringLaw
 from dem.physics.overlaps import Glance, Overlaps
-from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
 Told = list[tuple[Any, ...]]
-"""What an engine was told, in order: a name and numbers."""
+"""Calls in order: a name and numbers."""
 
 STABLE_STEP = 5e-4  # s; nothing here is unstable
 
@@ -109,7 +108,7 @@ class BoundariesDouble:
 
 @dataclass(kw_only=True)
 class MotorsDouble:
-    """Motors that hold what they are told, and turn nothing."""
+    """Motors that hold their commands, and turn nothing."""
 
     told: Told
     present: bool = False
@@ -151,7 +150,7 @@ class MotorsDouble:
 
 @dataclass(kw_only=True)
 class StringsDouble:
-    """Two strings of a tension, `tension` [N], that is the same however far they are pulled."""
+    """Two strings of a constant tension, `tension` [N]."""
 
     told: Told
     tension: float = 0.0
@@ -206,7 +205,7 @@ class LedgerDouble:
 
 @dataclass(kw_only=True)
 class EngineDouble:
-    """See `dem.engine.interface.Engine`, and above."""
+    """The engine; see above."""
 
     particle: Particle
     cylinder: Cylinder
@@ -216,9 +215,9 @@ class EngineDouble:
     stops_at: int | None = None
     """Step at which it stops by itself."""
     drift: float = 0.0
-    """Speed at which those that stand slide along x [m/s]."""
+    """Speed at which standing smarticles slide along x [m/s]."""
     deepest: float = 0.0
-    """Depth of the deepest contact of each smarticle that stands [m]."""
+    """Depth of the deepest contact of each standing smarticle [m]."""
     time: float = 0.0
     steps: int = 0
     cpu_elsewhere: float = 0.0
@@ -354,7 +353,7 @@ class EngineDouble:
         return Overlaps(self.deepest, deep, 0.0)
 
     def contact_forces(self) -> ContactForces:
-        """Those that stand, each pressed by its weight onto the floor below its middle link."""
+        """Standing smarticles, each pressed by its weight onto the floor below its middle link."""
         standing = np.flatnonzero(self._standing)
         points, up = self.positions[standing] * [1, 1, 0], np.tile([0.0, 0.0, 1.0], (len(standing), 1))
         weight = self.particle.boxes.mass * self.gravity
@@ -387,12 +386,14 @@ class EngineDouble:
 
 
 class KindDouble:
-    """See `dem.engine.kinds.EngineKind`; `built` are the engines that it has built."""
+    """`dem.engine.kinds.EngineKind`; `built` are the engines that it has built."""
 
     name = "double"
     workers = "threads"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ()
+    adds: Mapping[EffectName, Adds] = {}
+    order: tuple[str, ...] = ()
     built: list[EngineDouble]
 
     def __init__(self) -> None:
@@ -404,16 +405,10 @@ class KindDouble:
     def threads(self) -> int:
         return 1
 
-    def adds(self, effect: EffectName) -> Adds:
-        return Adds()
-
-    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
-        return tuple(engines)
-
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         return STABLE_STEP
 
-    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
+    def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         return 1e-6 / time_step
 
     def build(self, scene: Demand, time_step: float) -> EngineDouble:
@@ -422,5 +417,5 @@ class KindDouble:
 
 
 def _conforms(engine: EngineDouble, kind: KindDouble) -> tuple[Engine, EngineKind]:
-    """For the type checker alone: the doubles are what they stand for."""
+    """For the type checker alone: the doubles implement the interfaces."""
     return engine, kind

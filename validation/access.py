@@ -17,17 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
-from dem.engine.demand import contact_law_of
+from dem.engine.demand import contact_law_of, motor_law_of
 from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motors import LAWS
 from dem.engine.links.shape import shape_of
-from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.container import WALL_MATERIAL
+from dem.engine.yade.construction import SMARTICLE_MATERIAL, WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import hinge_law, motor_law
+from dem.engine.yade.kind import hinge_law
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
@@ -169,7 +168,7 @@ class LinksAccess(_Access):
     """Keys of `motor` in a scene file whose motors have springs for shafts."""
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
-        return {"motor_law": motor_law(scene)}
+        return {"motor_law": motor_law_of(scene)}
 
     def ball(self) -> Particle:
         """Return what meets the floor like a ball of BALL_MASS, at the lever BALL_RADIUS, at `ball_turn`."""
@@ -326,7 +325,7 @@ class YadeAccess(_Access):
     spring_shafts: ClassVar[dict[str, Any]] = {}
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
-        return {"hinges": (hinge_law(scene), motor_law(scene))}
+        return {"hinge_law": hinge_law(scene), "motor_law": motor_law_of(scene)}
 
     def ball(self) -> Particle:
         # A cube of side r √(12/5) has the moment of a solid ball, 2/5 m r².

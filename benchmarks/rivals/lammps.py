@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.rivals.given import ACTIVITY, CREEP, Array, Given, Knobs, Outcome, rigid_links
-from dem.deck.lammps import DECK, DUMP, write_deck
+from dem.deck import DECK, DUMP, write_deck
 from dem.plan.steps import time_steps
 
 LOOP = re.compile(r"^Loop time of (\S+) on 1 procs", re.MULTILINE)

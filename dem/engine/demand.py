@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import Enum, auto
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
+from dem.physics.motor import MotorLaw
 from dem.setting.contact import Contact
 from dem.setting.container import Cylinder
 from dem.setting.fidelity import Fidelity
@@ -19,6 +21,15 @@ from dem.setting.motor import Motor
 from dem.setting.plane import Channel
 from dem.setting.recording import Recording
 from dem.setting.smarticle import Smarticle
+
+
+class Activity(Enum):
+    """What happens to the pile in a phase, as far as costs depend on it."""
+
+    POUR = auto()
+    REST = auto()
+    SHAKE = auto()
+    ACTUATE = auto()
 
 
 class Demand(Protocol):
@@ -30,7 +41,7 @@ class Demand(Protocol):
 
     @property
     def count(self) -> int:
-        """N."""
+        """Number of smarticles."""
 
     @property
     def hooks(self) -> Hooks | None:
@@ -58,7 +69,7 @@ class Demand(Protocol):
 
     @property
     def particle(self) -> Particle:
-        """One smarticle as the engine sees it."""
+        """One smarticle as the engine takes it."""
 
     @property
     def cylinder(self) -> Cylinder:
@@ -74,7 +85,7 @@ class Demand(Protocol):
 
     @property
     def motor_strengths(self) -> NDArray[np.float64] | None:
-        """(N, 2) factors on what the motors can do [1]; None where all are alike."""
+        """(N, 2) factors on torque limit and stiffness of the motors [1]; None where all are equal."""
 
     @property
     def actuates(self) -> bool:
@@ -85,9 +96,22 @@ class Demand(Protocol):
         """Stiffness [N/m] and damping [N s/m] of the strings of each phase that pulls by some."""
 
     def calls_for(self, effect: EffectName) -> bool:
-        """Whether a phase calls for an effect."""
+        """Return whether a phase calls for an effect."""
 
 
 def contact_law_of(scene: Demand) -> ContactLaw:
-    """Return the contact law of a scene, the same on all engines."""
+    """Return the contact law of a scene, on all engines."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
+
+
+def motor_law_of(scene: Demand) -> MotorLaw | None:
+    """Return the motor law of a scene, on all engines; None where no phase actuates."""
+    if not scene.actuates:
+        return None
+    return MotorLaw(
+        torque_limit=scene.torque_limit,
+        speed_limit=scene.motor.speed_limit_rad_per_s,
+        stiffness=scene.motor.stiffness_N_m_per_rad,
+        law=scene.motor.law,
+        damping=scene.motor.damping_N_m_s_per_rad,
+    )

@@ -40,12 +40,12 @@ class Adds:
     Args:
         engines: what an engine runs in every step, by its own names.
         functors: what these are given to work with.
-        materials: labels of materials.
+        materials: labels.
         shapes: kinds of bodies.
         series: datasets of `series.h5`.
         arrays: cell data of every frame.
         files: of the run directory.
-        python: what Python does for it, and how often, and what else it takes.
+        python: what Python does for it, how often, and other costs.
     """
 
     engines: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class Adds:
 
     @staticmethod
     def together(parts: Iterable[Adds]) -> Adds:
-        """The union, in order of mention."""
+        """Return the union, in order of mention."""
         each = list(parts)
         names = [field.name for field in fields(Adds) if field.name != "python"]
         lists = {
@@ -68,14 +68,9 @@ class Adds:
         return Adds(**lists, python="; ".join(part.python for part in each if part.python))
 
     def to_text(self) -> str:
-        """One line, lists that are long by their length; empty for nothing."""
-        counted = ((self.functors, "functors"), (self.series, "datasets"), (self.arrays, "arrays per frame"))
-        named = (
-            ("engines", self.engines),
-            ("materials", self.materials),
-            ("bodies", self.shapes),
-            ("files", self.files),
-        )
-        told = [f"{what} {', '.join(names)}" for what, names in named if names]
-        told += [f"{len(names)} {what}" for names, what in counted if names]
-        return "; ".join(filter(None, [*told, self.python]))
+        """Return one line, with the number of entries of lists that are long; empty for nothing."""
+        named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, "files": self.files}
+        counted = {"functors": self.functors, "datasets": self.series, "arrays per frame": self.arrays}
+        parts = [f"{what} {', '.join(names)}" for what, names in named.items() if names]
+        parts += [f"{len(names)} {what}" for what, names in counted.items() if names]
+        return "; ".join(filter(None, [*parts, self.python]))

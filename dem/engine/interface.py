@@ -1,13 +1,12 @@
-"""What a run needs of an engine: the one interface between the physics and everything around it.
+"""The interface between the physics and everything around it: what a run needs of an engine.
 
-An engine is a container, or a plane, that smarticles are added to and that time is advanced in. `Engine` is the running
-simulation, in groups: time and smarticles on the engine itself, and `boundaries`, `motors`, `strings` and `ledger` for
-what does not give way, what moves barbs, what pulls chains, and what energies add up to. `EngineKind` is what is asked
-of an engine before there is a simulation.
+An engine is a container, or a plane, that smarticles are added to and in which time is advanced. `Engine` is the
+running simulation: time and smarticles on the engine itself, and `boundaries`, `motors`, `strings` and `ledger`.
+`dem.engine.kinds` lists the engines, and says what can be asked of one before there is a simulation; `tests/double.py`
+implements the interface in memory.
 
 Heights, velocities and forces are in the laboratory frame. Sums over steps are counted inside the engine: a difference
-of two of them over the steps in between is a mean that misses no impact. `tests/double.py` implements the interface in
-memory; `dem.engine.kinds` lists the engines that there are.
+of two of them over the steps in between is a mean that misses no impact.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
+from dem.physics.contact import StringLaw
 from dem.physics.overlaps import Glance, Overlaps
-from dem.physics.strings import StringLaw
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -37,8 +36,8 @@ class Saved:
     """A simulation at one instant, as its engine saves it.
 
     Args:
-        content: the engine's own serialisation; opaque to everybody else.
-        memory: plain data, JSON-able without loss, that belongs to it.
+        content: the engine's own serialisation.
+        memory: plain data that JSON keeps without loss.
     """
 
     content: bytes
@@ -50,11 +49,11 @@ class MotorReadings:
     """All motors at one instant, (N, 2) each: barb 1 and barb 2 of every smarticle.
 
     Args:
-        schedule: angles that they were told at the last look [rad]; a motor that halts falls behind.
+        schedule: angles of the schedule at the last control update [rad]; a motor that halts falls behind.
         commands: angles that they hold [rad].
-        torques: on the barbs since the last look [N m]; positive ones raise the angle.
-        work: done on the links since the start, ∫ τ dα up to the last look [J].
-        halted: bool, whether a motor wanted to advance at the last look and did not.
+        torques: on the barbs since the last control update [N m]; positive ones raise the angle.
+        work: done on the links since the start, ∫ τ dα up to the last control update [J].
+        halted: whether a motor wanted to advance at the last control update and did not.
     """
 
     schedule: Array
@@ -65,9 +64,9 @@ class MotorReadings:
 
 
 class Boundaries(Protocol):
-    """What does not give way to smarticles: floor and wall, hooks, or the walls of a channel."""
+    """Rigid boundaries: floor and wall, hooks, or the walls of a channel."""
 
-    # -- how they stand ----------------------------------------------------------------------------------------
+    # -- where they are ----------------------------------------------------------------------------------------
 
     @property
     def floor(self) -> float:
@@ -91,7 +90,7 @@ class Boundaries(Protocol):
 
     @property
     def raised(self) -> float | None:
-        """How far the pile may have been raised by a hook [m]; None where nothing holds it back any more."""
+        """How far a hook may have raised the pile [m]; None where nothing holds the pile back any more."""
 
     @property
     def upper_height(self) -> float:
@@ -100,7 +99,7 @@ class Boundaries(Protocol):
     # -- how they move -----------------------------------------------------------------------------------------
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """Move what is there as z = A sin(2πf t), t from now; it starts where it is.
+        """Move the container as z = A sin(2πf t), t from now; it starts where it is.
 
         Args:
             amplitude: A [m].
@@ -123,18 +122,15 @@ class Boundaries(Protocol):
     def remove_wall(self) -> None:
         """Take the wall away, moving or not; what its contacts had stored is dissipated."""
 
-    # -- what they feel ----------------------------------------------------------------------------------------
+    # -- forces on them ----------------------------------------------------------------------------------------
 
     @property
     def hook_sums(self) -> Array:
-        """(2, 3) forces of the smarticles on the lower and the upper hook, summed over all steps so far [N].
-
-        (0, 3) without hooks.
-        """
+        """(2, 3) forces of the smarticles on lower and upper hook, summed over all steps [N]; (0, 3) without hooks."""
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) the same for the lower and the upper wall of a channel; (0, 3) without walls."""
+        """(2, 3) forces on the lower and the upper wall of a channel, summed likewise [N]; (0, 3) without walls."""
 
 
 class Motors(Protocol):
@@ -149,34 +145,34 @@ class Motors(Protocol):
         """Whether barbs can turn at present."""
 
     def articulate(self) -> None:
-        """Let the motors take hold of the barbs, where these are; nothing while articulated already."""
+        """Let barbs turn, held by their motors where they are; nothing while articulated already."""
 
     def weld(self) -> None:
-        """Make each smarticle rigid in the shape that it has; nothing while welded already."""
+        """Make each smarticle rigid in its present shape; nothing while welded already."""
 
     @property
     def looks_at_once(self) -> int:
-        """How many looks the motors can be told of at once, one or more."""
+        """Most control updates that `actuate` takes at once."""
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Let the motors look at their barbs and act for a control period; and so for the periods that follow.
+        """Make a control update, which acts for a control period, and others at the ends of the periods that follow.
 
         Args:
-            targets: (looks, N, 2) angles at the end of each period according to the schedule [rad]; `looks_at_once`
+            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `looks_at_once`
                 of them at most.
             interval: length of a period [s].
         """
 
     @property
     def readings(self) -> MotorReadings | None:
-        """What the motors tell; None before the first articulation."""
+        """State of all motors; None before the first articulation."""
 
     @property
     def work(self) -> float:
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """(N, 2) how far the hinges have given way [m]; zero while welded."""
+        """Return how far the hinges have given way (N, 2) [m]; zero while welded."""
 
 
 class Strings(Protocol):
@@ -184,19 +180,19 @@ class Strings(Protocol):
 
     @property
     def tied(self) -> bool:
-        """Whether they are there."""
+        """Whether they exist at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie a string to each of some points of articulated smarticles, taut, its other end outwards on the x-axis.
+        """Tie taut strings to points of articulated smarticles, their other ends outwards on the x-axis.
 
         Args:
             ties: the points.
-            law: what the strings have in common.
-            speeds: of their other ends, away from the origin [m/s].
+            law: of all strings.
+            speeds: of the other ends, away from the origin [m/s].
         """
 
     def untie(self) -> None:
-        """Let go of all strings."""
+        """Remove all strings."""
 
     @property
     def sums(self) -> Array:
@@ -212,7 +208,7 @@ class Strings(Protocol):
 
 
 class EnergyLedger(Protocol):
-    """Energies that have to be added up step by step, each only where a scene asks for it."""
+    """Work and dissipation, added up step by step, each only where a scene asks for it."""
 
     @property
     def container_work(self) -> float:
@@ -220,7 +216,7 @@ class EnergyLedger(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy of motion, of gravity above z = 0 and of contacts taken in, that smarticles were added with [J]."""
+        """Energy that smarticles were added with [J]: kinetic, of gravity above z = 0, of contacts taken in."""
 
     @property
     def dissipated(self) -> float:
@@ -231,14 +227,14 @@ class EnergyLedger(Protocol):
         """Energy added and work of boundaries since the start [J]; NaN while one moves whose work is not added up."""
 
     def elastic(self) -> tuple[float, float]:
-        """Energy in the springs of contacts and of hinges [J]."""
+        """Return the energies in the springs of contacts and of hinges [J]."""
 
     def take_in(self) -> None:
-        """Count what the springs of contacts hold at present as added: of smarticles that were added touching."""
+        """Count the present energy of contacts as added; for smarticles that were added touching."""
 
 
 class Engine(Protocol):
-    """A running simulation. One process runs one: engines may keep theirs in a process-wide singleton."""
+    """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
     @property
     def particle(self) -> Particle:
@@ -254,25 +250,25 @@ class Engine(Protocol):
 
     @property
     def boundaries(self) -> Boundaries:
-        """What does not give way."""
+        """Rigid boundaries."""
 
     @property
     def motors(self) -> Motors:
-        """What moves the barbs."""
+        """Motors of the barbs."""
 
     @property
     def strings(self) -> Strings:
-        """What pulls a chain."""
+        """Strings that pull a chain."""
 
     @property
     def ledger(self) -> EnergyLedger:
-        """What energies add up to."""
+        """Energy ledger."""
 
     # -- time --------------------------------------------------------------------------------------------------
 
     @property
     def cpu_elsewhere(self) -> float:
-        """Processor time [s] that other processes of this machine have spent for it since it was built."""
+        """Processor time of its other processes on this machine since it was built [s]."""
 
     @property
     def time(self) -> float:
@@ -306,10 +302,10 @@ class Engine(Protocol):
         """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
 
     def still(self) -> None:
-        """Bring all smarticles to rest where they are, while welded; their kinetic energy is dissipated."""
+        """Set all velocities to zero, while welded; the kinetic energy is dissipated."""
 
     def state(self) -> State:
-        """Poses and velocities of all smarticles.
+        """Return poses and velocities of all smarticles.
 
         Raises:
             RunError: the simulation has blown up.
@@ -317,40 +313,36 @@ class Engine(Protocol):
 
     @property
     def impulse(self) -> float:
-        """What gravity, and throwing them, has given to all smarticles since they were added [N s], downwards."""
+        """Momentum that gravity and throwing have given to all smarticles, downwards [N s]."""
 
     def unbalanced_force(self) -> float:
-        """Mean net force on a smarticle over its weight [1]: 0 for a still pile, 1 in free fall, inf when empty."""
+        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf when empty."""
 
     def neighbours(self) -> NDArray[np.int64]:
-        """(N,) how many other smarticles each one touches."""
+        """Return for each smarticle (N,) how many others it touches."""
 
     def touches(self) -> NDArray[np.int64]:
-        """(N,) contacts of each smarticle with others and with boundaries, however many with the same."""
+        """Return the number (N,) of contacts of each smarticle, with smarticles and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:
-        """How deep contacts are at present, and who has some deeper than a limit [m]."""
+        """Return the present overlaps, and which smarticles have one deeper than a limit [m]."""
 
     def contact_forces(self) -> ContactForces:
-        """Forces at all contacts at present, or in the last step; contacts of one pair of links are one."""
+        """Return forces at all contacts, at present or in the last step; a pair of links has one contact."""
 
     def glance(self, state: State) -> Glance | None:
-        """The extremes of all smarticles, for less than it costs to ask for each one.
+        """Return the extremes of all smarticles, cheaper than from each one, in the present state.
 
-        Args:
-            state: at this instant.
-
-        Returns:
-            None where the engine has no such way, or knows of something that must be looked at closely.
+        None where the engine has no such way, or knows of something that needs a full check.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Everything that `load` needs; the simulation goes on from it as one that was loaded would, bit for bit.
+        """Return everything that `load` needs; the simulation goes on with the bits of one that was loaded.
 
         Args:
-            scratch: folder for files that are removed again.
+            scratch: folder for temporary files.
         """
 
     def load(self, saved: Saved, scratch: Path) -> None:

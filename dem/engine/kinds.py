@@ -1,12 +1,11 @@
-"""The engines that there are, and what is asked of one before there is a simulation."""
+"""The engines that exist, and what can be asked of one before there is a simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Protocol
 
-from dem.engine.demand import Demand
-from dem.engine.doing import Doing
+from dem.engine.demand import Activity, Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine
 from dem.errors import InputError
@@ -17,64 +16,55 @@ class EngineKind(Protocol):
 
     @property
     def name(self) -> str:
-        """What a scene calls it."""
-
-    @property
-    def damps_once_per_look(self) -> bool:
-        """Whether a servo's damper acts on what the last look told; it must then look in every step."""
-
-    @property
-    def idle_knobs(self) -> tuple[str, ...]:
-        """Knobs of the fidelity that have no meaning on it."""
-
-    def version(self) -> str:
-        """Version of what results depend on.
-
-        Raises:
-            RunError: it is not installed.
-        """
+        """Its name in scenes."""
 
     @property
     def workers(self) -> str:
         """What a run on several cores has several of: threads, or ranks, which are processes."""
 
+    @property
+    def damps_once_per_look(self) -> bool:
+        """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
+
+    @property
+    def idle_knobs(self) -> tuple[str, ...]:
+        """Knobs of the fidelity that have no meaning on it."""
+
+    @property
+    def adds(self) -> Mapping[EffectName, Adds]:
+        """What an effect adds to its work; effects without an entry add nothing."""
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """All names of `Adds.engines`, in the order in which a step runs them."""
+
+    def version(self) -> str:
+        """Return the version of what results depend on.
+
+        Raises:
+            RunError: it is not installed.
+        """
+
     def threads(self) -> int:
-        """Threads, or ranks, that it runs with here."""
-
-    def adds(self, effect: EffectName) -> Adds:
-        """What an effect adds to what it does."""
-
-    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
-        """What runs in every step, in the order in which it does."""
+        """Return the number of threads, or ranks, that it runs with here."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Largest stable time step [s] of a scene.
+        """Return the largest stable time step [s]; articulated where barbs may turn, or have turned before."""
 
-        Args:
-            scene: the scene.
-            articulated: whether barbs may turn, or have turned before.
-        """
-
-    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
-        """Wall seconds that a simulated second costs, one core, about.
-
-        Args:
-            scene: the scene.
-            time_step: [s].
-            doing: what the smarticles do.
-        """
+    def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
+        """Estimate the wall seconds that a simulated second costs on one core, with a time step [s]."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
-        """A simulation of a scene, empty, with a time step [s] of its phases with motors that is not checked."""
+        """Build an empty simulation; the time step [s] is that of phases with motors and is not checked."""
 
 
 def engine_kind(name: str) -> EngineKind:
-    """The engine that a scene names.
+    """Return the engine that a scene names.
 
     Raises:
         InputError: there is none of that name.
     """
-    # Imported when asked for: a scene on one engine needs nothing of the other.
+    # Imported when asked for: a scene on one engine needs nothing of the others.
     if name == "yade":
         from dem.engine.yade.kind import YadeKind  # noqa: PLC0415
 

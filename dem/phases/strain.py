@@ -14,7 +14,7 @@ from dem.phases.arrange import chain_of
 from dem.phases.gaits.actuated import ActuatedPhase, Actuating
 from dem.phases.gaits.drive import Drive, Gait, drive
 from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 from dem.setting.motion import Hold
 from dem.setting.motor import Motor
 from dem.setting.part import Length, Part, Speed, Stiffness

@@ -1,4 +1,4 @@
-"""The law of contact: linear spring, dashpot and Coulomb friction, and what restitution makes of them."""
+"""Laws of contact and of strings: spring, dashpot and Coulomb friction, and the dashpot of a restitution."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ContactLaw:
 
 
 def typical_effective_mass(particle: Particle) -> float:
-    """Harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
+    """Return the harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
 
     The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace.
     """
@@ -47,7 +47,7 @@ def typical_effective_mass(particle: Particle) -> float:
 
 
 def restitution_of(damping_ratio: float) -> float:
-    """Restitution [1] of a linear spring and dashpot that never pulls.
+    """Return the restitution [1] of a linear spring and dashpot that never pulls.
 
     The contact ends when its force is zero, before the spring is back at zero length.
 
@@ -65,20 +65,14 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 def damping_ratio(restitution: float) -> float:
-    """Damping ratio ζ [1] of a contact with the given restitution, the inverse of `restitution_of`."""
+    """Return the damping ratio ζ [1] of a contact with a restitution, the inverse of `restitution_of`."""
     if restitution == 1:
         return 0.0
     return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
 
 
 def contact_law(particle: Particle, contact: Contact, stiffness: float) -> ContactLaw:
-    """The contact law of a scene; restitution holds at the typical effective mass of a pair.
-
-    Args:
-        particle: one smarticle.
-        contact: friction and restitution.
-        stiffness: kn of one contact [N/m].
-    """
+    """Return the contact law of a stiffness kn [N/m]; restitution holds at the typical effective mass of a pair."""
     single = typical_effective_mass(particle)
     zeta = damping_ratio(contact.restitution)
     return ContactLaw(
@@ -90,3 +84,23 @@ def contact_law(particle: Particle, contact: Contact, stiffness: float) -> Conta
         friction=contact.friction_smarticle,
         wall_friction=contact.friction_wall,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StringLaw:
+    """A string: a spring with a dashpot that pulls and never pushes.
+
+    Args:
+        length: unstretched [m].
+        stiffness: when taut [N/m].
+        damping: when taut [N s/m].
+    """
+
+    length: float
+    stiffness: float
+    damping: float
+
+    def tension(self, length: float, rate: float) -> float:
+        """Return the tension [N] at a length [m] that grows at a rate [m/s]; 0 for a string that hangs."""
+        stretch = length - self.length
+        return max(0.0, self.stiffness * stretch + self.damping * rate) if stretch > 0 else 0.0

@@ -1,8 +1,10 @@
-"""How deep contacts are, and how far all goes: what the watchdog asks of an engine."""
+"""Overlaps of contacts and extremes of a pile, which the watchdog checks."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ APART = 0.1  # of the depth that is too deep; boundaries that have moved against
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between two boundaries that have moved apart: what gives way is the contact alone.
+    """A smarticle between two boundaries that have moved apart, so that only its contacts can give way.
 
     Args:
         smarticle: its number.
@@ -31,8 +33,8 @@ class Overlaps:
 
     Args:
         deepest: overlap of the deepest contact [m].
-        deep: (N,) bool, smarticles with a contact that is deeper than asked for.
-        elastic_energy: no less than what the springs of all contacts and hinges hold [J].
+        deep: (N,) smarticles with a contact deeper than the limit asked for.
+        elastic_energy: upper bound of what the springs of all contacts and hinges hold [J].
         held: those of the deep ones that two boundaries hold.
     """
 
@@ -44,14 +46,14 @@ class Overlaps:
 
 @dataclass(frozen=True, kw_only=True)
 class Glance:
-    """The extremes of all smarticles at one instant. What is no number is within no limit.
+    """The extremes of all smarticles at one instant; NaN is within no limit.
 
     Args:
         fastest: speed of the fastest link's centre [m/s].
         lowest: height of the lowest point that must stay inside [m].
-        highest: the same of the highest one [m].
-        widest: the farthest one's distance from the vertical axis [m].
-        gap: how far the links of a hinge are apart at most [m].
+        highest: height of the highest one [m].
+        widest: largest distance of such a point from the vertical axis [m].
+        gap: largest distance between the links of a hinge [m].
         deepest: overlap of the deepest contact [m].
         elastic_energy: as in `Overlaps` [J].
     """
@@ -63,3 +65,19 @@ class Glance:
     gap: float
     deepest: float
     elastic_energy: float
+
+
+def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
+    """Return smarticles that touch two boundaries which have moved apart by more than `least` [m].
+
+    Args:
+        touched: names of the boundaries that a smarticle touches, by its number.
+        raised: how far each boundary was raised since the start [m], by name.
+        least: distance [m].
+    """
+    return tuple(
+        Held(k, (first, second), apart)
+        for k, names in sorted(touched.items())
+        for first, second in combinations([name for name in raised if name in names], 2)
+        if (apart := abs(raised[first] - raised[second])) > least
+    )

@@ -1,99 +1,255 @@
-"""The engine and fidelity that a scene needs, from what was measured: a limit of the error, of the hours, or of both.
+"""The engine and fidelity that a scene needs, from a table of measured errors and costs.
 
-The table is the one that `smarticles accuracy` writes: what each named fidelity errs by on some scene, and how its
-processor times compare with the planned wall times. The hours are those planned for this scene, times that ratio. One
-with the knob `engine` tells of both engines, against the same reference; one with the knob `fidelity` of a single one.
+`smarticles accuracy` writes the table: the error of each named fidelity on some scene, and how its processor times
+compare with the planned wall times. The hours are those planned for this scene, times that ratio. The table's knob
+`engine` compares engines with one reference, its knob `fidelity` the fidelities of one engine.
 """
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
+from dem.engine import ENGINES
 from dem.errors import InputError
-from dem.plan.measured import FINER, FINEST, AccuracyTable, Measured
 from dem.plan.outlook import Plan, plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
+from dem.setting.fidelity import FIDELITIES, fidelities
+
+SHIPPED = Path(__file__).with_name("work_precision.csv")
+"""The table that is used unless another one is given; there only if it was measured."""
+
+QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
+"""What a limit of the error can be of: names of columns and of `--of`, and symbols."""
+
+PACKING = ("phi_0", "phi_f")
+"""Default of `--of`."""
+
+_HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
+_FINEST = (list(FIDELITIES)[-1], "converged")
+_KNOB, _VALUE, _SEEDS, _RATIO = "knob", "value", "seeds [-]", "processor time over expected wall time [-]"
+_ASPECT, _COUNT, _ACTIVITY, _VERDICT = "aspect ratio [-]", "smarticles [-]", "activity", "verdict"
+_COLUMNS = (
+    *(_KNOB, _VALUE, _SEEDS, _RATIO, _ASPECT, _COUNT, _ACTIVITY, _VERDICT),
+    *(f"{name} error{mark} [%]" for name in QUANTITIES for mark in ("", " 95 %")),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Expectation:
-    """What a fidelity is expected to bring on the scene at hand.
+class Error:
+    """A relative error.
 
     Args:
-        measured: its errors, on the scene of the table.
-        hours: wall time on this scene, on one core of the table's machine [h].
+        of: symbol of the quantity.
+        value: against the reference fidelity [1]; NaN if unknown.
+        band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
     """
 
-    measured: Measured
-    hours: float
+    of: str
+    value: float
+    band: float
+
+    def __str__(self) -> str:
+        band = f" ± {self.band:.3f}" if math.isfinite(self.band) else ", scatter unknown"
+        return f"{self.of} {self.value:+.3f}{band}"
+
+    @property
+    def size(self) -> float:
+        """Absolute value [1]; inf if unknown."""
+        return math.inf if math.isnan(self.value) else abs(self.value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """One named fidelity of an engine as the table has it.
+
+    Args:
+        errors: of the quantities asked for; `others` are those of the others.
+        seeds: how many runs it was measured with.
+        ratio: measured processor time over the planned wall time [1].
+        is_reference: whether the errors of the others are against it.
+        hours: expected wall time on the scene at hand, on one core of the table's machine [h].
+    """
+
+    fidelity: str
+    errors: tuple[Error, ...]
+    engine: str = "yade"
+    others: tuple[Error, ...] = ()
+    seeds: int
+    ratio: float
+    is_reference: bool
+    hours: float = math.nan
+
+    @property
+    def name(self) -> str:
+        """Engine and fidelity."""
+        return f"{self.fidelity} on {self.engine}"
+
+    @property
+    def worst(self) -> Error:
+        """The largest error, or one that is unknown."""
+        return max(self.errors, key=lambda error: error.size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracyTable:
+    """What was measured, and of which scene.
+
+    Args:
+        fidelities: those with finished runs, engine by engine, coarse to fine.
+        reference: name of what errors are against.
+        activity: types of phase, separated by spaces.
+    """
+
+    path: Path
+    fidelities: tuple[Measured, ...]
+    reference: str
+    aspect_ratio: float
+    count: int
+    activity: str
+
+
+def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None) -> AccuracyTable:
+    """Read a table of `smarticles accuracy`.
+
+    Args:
+        path: None: the one that ships.
+        of: keys of `QUANTITIES`, of which errors are asked for.
+        engine: the only one that may be chosen; None: any.
+
+    Raises:
+        InputError: there is none, it is another table, or it has no named fidelities.
+    """
+    file = SHIPPED if path is None else path
+    if path is None and not file.is_file():
+        msg = f"--table: no table of measured errors ships at {file}; {_HOW}"
+        raise InputError(msg)
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "not a text file"
+        msg = f"--table {file}: cannot be read ({why}); {_HOW}"
+        raise InputError(msg) from None
+    reader = csv.DictReader(line for line in lines if line and not line.startswith("#"))
+    for column in _COLUMNS:
+        if column not in (reader.fieldnames or ()):
+            msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
+            raise InputError(msg)
+    rows = list(reader)
+    named = _named_fidelities(rows)
+    try:
+        every = [_measured(*key, row, of) for key, row in named.items() if int(row[_SEEDS]) > 0]
+        knobs = {row[_KNOB] for row in named.values()}
+        references = [row for row in rows if row[_KNOB] in knobs and row[_VERDICT] == "reference"]
+        reference = next((row[_VALUE] for row in references if int(row[_SEEDS]) > 0), None)
+        if reference is None or len(every) < 2:
+            msg = f"--table {file}: has fewer than two named fidelities with runs; {_HOW}"
+            raise InputError(msg)
+        found = tuple(one for one in every if engine in (None, one.engine))
+        if not found:
+            there = ", ".join(dict.fromkeys(one.engine for one in every))
+            msg = f"--table {file}: has nothing on the engine {engine}, only on {there}; leave --engine out, or {_HOW}"
+            raise InputError(msg)
+        first = next(iter(named.values()))
+        return AccuracyTable(
+            path=file,
+            fidelities=found,
+            reference=reference,
+            aspect_ratio=float(first[_ASPECT]),
+            count=round(float(first[_COUNT])),
+            activity=first[_ACTIVITY],
+        )
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        msg = f"--table {file}: a row of knob fidelity does not hold numbers ({error}); {_HOW}"
+        raise InputError(msg) from None
+
+
+def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
+    """Rows of named fidelities by engine and name, coarse to fine.
+
+    All errors are against one reference: of the knob `engine` where the table has it, otherwise of the knob `fidelity`.
+    """
+    named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
+        # Older tables lack the column.
+        f"{row.get('engine') or 'yade'} {row[_VALUE]}": row
+        for row in rows
+        if row[_KNOB] == "fidelity"
+    }
+    keys = ((engine, name) for engine in ENGINES for name in fidelities(engine))
+    return {key: named[" ".join(key)] for key in keys if " ".join(key) in named}
+
+
+def _measured(engine: str, name: str, row: dict[str, str], of: Sequence[str]) -> Measured:
+    def number(column: str) -> float:
+        return float(row[column]) if row[column].strip() else math.nan
+
+    errors = {
+        key: Error(of=symbol, value=number(f"{key} error [%]") / 100, band=number(f"{key} error 95 % [%]") / 100)
+        for key, symbol in QUANTITIES.items()
+    }
+    ratio = number(_RATIO)
+    return Measured(
+        engine=engine,
+        fidelity=name,
+        errors=tuple(error for key, error in errors.items() if key in of),
+        others=tuple(error for key, error in errors.items() if key not in of),
+        seeds=int(row[_SEEDS]),
+        ratio=ratio if ratio > 0 else 1.0,
+        is_reference=row[_VERDICT] == "reference",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The engine and fidelity chosen.
-
-    Args:
-        planned: the plan of the scene with it, its wall times corrected by what was measured.
-        expected: what it is expected to bring.
-        why: which limit it answers.
-        notes: what is to be known about it, one line each.
-    """
+    """The engine and fidelity chosen: the scene's plan with corrected wall times, errors, reason, caveats."""
 
     planned: Plan
-    expected: Expectation
+    expected: Measured
     why: str
     notes: tuple[str, ...]
 
-    @property
-    def fidelity(self) -> str:
-        """Its name."""
-        return self.expected.measured.fidelity
-
-    @property
-    def engine(self) -> str:
-        """The engine it is on."""
-        return self.expected.measured.engine
-
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for `--json`; an unknown number is null."""
-        errors = [
-            {"of": error.of, "value": _known(error.value), "band": _known(error.band)}
-            for error in self.expected.measured.errors
-        ]
+        """Return plain data for `--json`; an unknown number is null."""
+
+        def known(number: float) -> float | None:
+            return None if math.isnan(number) else number
+
         return {
-            "engine": self.engine,
-            "fidelity": self.fidelity,
+            "engine": self.expected.engine,
+            "fidelity": self.expected.fidelity,
             "expected_hours": self.expected.hours,
-            "errors": errors,
-            "seeds": self.expected.measured.seeds,
+            "errors": [
+                {"of": error.of, "value": known(error.value), "band": known(error.band)}
+                for error in self.expected.errors
+            ],
+            "seeds": self.expected.seeds,
             "why": self.why,
             "notes": list(self.notes),
         }
 
     def to_text(self) -> str:
-        """A few lines for the terminal."""
-        measured = self.expected.measured
-        errors = "none by definition" if measured.is_reference else ", ".join(map(str, measured.errors))
+        """Return a few lines for the terminal."""
+        found = self.expected
+        errors = "none by definition" if found.is_reference else ", ".join(map(str, found.errors))
         lines = [
-            f"engine {self.engine}, fidelity {self.fidelity}: {self.why}",
-            f"expected: {self.expected.hours:.2g} h of one core, error {errors} ({measured.seeds} seeds)",
+            f"engine {found.engine}, fidelity {found.fidelity}: {self.why}",
+            f"expected: {found.hours:.2g} h of one core, error {errors} ({found.seeds} seeds)",
             *(f"note: {note}" for note in self.notes),
         ]
-        return "\n".join([*lines, f"use it: --engine {self.engine} --set fidelity={self.fidelity}"])
-
-
-def _known(number: float) -> float | None:
-    return None if math.isnan(number) else number
+        return "\n".join([*lines, f"use it: --engine {found.engine} --set fidelity={found.fidelity}"])
 
 
 def choose(
     scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
 ) -> Choice:
-    """Engine and fidelity for a scene: the cheapest within the error, else the most exact within the hours.
+    """Choose engine and fidelity for a scene: the cheapest within the error, else the most exact within the hours.
 
     Args:
         scene: the scene; its own engine and fidelity do not matter.
@@ -105,87 +261,73 @@ def choose(
         InputError: no fidelity keeps the limit, or the two contradict each other; the message says which gives way.
     """
     plans: dict[str, Plan] = {}
-    expected: list[Expectation] = []
-    refused: list[InputError] = []
+    expected: list[Measured] = []
+    rejected: list[InputError] = []
     for one in table.fidelities:
+        data = {**scene.model_dump(mode="json"), "engine": one.engine, "fidelity": one.fidelity}
         try:
-            plans[one.name] = plan(_with_fidelity(scene, one)).corrected(one.ratio)
+            planned = plan(parse_scene(data, source=f"{scene.name} at fidelity {one.name}")).corrected(one.ratio)
         except InputError as error:  # such as two rows in a section that is square
-            refused.append(error)
+            rejected.append(error)
             continue
-        expected.append(Expectation(measured=one, hours=plans[one.name].wall_s / 3600))
+        plans[one.name] = planned
+        expected.append(replace(one, hours=planned.wall_s / 3600))
     if not expected:
-        raise refused[0]
+        raise rejected[0]
     picked, why = pick(expected, max_error=max_error, max_hours=max_hours)
-    return Choice(
-        planned=plans[picked.measured.name],
-        expected=picked,
-        why=why,
-        notes=(*map(str, refused), *_notes(scene, table, picked.measured, max_error)),
-    )
+    notes = (*map(str, rejected), *_notes(scene, table, picked, max_error))
+    return Choice(planned=plans[picked.name], expected=picked, why=why, notes=notes)
 
 
-def _with_fidelity(scene: Scene, measured: Measured) -> Scene:
-    data = {**scene.model_dump(mode="json"), "engine": measured.engine, "fidelity": measured.fidelity}
-    return parse_scene(data, source=f"{scene.name} at fidelity {measured.name}")
-
-
-def pick(
-    expected: Sequence[Expectation], *, max_error: float | None, max_hours: float | None
-) -> tuple[Expectation, str]:
-    """What keeps the limits, and in words which one; arguments and errors as `choose`, fidelities coarse to fine.
+def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
+    """Return one of some fidelities, coarse to fine, that keeps the limits of `choose`, and in words which limit.
 
     Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
     engines' finest the one whose error is known and least.
+
+    Raises:
+        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:
         if quick:
-            return _most_exact(quick), f"the most exact within --max-hours {max_hours:g}"
+            finest = {one.engine: one for one in quick}.values()
+            exact = min(finest, key=lambda one: (not one.is_reference, one.worst.size))
+            return exact, f"the most exact within --max-hours {max_hours:g}"
         least = min(expected, key=lambda one: one.hours)
         msg = (
-            f"--max-hours {max_hours:g}: even {least.measured.name} is expected to take {least.hours:.2g} h; "
+            f"--max-hours {max_hours:g}: even {least.name} is expected to take {least.hours:.2g} h; "
             f"give --max-hours {_above(least.hours)} or a smaller scene"
         )
         raise InputError(msg)
-    exact = [one for one in expected if abs(one.measured.worst.value) <= max_error]
-    if not exact:
-        known = [one for one in expected if not math.isnan(one.measured.worst.value)]
-        best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
+    within = [one for one in expected if one.worst.size <= max_error]
+    if not within:
+        best = min(expected, key=lambda one: one.worst.size)
         msg = (
             f"--max-error {max_error:g}: no fidelity of the table is known to be within; the best is {best.name}, "
-            f"{best.worst}; give --max-error {_above(abs(best.worst.value))} or a table with finished reference runs"
+            f"{best.worst}; give --max-error {_above(best.worst.size)} or a table with finished reference runs"
         )
         raise InputError(msg)
-    need = min(exact, key=lambda one: one.hours)
+    need = min(within, key=lambda one: one.hours)
     if max_hours is None or need.hours <= max_hours:
         limits = f"--max-error {max_error:g}" + ("" if max_hours is None else f" and --max-hours {max_hours:g}")
         return need, f"the cheapest within {limits}"
     msg = (
-        f"--max-error {max_error:g} and --max-hours {max_hours:g} contradict each other: {need.measured.name}, the "
+        f"--max-error {max_error:g} and --max-hours {max_hours:g} contradict each other: {need.name}, the "
         f"cheapest within the error, is expected to take {need.hours:.2g} h; accuracy goes first, so the hours give "
         f"way: --max-hours {_above(need.hours)}"
     )
-    known = [one for one in quick if not math.isnan(one.measured.worst.value)]
+    known = [one for one in quick if math.isfinite(one.worst.size)]
     if known:
-        best = min(known, key=lambda one: abs(one.measured.worst.value)).measured
-        msg += f"; or accept {best.name} ({best.worst}) with --max-error {_above(abs(best.worst.value))}"
+        best = min(known, key=lambda one: one.worst.size)
+        msg += f"; or accept {best.name} ({best.worst}) with --max-error {_above(best.worst.size)}"
     raise InputError(msg)
-
-
-def _most_exact(able: Sequence[Expectation]) -> Expectation:
-    finest = {one.measured.engine: one for one in able}.values()
-    return min(finest, key=lambda one: (not one.measured.is_reference, _or_inf(abs(one.measured.worst.value))))
-
-
-def _or_inf(number: float) -> float:
-    return math.inf if math.isnan(number) else number
 
 
 def _above(number: float) -> str:
     """A number rounded up to two digits."""
-    if number <= 0:
-        return "0"
+    if number <= 0 or math.isinf(number):
+        return f"{max(0.0, number):g}"
     unit = 10.0 ** (math.floor(math.log10(number)) - 1)
     return f"{math.ceil(number / unit - 1e-9) * unit:.3g}"
 
@@ -204,19 +346,16 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
                 f"not assured: the scatter of {measured.seeds} seeds allows an error up to {max(bounds):.2g}, more "
                 f"than --max-error {max_error:g}; measure with more seeds"
             )
-    if not table.reference.endswith((FINEST, FINER)):
-        notes.append(f"errors are against {table.reference}: the table has no finished runs of {FINEST}")
+    if not table.reference.endswith(_FINEST):
+        notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
+    kinds = dict.fromkeys(phase.type for phase in scene.phases)
+    activity = " ".join(kind for kind in kinds if kind not in ("deposit", "take-over", "relax"))
     here = {
         "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),
-        "activity": (_activity(scene), table.activity),
+        "activity": (activity, table.activity),
     }
     for name, (own, there) in here.items():
         if own != there:
             notes.append(f"errors were measured at {name} {there}, this scene has {own or 'none'}")
     return (*notes, f"table: {table.path}")
-
-
-def _activity(scene: Scene) -> str:
-    kinds = dict.fromkeys(phase.type for phase in scene.phases)
-    return " ".join(kind for kind in kinds if kind not in ("deposit", "take-over", "relax"))

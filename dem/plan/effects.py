@@ -1,17 +1,18 @@
-"""The effects that a scene may call for: for each one whether a scene does, why, and what it adds to a run.
+"""Which effects a scene calls for, why, and what each adds to a run.
 
-This is the one place that knows, together with the engine, which is asked what an effect adds to it. `dem.plan.outlook`
-prints it, `dem.run` makes a run from it, and tests hold an engine's own lists and the files of runs against it.
+`dem.plan.outlook` prints this, `dem.run` makes a run from it, and tests compare it with an engine's own lists and the
+files of runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dem.engine.effect import Adds, EffectName
-from dem.engine.kinds import EngineKind, engine_kind
-from dem.plan import calls
+from dem.engine.kinds import engine_kind
+from dem.phases.arrange import chain_of
+from dem.phases.gaits.checks import overshoot
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
@@ -24,32 +25,47 @@ from dem.record.columns import (
 )
 from dem.scene.scene import Scene
 
-Rule = Callable[[Scene], tuple[bool, str]]
-"""Whether a scene calls for an effect, and why."""
-
-
 _NOTHING = Adds()
 
-
-@dataclass(frozen=True, kw_only=True)
-class Effect:
-    """One effect, for all scenes.
-
-    Args:
-        name: which one.
-        rule: whether a scene calls for it, and why.
-        adds: what it adds where a scene does, whatever the engine.
-    """
-
-    name: EffectName
-    rule: Rule
-    adds: Adds = _NOTHING
-
-    def decided(self, scene: Scene, kind: EngineKind) -> Decision:
-        """What it comes to in a scene on an engine."""
-        on, why = self.rule(scene)
-        adds = Adds.together((kind.adds(self.name), self.adds)) if on else _NOTHING
-        return Decision(self.name, on, why, adds)
+ADDS: Mapping[EffectName, Adds] = {
+    EffectName.STRINGS: Adds(series=tuple(STRAIN_COLUMNS)),
+    EffectName.MOTORS: Adds(
+        series=tuple(MOTOR_COLUMNS), arrays=("angle_rad", "motor_torque_N_m", "motor_work_J", "halted")
+    ),
+    EffectName.HOOKS: Adds(series=tuple(HOOK_COLUMNS)),
+    EffectName.WALL_REMOVAL: Adds(
+        series=tuple(RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
+    ),
+    EffectName.ENERGIES: Adds(series=tuple(ENERGY_COLUMNS)),
+    EffectName.ENERGY_ACCOUNT: Adds(series=tuple(LEDGER_COLUMNS)),
+    EffectName.SERIES: Adds(
+        series=tuple(COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
+    ),
+    EffectName.FRAMES: Adds(
+        arrays=(
+            "smarticle_id",
+            "link",
+            "velocity_m_per_s",
+            "angular_velocity_rad_per_s",
+            "contacts",
+            "time_s",
+            "floor_z_m",
+            "phase",
+        ),
+        files=("frames.pvd", "frames"),
+        python="reads all contacts and writes one file per frame",
+    ),
+    EffectName.CONTACT_FORCES: Adds(
+        arrays=tuple(FORCE_FIELDS),
+        files=("forces.pvd", "forces"),
+        python="reads the forces of all contacts and writes one file per frame",
+    ),
+    EffectName.SPHERE_GLYPHS: Adds(
+        files=("spheres.pvd", "spheres"), python="writes one file per interval, a point per sphere"
+    ),
+    EffectName.CHECKPOINTS: Adds(files=("checkpoint.zip", "checkpoint.previous.zip")),
+}
+"""What effects add on every engine; `EngineKind.adds` has what they add on one."""
 
 
 @dataclass(frozen=True)
@@ -63,88 +79,109 @@ class Decision:
 
 
 def decide(scene: Scene) -> tuple[Decision, ...]:
-    """All effects of a scene on its engine, on or off."""
-    kind = engine_kind(scene.engine)
-    return tuple(effect.decided(scene, kind) for effect in EFFECTS)
+    """Return all effects of a scene on its engine, on or off."""
+    own, reasons = engine_kind(scene.engine).adds, _reasons(scene)
+    return tuple(
+        Decision(name, on, why, Adds.together((own.get(name, _NOTHING), ADDS.get(name, _NOTHING))) if on else _NOTHING)
+        for name, (on, why) in ((name, reasons[name]) for name in EffectName)
+    )
 
 
-def called_for(scene: Scene, name: EffectName) -> bool:
-    """Whether a scene calls for an effect."""
-    return next(effect for effect in EFFECTS if effect.name is name).rule(scene)[0]
+def called_for(scene: Scene) -> frozenset[EffectName]:
+    """Return the effects that a scene calls for."""
+    return frozenset(name for name, (on, _) in _reasons(scene).items() if on)
 
 
-EFFECTS = (
-    Effect(
-        name=EffectName.CONTACT,
-        rule=lambda _: (True, "every scene has smarticles that touch each other and a floor"),
-    ),
-    Effect(name=EffectName.CONTAINER, rule=calls.container),
-    Effect(name=EffectName.PLANE, rule=calls.plane),
-    Effect(name=EffectName.STRINGS, rule=calls.strings, adds=Adds(series=tuple(STRAIN_COLUMNS))),
-    Effect(name=EffectName.GRAVITY, rule=calls.gravity),
-    Effect(name=EffectName.FRICTION, rule=calls.friction),
-    Effect(name=EffectName.RESTITUTION, rule=calls.restitution),
-    Effect(name=EffectName.CONTAINER_MOTION, rule=calls.container_motion),
-    Effect(name=EffectName.ARTICULATION, rule=calls.articulation),
-    Effect(
-        name=EffectName.MOTORS,
-        rule=calls.motors,
-        adds=Adds(
-            series=tuple(MOTOR_COLUMNS),
-            arrays=("angle_rad", "motor_torque_N_m", "motor_work_J", "halted"),
+def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
+    """Whether a scene calls for each effect, and why."""
+    contact, plane, gravity = scene.contact, scene.plane, scene.gravity_m_per_s2
+    recording = scene.recording
+    by_phases: dict[EffectName, list[str]] = {}
+    for index, phase in enumerate(scene.phases):
+        for name, why in phase.calls(scene, index).items():
+            by_phases.setdefault(name, []).append(why)
+
+    def phases(name: EffectName, otherwise: str) -> tuple[bool, str]:
+        return name in by_phases, ", ".join(by_phases.get(name, [])) or otherwise
+
+    def every(key: str, what: str) -> tuple[bool, str]:
+        interval = getattr(recording, key)
+        return interval is not None, f"recording.{key} is null" if interval is None else f"{what} every {interval:g} s"
+
+    checked, each = every("checkpoint_interval_s", "one")
+    energies = f"recording.energy is {str(recording.energy).lower()}"
+    if recording.energies and not recording.energy:
+        energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
+    return {
+        EffectName.CONTACT: (True, "every scene has smarticles that touch each other and a floor"),
+        EffectName.CONTAINER: (True, f"a wall {1e3 * scene.cylinder.height:.0f} mm high")
+        if plane is None
+        else (False, "key plane: a table, and walls if it says so"),
+        EffectName.PLANE: _plane(scene),
+        EffectName.STRINGS: phases(EffectName.STRINGS, "no phase of type strain"),
+        EffectName.GRAVITY: (
+            gravity > 0,
+            f"g = {gravity:g} m/s²" if plane is None else "the table carries it, and nothing moves along it",
         ),
-    ),
-    Effect(name=EffectName.TORQUE_CAP, rule=calls.torque_cap),
-    Effect(name=EffectName.HOOKS, rule=calls.hooks, adds=Adds(series=tuple(HOOK_COLUMNS))),
-    Effect(
-        name=EffectName.WALL_REMOVAL,
-        rule=calls.wall_removal,
-        adds=Adds(series=tuple(RELEASE_COLUMNS), python="looks at the pile's top every 10 ms while the wall is lifted"),
-    ),
-    Effect(name=EffectName.ENERGIES, rule=calls.energies, adds=Adds(series=tuple(ENERGY_COLUMNS))),
-    Effect(name=EffectName.ENERGY_ACCOUNT, rule=calls.energy_account, adds=Adds(series=tuple(LEDGER_COLUMNS))),
-    Effect(
-        name=EffectName.SERIES,
-        rule=calls.series,
-        adds=Adds(
-            series=tuple(COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
+        EffectName.FRICTION: (
+            contact.friction_smarticle > 0 or contact.friction_wall > 0,
+            f"μ = {contact.friction_smarticle:g} between smarticles, {contact.friction_wall:g} at the container",
         ),
-    ),
-    Effect(
-        name=EffectName.FRAMES,
-        rule=calls.frames,
-        adds=Adds(
-            arrays=(
-                "smarticle_id",
-                "link",
-                "velocity_m_per_s",
-                "angular_velocity_rad_per_s",
-                "contacts",
-                "time_s",
-                "floor_z_m",
-                "phase",
-            ),
-            files=("frames.pvd", "frames"),
-            python="reads all contacts and writes one file per frame",
+        EffectName.RESTITUTION: (contact.restitution < 1, f"restitution {contact.restitution:g} at a typical lever"),
+        EffectName.CONTAINER_MOTION: phases(EffectName.CONTAINER_MOTION, "no phase of type shake"),
+        **_motors(scene, by_phases.get(EffectName.ARTICULATION, [])),
+        EffectName.HOOKS: _hooks(scene, ", ".join(by_phases.get(EffectName.HOOKS, []))),
+        EffectName.WALL_REMOVAL: phases(EffectName.WALL_REMOVAL, "no phase of type remove-container"),
+        EffectName.ENERGIES: (recording.energies, energies),
+        EffectName.ENERGY_ACCOUNT: every("dissipation_interval_s", "dissipation is sampled"),
+        EffectName.SERIES: every("series_interval_s", "a sample"),
+        EffectName.FRAMES: every("frame_interval_s", "a frame"),
+        EffectName.CONTACT_FORCES: (
+            recording.contact_forces,
+            "with each frame" if recording.contact_forces else "recording.contact_forces is false",
         ),
-    ),
-    Effect(
-        name=EffectName.CONTACT_FORCES,
-        rule=calls.contact_forces,
-        adds=Adds(
-            arrays=tuple(FORCE_FIELDS),
-            files=("forces.pvd", "forces"),
-            python="reads the forces of all contacts and writes one file per frame",
+        EffectName.SPHERE_GLYPHS: every("sphere_interval_s", "all spheres"),
+        EffectName.CHECKPOINTS: (checked, f"{each}; a killed run goes on from the last one" if checked else each),
+    }
+
+
+def _plane(scene: Scene) -> tuple[bool, str]:
+    if scene.plane is None:
+        return False, "no key plane"
+    width, walls = scene.plane.width_m, "no walls"
+    if width is not None:
+        walls = f"two walls {1e3 * width:.3g} mm apart, h/H = {chain_of(scene).width / width:.3g}"
+    return True, f"smarticles move along x and y and turn about z; {walls}; the table carries them and does not rub"
+
+
+def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, str]]:
+    if not scene.actuates:
+        off = (False, "no phase actuates")
+        welded = (False, f"{off[1]}; each smarticle is one welded clump")
+        return {EffectName.ARTICULATION: welded, EffectName.MOTORS: off, EffectName.TORQUE_CAP: off}
+    motor, fidelity, share = scene.motor, scene.fidelity, overshoot(scene)
+    beyond = f", exceeded by up to {share:.2g} τ_max between control updates" if share else ""
+    return {
+        EffectName.ARTICULATION: (
+            True,
+            f"phase{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: three links and two hinges per smarticle, "
+            f"pins of {fidelity.hinge_stiffness_N_per_m:g} N/m; welded in the others",
         ),
-    ),
-    Effect(
-        name=EffectName.SPHERE_GLYPHS,
-        rule=calls.sphere_glyphs,
-        adds=Adds(files=("spheres.pvd", "spheres"), python="writes one file per interval, a point per sphere"),
-    ),
-    Effect(
-        name=EffectName.CHECKPOINTS,
-        rule=calls.checkpoints,
-        adds=Adds(files=("checkpoint.zip", "checkpoint.previous.zip")),
-    ),
-)
+        EffectName.MOTORS: (
+            True,
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, a control update every {fidelity.control_interval_s:g} s",
+        ),
+        EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
+    }
+
+
+def _hooks(scene: Scene, pulls: str) -> tuple[bool, str]:
+    hooks = scene.hooks
+    if hooks is None:
+        return False, "no key hooks"
+    grid = f", the lower one of {hooks.lower_bars} each way over {1e3 * hooks.lower_length_m:.3g} mm"
+    return (
+        True,
+        f"crosses at {1e3 * hooks.lower_height_m:.3g} and {1e3 * hooks.upper_height_m:.3g} mm, bars of "
+        f"{1e3 * hooks.side_m:.3g} mm{grid if hooks.lower_bars > 1 else ''}; {pulls or 'no phase pulls one'}",
+    )

@@ -1,19 +1,30 @@
-"""What a run would do: phases, effects and why each is on or off, engines, time step, cost. Simulates nothing."""
+"""What a run would do: phases, effects and why each is on or off, engines, time step, cost, warnings."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
-from dem.engine.doing import Doing
+from dem.engine.demand import Activity
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
-from dem.plan.advice import expected_overlaps, warnings_of
+from dem.phases.shake import Shake
+from dem.physics.contact import typical_effective_mass
 from dem.plan.effects import Decision, decide
-from dem.plan.protocol import protocol_lines
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
+from dem.setting.fidelity import Fidelity, fidelities
+from dem.setting.protocol import PARTS, PROTOCOLS, leaves_alone
+
+# Diameters: overlaps above the one cause a warning, contacts are linear up to the other.
+SOFT, LINEAR = 0.5, 0.25
+_LEFT_OUT = {
+    "series_interval_s": "one sample is taken, at the start",
+    "frame_interval_s": "no frame is written",
+    "sphere_interval_s": "no spheres are written",
+}
 
 
 @dataclass(frozen=True)
@@ -30,12 +41,7 @@ class PlannedPhase:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything `smarticles plan` says.
-
-    `strands` are those of a link where the engine takes links as they are, 0 where it fills them with spheres;
-    `correction` is the factor that wall times have been corrected by; `protocol` are lines of what the scene has by its
-    protocol.
-    """
+    """Everything that `smarticles plan` prints."""
 
     name: str
     count: int
@@ -55,29 +61,32 @@ class Plan:
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
     strands: int = 0
+    """Of a link, where the engine takes links as they are; 0 where it fills them with spheres."""
     correction: float = 1.0
+    """Factor that wall times have been corrected by."""
     protocol: tuple[str, ...] = ()
+    """Lines of what the scene has by its protocol."""
     overlap_impact: float = 0.0
     """Of the hardest impact, estimated, in diameters [1]."""
     overlap_weight: float = 0.0
     """Under the pile's weight, estimated, in diameters [1]."""
 
     def corrected(self, factor: float) -> Self:
-        """The same plan with wall times `factor` times as long [1], as measured on a scene of the same fidelity."""
+        """Return this plan with wall times `factor` times as long [1]."""
         phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
         return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for `--json`."""
+        """Return plain data for `--json`."""
         return asdict(self)
 
     def to_text(self) -> str:
-        """A table for the terminal."""
+        """Return a table for the terminal."""
         corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
+        section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
-            f"{self.name}: {self.count} smarticles of {self._section_to_text()}, "
-            f"d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
+            f"{self.name}: {self.count} smarticles of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
             *self.protocol,
             self._steps_to_text(),
@@ -89,9 +98,9 @@ class Plan:
         for phase in self.phases:
             guess = "" if phase.duration_s is not None else "≈ "
             label = f"{phase.index} {phase.type}"
-            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_told(phase.wall_s):>22}")
+            lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_wall_time(phase.wall_s):>22}")
         lines += [
-            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_told(self.wall_s):>22}",
+            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_wall_time(self.wall_s):>22}",
             f"(one core{corrected}; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why, and what it adds",
@@ -103,54 +112,37 @@ class Plan:
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
-    def _section_to_text(self) -> str:
-        if not self.strands:
-            return f"{self.spheres_per_smarticle} spheres"
-        return f"smooth links of {self.strands} strand{'' if self.strands == 1 else 's'}"
+    @property
+    def _strands(self) -> str:
+        return f"{self.strands} strand{'' if self.strands == 1 else 's'}"
 
     def _engine_to_text(self) -> list[str]:
-        """What is different on an engine that is not the usual one."""
-        idle = engine_kind(self.engine).idle_knobs
+        """What differs on an engine other than YADE: knobs without meaning, and the fidelity of links."""
+        idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
-            told = f"engine {self.engine}: {', '.join(idle)} have no meaning here"
-            return [told] if idle else []
-        return [
-            f"engine {self.engine}: fidelity.rows are strands; {', '.join(idle)} have no meaning here",
-            f"fidelity {self._fidelity_to_text()}",
-        ]
-
-    def _fidelity_to_text(self) -> str:
-        """The knobs of a fidelity, and by what they differ from its name."""
+            return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
         named = fidelities(self.engine)[self.fidelity]
-        shares = f"time step {self.time_step_s / self.stable_time_step_s:.2g} of the stable one"
-        told = f"{self.strands} strand{'' if self.strands == 1 else 's'}, {self.stiffness_N_per_m:g} N/m, {shares}"
-        same = (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"])
         usual = f" (by name {named['rows']}, {named['stiffness_N_per_m']:g} N/m)"
-        return f"{self.fidelity}: {told}{'' if same else usual}"
+        if (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"]):
+            usual = ""
+        return [
+            f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
+            f"fidelity {self.fidelity}: {self._strands}, {self.stiffness_N_per_m:g} N/m, time step "
+            f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
+        ]
 
     def _steps_to_text(self) -> str:
         first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
-        told = f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
-        return f"{told} from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else told
+        longest = f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
+        return f"{longest} from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else longest
 
 
-def _told(wall: float) -> str:
-    """A wall time for a person: in the unit in which it is a number of two or three digits."""
+def _wall_time(wall: float) -> str:
+    """A wall time in the unit in which it has two or three digits."""
     for most, unit, name, form in ((10, 1, "s", ".1f"), (600, 1, "s", ".0f"), (7200, 60, "min", ".0f")):
         if wall < most:
             return f"{wall / unit:{form}} {name}"
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
-
-
-def _doing(scene: Scene, index: int) -> Doing:
-    """What smarticles do in a phase, as far as its cost goes."""
-    phase = scene.phases[index]
-    if phase.pours:
-        return Doing.POUR
-    if phase.actuates:
-        return Doing.ACTUATE
-    shaken = EffectName.CONTAINER_MOTION in phase.calls(scene, index)
-    return Doing.SHAKE if shaken else Doing.REST
 
 
 def plan(scene: Scene) -> Plan:
@@ -162,35 +154,138 @@ def plan(scene: Scene) -> Plan:
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
     particle = scene.particle
-    spheres = len(particle.centres)
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
-        wall = kind.seconds_per_second(scene, dt, _doing(scene, index)) * estimate
+        wall = kind.seconds_per_second(scene, dt, _activity(scene, index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
-    simulated = sum(phase.estimate_s for phase in phases)
     effects = decide(scene)
     impact, weight = expected_overlaps(scene)
+    engines = Adds.together(effect.adds for effect in effects).engines
     return Plan(
         name=scene.name,
         count=scene.count,
-        spheres_per_smarticle=spheres,
+        spheres_per_smarticle=len(particle.centres),
         sphere_diameter_m=particle.chain.diameter,
         time_step_s=min(steps),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
         phases=tuple(phases),
         effects=effects,
-        engines=kind.in_order(Adds.together(effect.adds for effect in effects).engines),
-        frames=round(simulated / scene.recording.frame_interval_s),
+        engines=tuple(sorted(engines, key=kind.order.index)),
+        frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
         engine=scene.engine,
         fidelity=scene.fidelity.base,
-        overlap_impact=impact / particle.chain.diameter,
-        overlap_weight=weight / particle.chain.diameter,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
+        overlap_impact=impact / particle.chain.diameter,
+        overlap_weight=weight / particle.chain.diameter,
     )
+
+
+def _activity(scene: Scene, index: int) -> Activity:
+    phase = scene.phases[index]
+    if phase.pours:
+        return Activity.POUR
+    if phase.actuates:
+        return Activity.ACTUATE
+    return Activity.SHAKE if EffectName.CONTAINER_MOTION in phase.calls(scene, index) else Activity.REST
+
+
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """Return all warnings of a scene, for `plan` and the beginning of a run: what, where, value with unit, way out."""
+    of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
+    # Several phases may give the warning about one thing.
+    return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene), *stiffness_warnings(scene))
+
+
+def expected_overlaps(scene: Scene) -> tuple[float, float]:
+    """Estimate overlaps [m]: of an impact at the scene's greatest speed on one contact, and under the pile's weight.
+
+    The impact is that of `typical_effective_mass` after a fall by w, at the greatest speed that a phase gives besides.
+    The weight, times 1 + Γ, is borne by as many contacts as smarticles can lie on the floor.
+    """
+    gravity, width, boxes = scene.gravity_m_per_s2, scene.smarticle.middle_length_m, scene.smarticle.boxes
+    stiffness = scene.fidelity.stiffness_N_per_m
+    given = max(phase.peak_speed(gravity) for phase in scene.phases)
+    speed = math.sqrt(given**2 + 2 * gravity * width)
+    shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
+    bearing = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
+    weight = scene.count * boxes.mass * gravity * (1 + shaken) / bearing
+    return speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness), weight / stiffness
+
+
+def stiffness_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of contacts that are likely to be deeper than half a diameter, with the stiffness that they need."""
+    diameter = scene.sphere_diameter
+    impact, weight = (depth / diameter for depth in expected_overlaps(scene))
+    if max(impact, weight) <= SOFT:
+        return ()
+    # The overlap of an impact falls with the root of the stiffness.
+    factor = max((impact / LINEAR) ** 2, weight / LINEAR)
+    cause = "the hardest impact" if impact > weight else "the pile's weight"
+    return (
+        f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {cause} presses contacts in by about "
+        f"{max(impact, weight):.2g} of their thickness; use about {factor * scene.fidelity.stiffness_N_per_m:.2g} N/m "
+        f"for {LINEAR:g} of it",
+    )
+
+
+def engine_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
+    fidelity = scene.fidelity
+    named = fidelities(scene.engine)[fidelity.base]
+    usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
+    idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
+    if not idle:
+        return ()
+    mean = "has no meaning" if len(idle) == 1 else "have no meaning"
+    return (f"fidelity: {', '.join(idle)} {mean} on the engine {scene.engine}; leave out what does nothing",)
+
+
+def recording_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warn of intervals of recording that are longer than the run."""
+    known = all(phase.known_duration is not None for phase in scene.phases)
+    length = sum(phase.expected_duration(scene.count) for phase in scene.phases)
+    run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
+    intervals = {key: getattr(scene.recording, key) for key in _LEFT_OUT}
+    return tuple(
+        f"recording.{key}: {interval:g} s is longer than {run}, so that {_LEFT_OUT[key]}; shorten it, or lengthen "
+        "the run"
+        for key, interval in intervals.items()
+        if interval is not None and interval > length
+    )
+
+
+def protocol_lines(scene: Scene) -> tuple[str, ...]:
+    """Return a line of what a scene has by its protocol, and one of its deviations; none without a protocol."""
+    if scene.protocol is None:
+        return ()
+    kept, other = [], []
+    for key, value, says in _protocol_keys(scene, PROTOCOLS[scene.protocol]):
+        if value == says:
+            kept.append(f"{key} {_word(value)}")
+        else:
+            other.append(f"{key} is {_word(value)} here, not {_word(says)}")
+    lines = [f"protocol {scene.protocol}: {', '.join(kept) or 'nothing of it is left'}"]
+    return (*lines, f"  the scene says otherwise: {', '.join(other)}") if other else tuple(lines)
+
+
+def _protocol_keys(scene: Scene, says: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
+    """Key, the scene's value, and the protocol's, of all keys of the protocol."""
+    for part in PARTS:
+        if leaves_alone(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
+            continue
+        for key, value in says[part].items():
+            yield f"{part}.{key}", getattr(getattr(scene, part), key), value
+    for index, phase in enumerate(scene.phases):
+        for key, value in says.get(phase.kind, {}).items():
+            yield f"phases.{index}.{key}", getattr(phase, key), value
+
+
+def _word(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else "null" if value is None else str(value)

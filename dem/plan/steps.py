@@ -1,4 +1,4 @@
-"""The time step of each phase: from what the engine calls stable, and from intervals that it has to divide."""
+"""The time step of each phase: from the engine's stable step, and from intervals that it has to divide."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ MOST_PER_STEP = 0.05
 
 
 def stable_step(scene: Scene) -> float:
-    """Largest stable time step [s] of a scene on its engine, articulated where a phase actuates."""
+    """Return the largest stable time step [s] of a scene on its engine, articulated where a phase actuates."""
     return engine_kind(scene.engine).stable_step(scene, articulated=scene.actuates)
 
 
 def time_step(scene: Scene) -> float:
-    """The time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
+    """Return the time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
 
     Raises:
         InputError: the given `time_step_s` is above the stable one, the recording intervals do not fit, or a phase
@@ -50,12 +50,11 @@ def time_step(scene: Scene) -> float:
 
 
 def time_steps(scene: Scene) -> tuple[float, ...]:
-    """The time step [s] of each phase.
+    """Return the time step [s] of each phase.
 
-    Until motors act for the first time, smarticles are the rigid bodies that were poured, which hinges do not concern:
-    these phases have the step of a scene without motors, and so the same bits. After that a welded smarticle has
-    whatever shape its motors left it in, for which no longer step than that of the hinges is known to be stable. A
-    step given by hand is that of all phases.
+    Until motors act for the first time, smarticles are the rigid bodies that were poured, and phases have the step, and
+    so the bits, of a scene without motors. After that a welded smarticle has the shape in which its motors left it, for
+    which no longer step than that of the hinges is known to be stable. A given step is that of all phases.
 
     Raises:
         InputError: as in `time_step`, or something moves too fast for the step of its phase.
@@ -73,12 +72,12 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
 
 
 def _steps_in(interval: float, wanted: float) -> int:
-    """How many equal time steps an interval has, of at most the length that is wanted [s]."""
+    """Number of equal time steps of an interval, of at most the wanted length [s]."""
     return max(1, math.ceil(interval / wanted * (1 - 1e-12)))
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Refuse speeds of walls, hooks and strings that pass through smarticles before a contact can push them away."""
+    """Reject speeds of walls, hooks and strings that pass through smarticles before a contact can push them away."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step

@@ -50,7 +50,8 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     recording = scene.recording
     # No one radius gives the volume of a mould of tiers.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius
-    sampler = Sampler(radius, {effect for effect in EffectName if called_for(scene, effect)})
+    effects = called_for(scene)
+    sampler = Sampler(radius, effects)
     return Recorder(
         sampler=sampler,
         series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
@@ -60,8 +61,8 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
         progress=progress,
         interval=recording.series_interval_s,
         frame_every=recording.samples_in(recording.frame_interval_s),
-        forces=FrameWriter(out, FORCE) if called_for(scene, EffectName.CONTACT_FORCES) else None,
-        spheres=FrameWriter(out, SPHERE) if called_for(scene, EffectName.SPHERE_GLYPHS) else None,
+        forces=FrameWriter(out, FORCE) if EffectName.CONTACT_FORCES in effects else None,
+        spheres=FrameWriter(out, SPHERE) if EffectName.SPHERE_GLYPHS in effects else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
-from dem.plan.advice import warnings_of
+from dem.plan.outlook import warnings_of
 from dem.record.checkpoint import has_checkpoint, read_checkpoint
 from dem.record.document import Done, Ended, Failed, Manifest, Phase
 from dem.record.files import write_text

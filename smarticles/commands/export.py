@@ -87,7 +87,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def _export_scene(arguments: argparse.Namespace) -> int:
-    from dem.deck.lammps import DECK, write_deck  # noqa: PLC0415
+    from dem.deck import DECK, write_deck  # noqa: PLC0415
     from smarticles.scenes import read_scene  # noqa: PLC0415
 
     scene: Path = arguments.directory

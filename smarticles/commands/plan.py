@@ -77,8 +77,12 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     """The fidelity that --max-error and --max-hours ask for; None without them."""
-    from dem.plan.choice import choose  # noqa: PLC0415
-    from dem.plan.measured import PACKING, QUANTITIES, read_table  # noqa: PLC0415
+    from dem.plan.choice import (  # noqa: PLC0415
+        PACKING,
+        QUANTITIES,
+        choose,
+        read_table,
+    )
 
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):

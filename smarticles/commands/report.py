@@ -67,7 +67,7 @@ def _refuse_what_is_no_table(table: Path | None) -> None:
     """
     if table is None:
         return
-    from dem.plan.measured import QUANTITIES, read_table  # noqa: PLC0415
+    from dem.plan.choice import QUANTITIES, read_table  # noqa: PLC0415
 
     try:
         read_table(table, of=tuple(QUANTITIES))

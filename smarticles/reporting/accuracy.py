@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from dem.plan.measured import QUANTITIES, Error, read_table
+from dem.plan.choice import QUANTITIES, Error, read_table
 from dem.setting.fidelity import fidelities
 from smarticles.reporting.page import Block, Table, Words
 from smarticles.reporting.tables import word

@@ -1,11 +1,11 @@
 """Whether two versions of the program compute the same bits: small scenes, run by one and by the other, compared.
 
-    python bits.py make --out before --command "python -m cli" --cwd OLD_CHECKOUT
+    python bits.py make --out before --command "python -m smarticles" --cwd OLD_CHECKOUT
     python bits.py make --out after --command "python -m smarticles" --cwd NEW_CHECKOUT
     python bits.py compare before after
 
 `make` runs the cases of `bits_scenes.yaml` by the command line alone, so that it drives any version; `compare` lists
-what differs in the files and in what was said, and ends with status 1 if any of it is not in `ALLOWED`.
+what differs in the files and in what was printed, and ends with status 1 if any of it is not in `ALLOWED`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -33,109 +32,46 @@ import h5py
 import meshio
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 CASES = Path(__file__).with_name("bits_scenes.yaml")
-SAID = "said"  # folder of a case with what its commands said
+SAID = "said"  # folder of a case with what its commands printed
 LIMIT_S = 900.0  # longest time of one command
 TO_BE_CONTINUED = 75  # exit status of a run that SIGUSR1 stopped
 
-
-@dataclass(frozen=True)
-class Allowed:
-    """A difference that is none in what is computed.
-
-    Args:
-        files: name pattern of the files, seen from the folder of results; `*` stands for any part of a path.
-        what: name pattern of places in them, as `contents` names them; or an expression for the words that are left
-            out of texts before they are compared.
-        reason: why it may differ.
-    """
-
-    files: str
-    what: str | re.Pattern[str]
-    reason: str
-
-    def __str__(self) -> str:
-        what = self.what if isinstance(self.what, str) else f"/{self.what.pattern}/"
-        return f"{self.files}: {what}: {self.reason}"
-
-
+# Differences that are none in what is computed: files (a name pattern, seen from the folder of results), text that is
+# left out of their lines before they are compared, and the reason. Lines of data are `place: value`, see `lines_of`.
 ALLOWED = (
-    Allowed("*.json", "*versions.*", "versions and commit of the code"),
-    Allowed("*/versions.json", "*", "versions of the code"),
-    Allowed("*", re.compile(r"(?<=Versions: ).*"), "versions and commit of the code, how it was called"),
-    Allowed("*/provenance.json", "analysed_with.*", "versions of the code"),
-    Allowed("*.json", "*command", "how it was called"),
-    Allowed("*.json", "*started", "date"),
-    Allowed("*/sweep.json", "created", "date"),
-    Allowed("*/job.json", "stored", "date"),
-    Allowed("*/done.json", "*wall_s", "wall time"),
-    Allowed("*/done.json", "*cpu_s", "processor time"),
-    Allowed("*-status.json", "*wall_s", "wall time"),
-    Allowed("*/checkpoint*.zip", "bytes", "not compared; twins show where it leads"),
-    Allowed("*/.lock", "text", "process that ran"),
-    Allowed("*/log.txt", re.compile(r"^[-\d]+ [:\d]+,\d+", re.M), "date"),
-    Allowed("*/log.txt", re.compile(r"(?<= after )[\d.]+(?= s of wall time$)", re.M), "wall time"),
-    Allowed("*.txt", re.compile(r"(?<= simulated in )\d+(?= s$)", re.M), "wall time"),
-    Allowed("*.txt", re.compile(r"(?<=(?:done|iled) after )[\d:]+"), "wall time"),
-    Allowed("*.txt", re.compile(r"^\d+ of \d+ runs ended.*\n", re.M), "told twice a minute of wall time"),
-    Allowed("*-plan.*", re.compile(r"(?<=table: )/\S*(?=/results/accuracy/)"), "where the checkout lies"),
-    Allowed("*/array.sh", re.compile(r"(?<=[ (])/\S*(?=/)"), "where the folder and the program lie"),
-    Allowed("*/array.sh", re.compile(r"(?<=--job-name=).*"), "bears a hash of where the folder lies"),
-    Allowed("*/job.json", "job_name", "bears a hash of where the folder lies"),
-    Allowed("accuracy/ladder/results/*.csv", "wall time *", "wall time"),
-    Allowed("accuracy/ladder/results/*.csv", "processor time *", "processor time"),
-    Allowed("accuracy/ladder/results/accuracy.*", "*", "drawn and told over processor time; tables are compared"),
-    Allowed("accuracy/said/02-accuracy.out.txt", "*", "told over processor time; tables are compared"),
+    ("*.json", r"^.*\bversions\..*", "versions and commit of the code"),
+    ("*/versions.json", r".*", "versions of the code"),
+    ("*", r"(?<=Versions: ).*", "versions and commit of the code, how it was called"),
+    ("*/provenance.json", r"^analysed_with\..*", "versions of the code"),
+    ("*.json", r"^(\S*\.)?command: .*", "how it was called"),
+    ("*.json", r"^(\S*\.)?started: .*", "date"),
+    ("*/sweep.json", r"^created: .*", "date"),
+    ("*/job.json", r"^stored: .*", "date"),
+    ("*/done.json", r"^.*(wall|cpu)_s: .*", "wall and processor time"),
+    ("*-status.json", r"^.*wall_s: .*", "wall time"),
+    ("*/checkpoint*.zip", r".*", "not compared; twins show where it leads"),
+    ("*/.lock", r".*", "process that ran"),
+    ("*/log.txt", r"^[-\d]+ [:\d]+,\d+", "date"),
+    ("*/log.txt", r"(?<= after )[\d.]+(?= s of wall time$)", "wall time"),
+    ("*.txt", r"(?<= simulated in )\d+(?= s$)", "wall time"),
+    ("*.txt", r"(?<=(?:done|iled) after )[\d:]+", "wall time"),
+    ("*.txt", r"^\d+ of \d+ runs ended.*", "printed twice a minute of wall time"),
+    ("*-plan.*", r"(?<=table: )/\S*(?=/results/accuracy/)", "where the checkout lies"),
+    ("*/array.sh", r"(?<=[ (])/\S*(?=/)", "where the folder and the program lie"),
+    ("*/array.sh", r"(?<=--job-name=).*", "contains a hash of where the folder lies"),
+    ("*/job.json", r"^job_name: .*", "contains a hash of where the folder lies"),
+    ("accuracy/ladder/results/*.csv", r"^(wall|processor) time .*", "wall and processor time"),
+    ("accuracy/ladder/results/accuracy.*", r".*", "drawn and printed over processor time; tables are compared"),
+    ("accuracy/said/02-accuracy.out.txt", r".*", "printed over processor time; tables are compared"),
 )
-
 PACKED = (".vtu", ".h5")  # the same content may have other bytes
 SAME_OF_TWINS = ("frames", "spheres", "frames.pvd", "spheres.pvd", "series.h5", "scene.yaml", "done.json")
 
-Value = str | bytes | NDArray[Any]
-Difference = tuple[str, tuple[Allowed, ...]]
-"""Where and how, for a person; and what says that it may be, empty if nothing does."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Version:
-    """A version of the program.
-
-    Args:
-        command: words that start it.
-        checkout: the code, first on Python's path; None: what the command finds by itself.
-    """
-
-    command: Sequence[str]
-    checkout: Path | None
-
-    def start(self, folder: Path, words: Sequence[str], *, hide_commit: bool) -> subprocess.Popen[str]:
-        """Start a command in the folder of a case, so that no path in what it writes tells where that is."""
-        # One thread: bits depend on their number. The width of help texts is that of the terminal.
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "COLUMNS": "100", "PYTHONDONTWRITEBYTECODE": "1"}
-        if self.checkout is not None:
-            paths = [str(self.checkout.resolve()), os.environ.get("PYTHONPATH", "")]
-            environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
-        if hide_commit:
-            environment["GIT_DIR"] = os.devnull
-        return subprocess.Popen(
-            [*self.command, *words],
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            encoding="utf-8",
-        )
-
 
 def read_cases(only: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """The cases, all or those named, each with all of its files and commands.
-
-    Raises:
-        SystemExit: there is no case of a name.
-    """
+    """The cases, all or those named, each with all of its files and commands."""
     content = yaml.safe_load(CASES.read_text(encoding="utf-8"))
     cases: dict[str, dict[str, Any]] = content["cases"]
     for name in only:
@@ -152,24 +88,33 @@ def read_cases(only: Sequence[str]) -> dict[str, dict[str, Any]]:
     return {name: case for name, case in cases.items() if not only or name in only}
 
 
-def make(version: Version, out: Path, only: Sequence[str]) -> None:
+def make(command: Sequence[str], checkout: Path | None, out: Path, only: Sequence[str]) -> None:
     """Run the cases into folders of their own.
 
-    Raises:
-        SystemExit: a case is there already.
+    Args:
+        command: words that start the program.
+        checkout: its code, first on Python's path; None: what the command finds by itself.
+        out: folder of results.
+        only: names of cases; empty: all.
     """
     cases = read_cases(only)
     for name in cases:
         if (out / name).exists():
             sys.exit(f"--out {out}: holds {name} already; remove it, or choose another folder")
+    # One thread: bits depend on their number. The width of help texts is that of the terminal.
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "COLUMNS": "100", "PYTHONDONTWRITEBYTECODE": "1"}
+    if checkout is not None:
+        paths = [str(checkout.resolve()), os.environ.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     for name, case in cases.items():
         started = time.monotonic()
-        make_case(version, out / name, case)
+        hidden = {"GIT_DIR": os.devnull} if "hide_commit" in case else {}
+        make_case(command, environment | hidden, out / name, case)
         print(f"{time.monotonic() - started:6.1f} s  {name}", flush=True)
 
 
-def make_case(version: Version, folder: Path, case: Mapping[str, Any]) -> None:
-    """Write the files of a case, run its commands, and keep what they say."""
+def make_case(command: Sequence[str], environment: Mapping[str, str], folder: Path, case: Mapping[str, Any]) -> None:
+    """Write the files of a case, run its commands, and keep what they print."""
     (folder / SAID).mkdir(parents=True)
     for file, text in case["files"].items():
         (folder / file).parent.mkdir(exist_ok=True)
@@ -177,7 +122,16 @@ def make_case(version: Version, folder: Path, case: Mapping[str, Any]) -> None:
     for number, entry in enumerate(case["commands"], 1):
         stopped = isinstance(entry, Mapping)
         words = shlex.split(entry["stop"] if stopped else entry)
-        process = version.start(folder, words, hide_commit="hide_commit" in case)
+        # In the folder of the case, so that no path in what it writes contains where that is.
+        process = subprocess.Popen(
+            [*command, *words],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+        )
         if stopped:
             _stop(process, folder / words[words.index("--out") + 1] / "frames", entry["frames"])
         try:
@@ -187,11 +141,11 @@ def make_case(version: Version, folder: Path, case: Mapping[str, Any]) -> None:
             process.communicate()
             sys.exit(f"{folder}: not done after {LIMIT_S:g} s: {shlex.join(words)}")
         if stopped and process.returncode != TO_BE_CONTINUED:
-            sys.exit(f"{folder}: ended before it was told to stop, with status {process.returncode}: {err}")
+            sys.exit(f"{folder}: ended before it was stopped, with status {process.returncode}: {err}")
         stem = folder / SAID / f"{number:02d}-{words[0].strip('-') if words else 'nothing'}"
         stem.with_suffix(".json" if "--json" in words else ".out.txt").write_text(out, encoding="utf-8")
-        told = f"$ {shlex.join(words)}\nexit status {process.returncode}\n{err}"
-        stem.with_suffix(".err.txt").write_text(told, encoding="utf-8")
+        text = f"$ {shlex.join(words)}\nexit status {process.returncode}\n{err}"
+        stem.with_suffix(".err.txt").write_text(text, encoding="utf-8")
 
 
 def _stop(process: subprocess.Popen[str], frames: Path, number: int) -> None:
@@ -204,122 +158,74 @@ def _stop(process: subprocess.Popen[str], frames: Path, number: int) -> None:
         time.sleep(0.002)
 
 
-def contents(path: Path) -> dict[str, Value]:
-    """All that a file holds: values by the names of their places."""
-    read = {".vtu": _mesh, ".h5": _series, ".json": _json, ".csv": _table}.get(path.suffix)
-    if read is not None:
-        return read(path)
+def lines_of(path: Path) -> list[str]:
+    """All that a file contains: lines of text, or one line `place: value` for each value, each row of an array."""
+    if path.suffix in PACKED:
+        return [line for name, values in _arrays(path).items() for line in _rows(name, values)]
     try:
-        return {"text": path.read_text(encoding="utf-8")}
+        text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        return {"bytes": path.read_bytes()}
+        return [path.read_bytes().hex()]
+    if path.suffix == ".json" and text.lstrip()[:1] in ("{", "["):
+        return list(_leaves(json.loads(text), ""))
+    lines = text.splitlines()
+    if path.suffix == ".csv":
+        header, *rows = csv.reader([line for line in lines if not line.startswith("#")])
+        cells = [f"{name} [{k}]: {cell}" for k, row in enumerate(rows) for name, cell in zip(header, row, strict=True)]
+        return [line for line in lines if line.startswith("#")] + cells
+    return lines
 
 
-def _mesh(path: Path) -> dict[str, Value]:
-    mesh = meshio.read(path)
-    values: dict[str, Value] = {"points": mesh.points}
-    values |= {f"cells.{k}.{block.type}": block.data for k, block in enumerate(mesh.cells)}
-    values |= {f"point_data.{name}": data for name, data in mesh.point_data.items()}
-    return values | {f"{name}.{k}": data for name, parts in mesh.cell_data.items() for k, data in enumerate(parts)}
-
-
-def _series(path: Path) -> dict[str, Value]:
+def _arrays(path: Path) -> dict[str, Any]:
+    """Arrays, and attributes, of a mesh or a file of series."""
+    if path.suffix == ".vtu":
+        mesh = meshio.read(path)
+        arrays = {"points": mesh.points, **mesh.point_data}
+        arrays |= {f"cells.{k}.{block.type}": block.data for k, block in enumerate(mesh.cells)}
+        return arrays | {f"{name}.{k}": data for name, parts in mesh.cell_data.items() for k, data in enumerate(parts)}
     with h5py.File(path) as file:
-        values: dict[str, Value] = {name: np.asarray(file[name][()]) for name in file}
-        for item in (file, *file.values()):
-            values |= {f"{item.name.lstrip('/')}@{key}": repr(value) for key, value in item.attrs.items()}
-    return values
+        found = {f"{item.name}@{key}": value for item in (file, *file.values()) for key, value in item.attrs.items()}
+        return found | {name: file[name][()] for name in file}
 
 
-def _json(path: Path) -> dict[str, Value]:
-    try:
-        return dict(_leaves(json.loads(path.read_text(encoding="utf-8")), ""))
-    except ValueError:
-        return {"text": path.read_text(encoding="utf-8")}
+def _rows(name: str, values: Any) -> Iterator[str]:
+    array = np.asarray(values)
+    yield f"{name}: {array.dtype} {array.shape}"
+    yield from (f"{name} [{k}]: {row!r}" for k, row in enumerate(np.atleast_1d(array).tolist()))
 
 
-def _leaves(data: Any, place: str) -> Iterator[tuple[str, str]]:
+def _leaves(data: Any, place: str) -> Iterator[str]:
     if isinstance(data, dict | list) and data:
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from _leaves(value, f"{place}.{key}".lstrip("."))
     else:
-        yield place, json.dumps(data, ensure_ascii=False)
+        yield f"{place}: {json.dumps(data, ensure_ascii=False)}"
 
 
-def _table(path: Path) -> dict[str, Value]:
-    lines = path.read_text(encoding="utf-8").splitlines()
-    header, *rows = csv.reader([line for line in lines if not line.startswith("#")])
-    values: dict[str, Value] = {"header": ",".join(header), "rows": str(len(rows))}
-    values |= {f"{name} [{k}]": cell for k, row in enumerate(rows) for name, cell in zip(header, row, strict=True)}
-    return values | {"comments": "\n".join(line for line in lines if line.startswith("#"))}
-
-
-def differences(file: str, a: Path, b: Path) -> Iterator[Difference]:
-    """What differs between two files, either of which may be absent.
+def differences(file: str, a: Path, b: Path, used: Counter[str]) -> Iterator[str]:
+    """Yield lines that differ between two files, either of which may be absent; count allowed differences in `used`.
 
     Args:
         file: their name, for `ALLOWED`.
         a: the one.
         b: the other.
+        used: reasons, with how often they applied.
     """
-    if not (a.exists() and b.exists()):
-        yield "only in A" if a.exists() else "only in B", ()
+    if a.exists() != b.exists():
+        yield "only in A" if a.exists() else "only in B"
         return
     if a.read_bytes() == b.read_bytes():
         return
-    allowed = [entry for entry in ALLOWED if fnmatchcase(file, entry.files)]
-    one, other, same = contents(a), contents(b), True
-    for place in dict.fromkeys([*one, *other]):
-        fine = tuple(e for e in allowed if isinstance(e.what, str) and fnmatchcase(place, e.what))
-        for what, reasons in _compared(one.get(place), other.get(place), allowed):
-            same = False
-            yield f"{place}: {what}", fine or reasons
-    if one.keys() == other.keys() and list(one) != list(other):
-        yield "the same places in another order", ()
-    elif same and a.suffix not in PACKED:
-        yield "other bytes for the same content", ()
-
-
-def _compared(a: Value | None, b: Value | None, allowed: Sequence[Allowed]) -> Iterator[Difference]:
-    if a is None or b is None:
-        yield "only in B" if a is None else "only in A", ()
-    elif isinstance(a, str) and isinstance(b, str):
-        if a != b:
-            yield from _lines(a, b, allowed)
-    elif isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        if a.dtype != b.dtype or a.shape != b.shape:
-            yield f"{a.dtype} {a.shape} | {b.dtype} {b.shape}", ()
-        elif a.tobytes() != b.tobytes():
-            yield _values(a, b), ()
-    elif a != b:
-        yield "differ", ()
-
-
-def _lines(a: str, b: str, allowed: Sequence[Allowed]) -> Iterator[Difference]:
-    """Lines that differ when the words that may are left out, and one difference for those words."""
-    used = []
-    for entry in allowed:
-        if isinstance(entry.what, re.Pattern):
-            if entry.what.findall(a) != entry.what.findall(b):
-                used.append(entry)
-            a, b = entry.what.sub("", a), entry.what.sub("", b)
-    if used:
-        yield "words that may", tuple(used)
-    if a != b and "\n" not in a + b:
-        yield f"{a} | {b}", ()
-    elif a != b:
-        changes = difflib.unified_diff(a.splitlines(), b.splitlines(), n=0, lineterm="")
-        changed = [line for line in changes if not line.startswith(("--- ", "+++ ", "@@ "))]
-        yield from ((line, ()) for line in changed or ["ends of lines"])
-
-
-def _values(a: NDArray[Any], b: NDArray[Any]) -> str:
-    """How many values of two arrays differ in any bit, and the first two that do."""
-    one, other = (np.frombuffer(array.tobytes(), np.uint8).reshape(-1, array.dtype.itemsize) for array in (a, b))
-    where = np.flatnonzero((one != other).any(axis=1))
-    first = np.unravel_index(where[0], a.shape)
-    index = ", ".join(str(k) for k in first)
-    return f"{len(where)} of {a.size} values differ, the first at [{index}]: {a[first]!r} | {b[first]!r}"
+    before = after = [lines_of(a), lines_of(b)]
+    for pattern, text, reason in ALLOWED:
+        if fnmatchcase(file, pattern):
+            one, other = ([re.sub(text, "", line) for line in lines] for lines in after)
+            used[f"{pattern}: {reason}"] += [one, other] != after and after[0] != after[1]
+            after = [[line for line in lines if line] for lines in (one, other)]
+    if before[0] == before[1] and a.suffix not in PACKED:
+        yield "other bytes for the same content"
+    changes = difflib.unified_diff(*after, n=0, lineterm="")
+    yield from (line for line in changes if not line.startswith(("--- ", "+++ ", "@@ ")))
 
 
 def compare(a: Path, b: Path, only: Sequence[str]) -> int:
@@ -328,33 +234,20 @@ def compare(a: Path, b: Path, only: Sequence[str]) -> int:
     Returns:
         How many differences are not allowed.
     """
-    cases = read_cases(only)
+    cases, used = read_cases(only), Counter[str]()
     print(f"A: {a}, commit {_commits(a, cases)}\nB: {b}, commit {_commits(b, cases)}")
-    used: Counter[Allowed] = Counter()
     names = _files([a, b], cases)
-    refused = sum(_listed(name, differences(name, a / name, b / name), used) for name in names)
-    for root in (a, b):
-        for name, case in cases.items():
-            if "twins" in case:
-                one, other = (root / name / twin for twin in case["twins"])
-                for file in _files([one, other], SAME_OF_TWINS):
-                    found = differences(f"{name}/{file}", one / file, other / file)
-                    refused += _listed(f"{one} | {other.name}: {file}", found, used)
-    for entry, count in used.items():
-        print(f"allowed {count} times: {entry}")
-    print(f"{len(names)} files of {len(cases)} cases, {refused} differences that are not allowed")
-    return refused
-
-
-def _listed(name: str, found: Iterator[Difference], used: Counter[Allowed]) -> int:
-    """Print the differences that are not allowed, and count the others; how many were printed."""
-    refused = 0
-    for what, reasons in found:
-        used.update(reasons)
-        if not reasons:
-            refused += 1
-            print(f"{name}: {what}")
-    return refused
+    pairs = [(name, name, a / name, b / name) for name in names]
+    for root, (name, case) in itertools.product((a, b), cases.items()):
+        if "twins" in case:
+            one, other = (root / name / twin for twin in case["twins"])
+            files = _files([one, other], SAME_OF_TWINS)
+            pairs += [(f"{one} | {other.name}: {f}", f"{name}/{f}", one / f, other / f) for f in files]
+    found = [f"{shown}: {line}" for shown, file, *paths in pairs for line in differences(file, *paths, used)]
+    print("\n".join(found))
+    print("\n".join(f"allowed in {count} files: {reason}" for reason, count in used.items() if count))
+    print(f"{len(names)} files of {len(cases)} cases, {len(found)} differences that are not allowed")
+    return len(found)
 
 
 def _files(roots: Iterable[Path], parts: Iterable[str]) -> list[str]:
@@ -385,7 +278,7 @@ def main() -> int:
         one.add_argument("--only", type=lambda text: text.split(","), default=[], metavar="NAME,…", help="these cases")
     given = parser.parse_args()
     if given.action == "make":
-        make(Version(command=shlex.split(given.command), checkout=given.cwd), given.out.resolve(), given.only)
+        make(shlex.split(given.command), given.cwd, given.out.resolve(), given.only)
         return 0
     for folder, name in itertools.product((given.a, given.b), read_cases(given.only)):
         if not (folder / name).is_dir():

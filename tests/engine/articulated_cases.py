@@ -1,46 +1,42 @@
-"""Small simulations of articulated smarticles whose answer is known; like `cases.py`, for the same worker process.
-
-Momenta and energies are taken from YADE's bodies themselves, not from `State`, which is under test as well. SI
-throughout. Velocities belong to the half step before the positions (leapfrog).
-"""
+"""Articulated smarticles, hinges and motors at work: small simulations with a known answer; see `cases.py`."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
 import cases
 import numpy as np
+from cases import axes_of, vec
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
+from dem.engine.demand import contact_law_of, motor_law_of
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import hinge_law, motor_law
+from dem.engine.yade.kind import hinge_law
+from dem.engine.yade.stable_step import hinged_stable_time_step
 from dem.scene.scene import Scene
 from validation.access import bodies_of as bodies
-from validation.bench import drive
+from validation.bench import Targets, add, drive, scene_of
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
 def build(scene: Scene, *, dt: float | None = None, radius: float = 0.5, **instead: Any) -> YadeEngine:
     """An engine for smarticles that are articulated."""
-    hinges = (hinge_law(scene), motor_law(scene))
-    return cases.build(scene, dt=dt, radius=radius, facets=16, hinges=hinges, **instead)
+    laws = {"hinge_law": hinge_law(scene), "motor_law": motor_law_of(scene)}
+    return cases.build(scene, dt=dt, radius=radius, facets=16, **(laws | instead))
 
 
 def floating(data: dict[str, Any], *, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)) -> tuple[Scene, YadeEngine]:
     """One smarticle, welded, without gravity, far from everything."""
-    scene = cases.scene_of(data)
+    scene = scene_of(data)
     engine = build(scene, gravity=0.0)
-    cases.add(engine, (0, 0, 0.05), TILTED)
+    add(engine, (0, 0, 0.05), TILTED)
     cases.push(engine, 0, velocity=velocity, spin=spin)
     return scene, engine
-
-
-def vec(value: Any) -> np.ndarray:
-    return np.array([value[0], value[1], value[2]])
 
 
 def momentum(engine: YadeEngine) -> np.ndarray:
@@ -57,7 +53,7 @@ def kinetic_energy(engine: YadeEngine) -> float:
     """From velocities and from the angular momenta that YADE integrates."""
     total = 0.0
     for b in bodies(engine):
-        axes = np.array(b.ori.toRotationMatrix()).reshape(3, 3)
+        axes = axes_of(b)
         own = axes.T @ vec(b.angMom)
         total += 0.5 * b.mass * vec(b.vel) @ vec(b.vel) + 0.5 * float((own**2 / vec(b.inertia)).sum())
     return total
@@ -96,7 +92,7 @@ def inertia_tensor(engine: YadeEngine) -> np.ndarray:
     centre = sum(b.mass * vec(b.pos) for b in links) / mass
     total = np.zeros((3, 3))
     for b in links:
-        axes, arm = np.array(b.ori.toRotationMatrix()).reshape(3, 3), vec(b.pos) - centre
+        axes, arm = axes_of(b), vec(b.pos) - centre
         total += axes @ np.diag(vec(b.inertia)) @ axes.T + b.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return total
 
@@ -164,7 +160,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
 
     The same steps lead up to the change, so that a pile left alone is the answer.
     """
-    scene = cases.scene_of(data)
+    scene = scene_of(data)
     engine = build(scene, radius=scene.container.radius_m)
     rng = np.random.default_rng(scene.seed)
     layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}
@@ -209,3 +205,135 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.motors.actuate(np.full((1, 1, 2), angle), scene.fidelity.control_interval_s)
     return {"saved": saved, "loaded": loaded, "looked": engine.motors._hinges.torques(), "state": engine.state().angles}
+
+
+# -- hinges and motors -------------------------------------------------------------------------------------------------
+
+
+def gait(
+    data: dict[str, Any],
+    *,
+    straight_in: float,
+    velocity: Any = (0, 0, 0),
+    spin: Any = (0, 0, 0),
+) -> dict[str, Any]:
+    """A free smarticle straightens and bends back; conserved sums every millisecond."""
+    scene, engine = floating(data, velocity=velocity, spin=spin)
+    engine.advance(1)
+    engine.motors.articulate()
+    begun = engine.state().angles
+    rows: list[tuple[Any, ...]] = []
+    start = momentum(engine), angular_momentum(engine)
+
+    def targets(time: float) -> np.ndarray:
+        return begun * abs(1 - time / straight_in)
+
+    for time in drive(engine, scene, 2 * straight_in, targets):
+        if round(time / scene.fidelity.control_interval_s) % 5:
+            continue  # 1 ms
+        links = bodies(engine)
+        centre = sum(b.mass * vec(b.pos) for b in links) / sum(b.mass for b in links)
+        own = [np.cross(vec(b.pos) - centre, b.mass * vec(b.vel)) + vec(b.angMom) for b in links]
+        rows.append(
+            (
+                np.abs(momentum(engine) - start[0]).max(),
+                sum(b.mass * np.linalg.norm(vec(b.vel)) for b in links),
+                np.abs(angular_momentum(engine) - start[1]).max(),
+                sum(np.linalg.norm(part) for part in own),
+                engine.motors.gaps().max() / scene.sphere_diameter,
+                np.abs(engine.state().angles - targets(time)).max(),
+                kinetic_energy(engine),
+            )
+        )
+    keys = ("momentum", "links_momentum", "angular", "links_angular", "gap", "error", "energy")
+    columns = {key: np.array(column) for key, column in zip(keys, zip(*rows, strict=True), strict=True)}
+    return {**columns, "angles": engine.state().angles - begun}
+
+
+def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: float) -> dict[str, Any]:
+    """Both barbs turned from corner to corner [deg] of their range, at a constant speed [rad/s]."""
+    scene, engine = floating(data)
+    engine.motors.articulate()
+    touching, reached, gap = 0, [engine.state().angles[0]], 0.0
+    for corner in np.radians(corners):
+        begun = engine.motors.readings.commands[0].copy()
+        duration = max(np.abs(corner - begun).max() / speed, 1e-3)
+        for _ in drive(engine, scene, duration, lambda t, a=begun, b=corner, d=duration: a + (b - a) * min(t / d, 1)):
+            touching += own_contacts(engine)
+            gap = max(gap, engine.motors.gaps().max())
+            reached.append(engine.state().angles[0])
+    return {
+        "touching": touching,
+        "angles": np.degrees(reached),
+        "gap": gap / scene.sphere_diameter,
+    }
+
+
+def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
+    """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
+    scene = scene_of(data)
+    law, particle = contact_law_of(scene), scene.particle
+    dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
+    interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
+    engine = build(scene, dt=dt)
+    thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
+    for k in range(layers):
+        add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
+    engine.motors.articulate()
+    begun, fastest, gap = engine.state().angles, 0.0, 0.0
+    for time in drive(engine, scene, settle + watch, lambda _: begun, interval=interval):
+        gap = max(gap, engine.motors.gaps().max())
+        if not gap < thick:
+            return {"fastest": math.inf, "gap": math.inf, "z": np.full(layers, math.nan), "thick": thick, "dt": dt}
+        if time > settle:
+            fastest = max(fastest, float(np.linalg.norm(engine.state().link_velocities, axis=2).max()))
+    return {
+        "fastest": fastest,
+        "gap": gap / scene.sphere_diameter,
+        "z": engine.state().positions[:, 2],
+        "thick": thick,
+        "dt": dt,
+    }
+
+
+def hold_all(engine: Any, blocked: str) -> None:
+    """Stop all links of the first smarticle, and hold them, or let them go."""
+    zero = engine._yade.vector(0, 0, 0)
+    for body in bodies(engine)[:3]:
+        body.blockedDOFs = blocked
+        body.vel, body.angVel, body.angMom = zero, zero, zero
+
+
+def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]:
+    """All links held while the motors straighten; then freed, or moved back by an angle."""
+    scene, engine = floating(data)
+    engine.motors.articulate()
+    hold_all(engine, "xyzXYZ")
+    begun = engine.state().angles[0]
+    commands, torques, halted = [], [], []
+
+    def follow(duration: float, targets: Targets) -> None:
+        for _ in drive(engine, scene, duration, targets):
+            commands.append(engine.motors.readings.commands[0])
+            torques.append(engine.motors._hinges.torques()[0])
+            halted.append(engine.motors.readings.halted[0])
+
+    follow(0.02, lambda t: begun - 5 * t)
+    marks = [len(commands)]
+    if freed:
+        hold_all(engine, "")
+    goal = begun - 0.1 if freed else engine.motors.readings.commands[0] + back
+    follow(0.1, lambda _: goal)
+    return {
+        "begun": begun,
+        "goal": goal,
+        "mark": marks[0],
+        "commands": np.array(commands),
+        "torques": np.array(torques),
+        "halted": np.array(halted),
+        "angles": engine.state().angles[0],
+        "limit": scene.torque_limit,
+        "advance": scene.motor.stiffness_N_m_per_rad
+        * scene.motor.speed_limit_rad_per_s
+        * scene.fidelity.control_interval_s,
+    }

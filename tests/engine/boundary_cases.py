@@ -1,4 +1,4 @@
-"""Hooks and the container's removal: small simulations whose answer is known, run as those of `cases.py` are."""
+"""Hooks and the container's removal: small simulations with a known answer; see `cases.py`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any
 
 import cases
 import numpy as np
-from cases import pour
 from scipy.spatial.transform import Rotation
 
 from dem.engine.yade.engine import YadeEngine
@@ -16,13 +15,9 @@ from validation.bench import add, scene_of
 HANGING = Rotation.from_euler("x", -90, degrees=True)  # turns the mouth downwards
 
 
-def build(scene: Scene, *, radius: float | None = None) -> YadeEngine:
-    cylinder = scene.cylinder
-    if radius is not None:
-        cylinder = type(cylinder)(radius=radius, height=cylinder.height, facets=cylinder.facets)
+def build(scene: Scene) -> YadeEngine:
     hooks = None if scene.hooks is None else scene.hooks.crosses
-    shaken = any(phase.type == "shake" for phase in scene.phases)
-    return cases.build(scene, cylinder=cylinder, shaken=shaken, hooks=hooks)
+    return cases.build(scene, cylinder=scene.cylinder, hooks=hooks)
 
 
 def damped(engine: YadeEngine, damping: float) -> None:
@@ -37,23 +32,16 @@ def mean_hook_forces(engine: YadeEngine, steps: int) -> np.ndarray:
     return (engine.boundaries.hook_sums - before) / steps
 
 
-def elastic(engine: YadeEngine) -> float:
-    """Energy in the springs of all contacts [J]."""
-    total = 0.0
+def energies(engine: YadeEngine) -> dict[str, float]:
+    state, elastic = engine.state(), 0.0
     for contact in engine._omega.interactions:
         if contact.isReal:
-            phys = contact.phys
-            depth = max(0.0, contact.geom.penetrationDepth)
-            total += phys.kn * depth**2 / 2 + phys.shearForce.squaredNorm() / (2 * phys.ks)
-    return total
-
-
-def energies(engine: YadeEngine) -> dict[str, float]:
-    state = engine.state()
+            phys, depth = contact.phys, max(0.0, contact.geom.penetrationDepth)
+            elastic += phys.kn * depth**2 / 2 + phys.shearForce.squaredNorm() / (2 * phys.ks)
     return {
         "kinetic": state.kinetic_energy,
         "height": state.potential_energy(engine.gravity, 0.0),
-        "elastic": elastic(engine),
+        "elastic": elastic,
     }
 
 
@@ -88,20 +76,14 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     }
 
 
-def _pour(engine: YadeEngine, scene: Scene, count: int, settle: float) -> None:
-    """A small pile, damped to rest."""
-    hooks = [cross.obstacles(2 * scene.particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
-    pour(engine, scene, count, np.concatenate([np.empty((0, 3)), *hooks]), engine.cylinder.inner_radius)
+def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
+    """A pile at rest whose wall goes away at once: contacts and energies before, right after, and while it spreads."""
+    scene = scene_of(data)
+    engine = build(scene)
+    cases.pour(engine, scene, count, radius=engine.cylinder.inner_radius)
     damped(engine, 0.3)
     engine.advance(round(settle / engine.time_step))
     damped(engine, 0.0)
-
-
-def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
-    """A pile at rest whose wall goes away at once: what is there before, right after, and while it spreads."""
-    scene = scene_of(data)
-    engine = build(scene)
-    _pour(engine, scene, count, settle)
     wall = set(engine.boundaries.container[:-1])
 
     def with_wall() -> int:
@@ -113,14 +95,10 @@ def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> 
     stale = with_wall()
     totals = [sum(after.values())]
     outside = []
-
-    def look() -> None:
-        totals.append(sum(energies(engine).values()))
-        outside.append(np.hypot(*engine.state().positions[:, :2].T).max())
-
     for _ in range(round(watch / engine.time_step / 20)):
         engine.advance(20)
-        look()
+        totals.append(sum(energies(engine).values()))
+        outside.append(np.hypot(*engine.state().positions[:, :2].T).max())
     return {
         "contacts": contacts,
         "stale": stale,

@@ -1,31 +1,40 @@
-"""Small simulations whose answer is known. They run in the worker process of `conftest.py`, never in pytest's own:
+"""Small simulations with a known answer. They run in the worker process of `conftest.py`, never in pytest's own:
 
-YADE keeps one scene per process, installs handlers, and must not meet PyVista's VTK. Each case builds its engine anew
-and returns plain numbers and arrays; the tests compare them with the answer. SI throughout.
+YADE keeps one scene per process, installs handlers, and must not meet PyVista's VTK. Each case builds its engine and
+returns plain numbers and arrays; the tests compare them with the answer. SI throughout.
 """
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
+import h5py
+import meshio
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses, place_layer
 from dem.engine.demand import contact_law_of
+from dem.engine.effect import Adds
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.library import yade_version
-from dem.engine.yade.stable_step import stable_time_step
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
+from dem.plan.outlook import plan
 from dem.plan.steps import time_step
+from dem.run.build import build_engine
+from dem.run.recorder import Recorder
 from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
-from validation.access import YadeAccess
-from validation.bench import add, advance_watched, body_rotations, scene_of
+from validation.access import YadeAccess, bodies_of
+from validation.bench import advance_watched, body_rotations, scene_of
 
 
 def build(
@@ -47,6 +56,15 @@ def version() -> str:
     return yade_version()
 
 
+def vec(value: Any) -> np.ndarray:
+    return np.array([value[0], value[1], value[2]])
+
+
+def axes_of(body: Any) -> np.ndarray:
+    """(3, 3) a body's principal axes in the laboratory frame."""
+    return np.array(body.ori.toRotationMatrix()).reshape(3, 3)
+
+
 def push(engine: YadeEngine, k: int, **motion: Any) -> None:
     """Give a welded smarticle a velocity and a spin."""
     YadeAccess().push(engine, k, **motion)
@@ -64,24 +82,17 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
     for k in range(count):
         push(engine, k, spin=rng.normal(size=3) * 30)
     engine.advance(steps)
-    state = engine.state()
-    members = {k: [] for k in range(count)}
-    for body, k in engine._assembly.smarticle_of.items():
-        members[k].append(np.array(engine._omega.bodies[body].state.pos))
-    tensors = []
-    clumps = [engine._omega.bodies[body].state for body in engine._assembly.bodies]
-    for clump in clumps:
-        axes = np.array(clump.ori.toRotationMatrix()).reshape(3, 3)
-        tensors.append(axes @ np.diag(np.array(clump.inertia)) @ axes.T)
+    state, clumps = engine.state(), bodies_of(engine)
+    spheres = [vec(engine._omega.bodies[body].state.pos) for body in sorted(engine._assembly.smarticle_of)]
     return {
         "asked": np.array([r.as_matrix() for r in rotations]),
         "asked_positions": positions,
         "start": body_rotations(start),
         "start_positions": start.positions,
         "rotations": body_rotations(state),
-        "tensors": np.array(tensors),
+        "tensors": np.array([axes_of(clump) @ np.diag(vec(clump.inertia)) @ axes_of(clump).T for clump in clumps]),
         "masses": np.array([clump.mass for clump in clumps]),
-        "spheres": np.array([members[k] for k in range(count)]),
+        "spheres": np.array(spheres).reshape(count, -1, 3),
         "expected_spheres": state.spheres(scene.particle),
     }
 
@@ -89,7 +100,7 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
 def pour(
     engine: YadeEngine, scene: Scene, count: int, obstacles: np.ndarray | None = None, radius: float | None = None
 ) -> None:
-    """A layer just above the floor, clear of the centres of spheres (n, 3) that are there."""
+    """A layer just above the floor, clear of the centres of spheres (n, 3) that exist already."""
     poses = place_layer(
         scene.particle,
         count=count,
@@ -124,41 +135,29 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     }
 
 
-def _wall(engine: YadeEngine) -> float:
-    """Height of the first facet of the wall."""
-    return float(engine._omega.bodies[engine.boundaries.container[0]].state.pos[2])
-
-
-def shake(data: dict[str, Any], *, periods: float, delay: int = 0, rest: int = 0, walls: bool = True) -> dict[str, Any]:
-    """Position and velocity of an empty container at every step."""
+def shake(data: dict[str, Any], *, periods: float, delay: int) -> dict[str, Any]:
+    """Position of an empty container at every step, shaken after a delay of some steps."""
     scene = scene_of(data)
     engine = build(scene, shaken=True)
     phase = next(p for p in scene.phases if p.type == "shake")
     amplitude = phase.amplitude(scene.gravity_m_per_s2)
-    if delay:  # YADE takes a run of no steps for one without end
-        engine.advance(delay)
-    begun, start = engine.time, engine.boundaries.floor
-    wall_start = _wall(engine)
-    engine.boundaries.shake(amplitude=amplitude, frequency=phase.frequency_hz, walls=walls)
-    rows: list[tuple[float, float]] = []
+
+    def wall() -> float:
+        return float(engine._omega.bodies[engine.boundaries.container[0]].state.pos[2])
+
+    engine.advance(delay)
+    begun, start, wall_start = engine.time, engine.boundaries.floor, wall()
+    engine.boundaries.shake(amplitude=amplitude, frequency=phase.frequency_hz)
+    floors: list[float] = []
     steps = math.ceil(periods / phase.frequency_hz / engine.time_step)
-    advance_watched(engine, steps, lambda: rows.append((engine.boundaries.floor, engine.boundaries.velocity)))
-    floors, speeds = np.array(rows).T
-    wall = _wall(engine)
-    last, elapsed = engine.boundaries.floor, engine.time - begun
-    engine.boundaries.stop()
-    if rest:
-        engine.advance(rest)
+    advance_watched(engine, steps, lambda: floors.append(engine.boundaries.floor))
     return {
         "time": np.arange(1, steps + 1) * engine.time_step,
-        "elapsed": elapsed,
-        "z": floors - start,
-        "v": speeds,
+        "elapsed": engine.time - begun,
+        "z": np.array(floors) - start,
         "dt": engine.time_step,
         "amplitude": amplitude,
-        "wall_moved": wall - wall_start,
-        "crept": engine.boundaries.floor - last,
-        "rest_velocity": engine.boundaries.velocity,
+        "wall_moved": wall() - wall_start,
     }
 
 
@@ -185,31 +184,6 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     }
 
 
-def stack(
-    data: dict[str, Any], *, layers: int, settle: float, watch: float, times_stable: float | None
-) -> dict[str, Any]:
-    """Smarticles lying flat on each other, let go from a slight height; largest speed after they settled."""
-    scene = scene_of(data)
-    dt = None
-    if times_stable is not None:
-        dt = times_stable * stable_time_step(scene.particle, contact_law_of(scene))
-    engine = build(scene, dt=dt)
-    particle = scene.particle
-    thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
-    for k in range(layers):
-        add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
-    engine.advance(round(settle / engine.time_step))
-    fastest = 0.0
-
-    def look() -> None:
-        nonlocal fastest
-        fastest = max(fastest, float(np.linalg.norm(engine.state().velocities, axis=1).max()))
-
-    advance_watched(engine, round(watch / engine.time_step), look)
-    state = engine.state()
-    return {"fastest": fastest, "z": state.positions[:, 2], "thick": thick, "dt": engine.time_step}
-
-
 def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     """A whole run; errors come back as text."""
     try:
@@ -217,3 +191,122 @@ def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
+
+
+def watched(data: dict[str, Any], out: str, each: Callable[[YadeEngine, int], None]) -> None:
+    """A whole run; `each` gets engine and phase at every sample."""
+    record = Recorder.record
+
+    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
+        record(recorder, engine, phase)
+        each(engine, phase)
+
+    with patch.object(Recorder, "record", look):
+        answer = run(data, out)
+    assert answer["error"] is None, answer
+
+
+def noted(data: dict[str, Any], out: str) -> list[dict[str, Any]]:
+    """Run a scene; the engine's own numbers at every sample."""
+    notes: list[dict[str, Any]] = []
+
+    def note(engine: YadeEngine, phase: int) -> None:
+        notes.append(
+            {
+                "time": engine.time,
+                "phase": phase,
+                "floor": engine.boundaries.floor,
+                "state": engine.state(),
+                "contacts": engine.neighbours(),
+                "torques": engine.motors.readings.torques.copy() if engine.motors.articulated else None,
+            }
+        )
+
+    watched(data, out, note)
+    return notes
+
+
+def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every: int) -> dict[str, Any]:
+    """A layer of random poses thrown at the floor of a container that is shaken: vertices, touches at every look."""
+    scene = scene_of(data)
+    engine = build_engine(scene, time_step(scene))
+    rng = np.random.default_rng(scene.seed)
+    poses = place_layer(
+        scene.particle, count=count, radius=0.012, bottom=3e-3, height=5e-3, obstacles=np.empty((0, 3)), rng=rng
+    )
+    engine.add(poses, speed=speed)
+    vertices, touches = [np.array(engine.state().vertices)], []
+    engine.boundaries.shake(amplitude=5e-4, frequency=30.0)
+    for _ in range(steps // every):
+        engine.advance(every)
+        vertices.append(np.array(engine.state().vertices))
+        touches.append(int(engine.touches().sum()))
+    return {
+        "vertices": np.array(vertices),
+        "touches": touches,
+        "diameter": scene.sphere_diameter,
+        "floor": engine.boundaries.floor,
+        "time": engine.time,
+        "impulse": engine.impulse,
+    }
+
+
+# What every run directory holds, whatever the scene calls for.
+OWN_FILES = {"scene.yaml", "run.json", "log.txt", "done.json", ".lock"}
+
+
+def inventory(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """Run a scene; what it was declared to be made of, and what was found at every sample and on the disk."""
+    scene = scene_of(data)
+    declared = Adds.together(decision.adds for decision in decide(scene))
+    found: dict[str, set[Any]] = defaultdict(set)
+    watched(data, out, lambda engine, _: _look(engine, found))
+    folder = Path(out)
+    found["files"] = {path.name for path in folder.iterdir()} - OWN_FILES
+    with h5py.File(folder / "series.h5") as file:
+        found["series"] = set(file)
+    for path in (folder / "frames").iterdir():
+        found["arrays"] |= set(meshio.read(path).cell_data)
+    kinds = ("engines", "functors", "materials", "shapes", "series", "arrays", "files")
+    return {
+        "declared": {kind: set(getattr(declared, kind)) for kind in kinds if kind != "engines"},
+        "found": {kind: found[kind] for kind in kinds if kind != "engines"},
+        "planned": set(plan(scene).engines),
+        "engines": found["engines"],
+        "contacts": found["contacts"],
+        "caps": found["caps"],
+    }
+
+
+def _look(engine: YadeEngine, found: dict[str, set[Any]]) -> None:
+    omega = engine._omega
+    found["engines"].add(tuple(type(one).__name__ for one in omega.engines))
+    _, collider, loop, *_ = omega.engines
+    for functors in (
+        collider.boundDispatcher.functors,
+        loop.geomDispatcher.functors,
+        loop.physDispatcher.functors,
+        loop.lawDispatcher.functors,
+    ):
+        found["functors"] |= {type(functor).__name__ for functor in functors}
+    found["materials"] |= {material.label for material in omega.materials}
+    found["shapes"] |= {type(body.shape).__name__ for body in omega.bodies}
+    for contact in omega.interactions:
+        if contact.isReal:
+            phys = contact.phys
+            found["contacts"].add((type(contact.geom).__name__, type(phys).__name__))
+            if type(phys).__name__ == "CohFrictPhys":
+                found["caps"].add(phys.maxTwistPl)
+
+
+def ledger_after_reload(data: dict[str, Any], out: str) -> dict[str, Any]:
+    """Energies of a pile right before and right after the simulation is saved and loaded."""
+    scene = scene_of(data)
+    engine = build_engine(scene, time_step(scene))
+    pour(engine, scene, scene.count)
+    engine.advance(2500)
+    before, folder = engine.ledger.elastic(), Path(out)
+    engine.load(engine.save(folder), folder)
+    after = engine.ledger.elastic()
+    engine.boundaries.remove_wall()
+    return {"before": before, "after": after, "dissipated": engine.ledger.dissipated}

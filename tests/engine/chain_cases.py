@@ -1,39 +1,34 @@
-"""Chains in a plane: small simulations whose answer is known, run as those of `cases.py` are."""
+"""Chains in a plane: small simulations with a known answer; see `cases.py`."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from cases import add
 from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
 from dem.engine.yade.engine import YadeEngine
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 from dem.plan.steps import time_step
 from dem.run.build import build_engine
 from dem.scene.scene import Scene
-from validation.bench import scene_of
+from validation.bench import add, scene_of
 
 TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
-
-
-def build(scene: Scene) -> YadeEngine:
-    return build_engine(scene, time_step(scene))
 
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, YadeEngine]:
     """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""
     scene = scene_of(data)
-    engine = build(scene)
+    engine = build_engine(scene, time_step(scene))
     add(engine, (0, -scene.particle.boxes.vertices[0, 1], 0), rotation)
     engine.motors.articulate()
     return scene, engine
 
 
 def hold(engine: YadeEngine, scene: Scene, seconds: float) -> None:
-    """Let motors hold their commands for a time; one look per step, as the phases do."""
+    """Let motors hold their commands for a time, with a control update per step, as phases do."""
     interval = scene.fidelity.control_interval_s
     for _ in range(round(seconds / interval)):
         engine.motors.actuate(engine.motors.readings.commands[None], interval)

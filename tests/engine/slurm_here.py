@@ -8,7 +8,7 @@ import shutil
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ import pytest
 
 DAEMONS = ("munged", "slurmctld", "slurmd")
 SEARCHED = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
+WAIT_S = 600.0
 CORES, MEMORY_MIB = 6, 6000  # as configured; the machine may have fewer
 
 _CONFIGURATION = """\
@@ -61,10 +62,16 @@ class SlurmHere:
     folder: Path
     environment: dict[str, str]
 
+    def ask(self, *command: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=300, check=False)
+
     def call(self, *command: str) -> str:
-        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=300, check=False)
+        done = self.ask(*command)
         assert done.returncode == 0, f"{command}: {done.stderr}{done.stdout}"
         return done.stdout
+
+    def logs(self) -> str:
+        return "\n".join(path.read_text(errors="replace")[-2000:] for path in self.folder.glob("*.log"))
 
 
 def require() -> None:
@@ -84,18 +91,12 @@ def slurm_here(folder: Path) -> Iterator[SlurmHere]:
     for name in ("state", "spool"):
         (folder / name).mkdir()
     configuration = folder / "slurm.conf"
-    ctld_port, d_port = _free_ports()
-    configuration.write_text(
-        _CONFIGURATION.format(
-            host=host,
-            user=getpass.getuser(),
-            ctld_port=ctld_port,
-            d_port=d_port,
-            folder=folder,
-            cores=CORES,
-            memory=MEMORY_MIB,
-        )
-    )
+    with socket.socket() as one, socket.socket() as other:
+        one.bind(("127.0.0.1", 0))
+        other.bind(("127.0.0.1", 0))
+        ports = {"ctld_port": one.getsockname()[1], "d_port": other.getsockname()[1]}
+    asked = {"host": host, "user": getpass.getuser(), "folder": folder, "cores": CORES, "memory": MEMORY_MIB}
+    configuration.write_text(_CONFIGURATION.format(**asked, **ports))
     key = folder / "munge.key"
     key.write_bytes(os.urandom(1024))
     key.chmod(0o600)
@@ -108,13 +109,13 @@ def slurm_here(folder: Path) -> Iterator[SlurmHere]:
     ]
     with ExitStack() as stack:
         stack.enter_context(_daemon(munged, here))
-        _wait_for((folder / "munge.sock").exists, "munged makes no socket", here)
+        wait_until((folder / "munge.sock").exists, lambda: "munged makes a socket")
         stack.enter_context(_daemon(["slurmctld", "-D", "-f", str(configuration)], here))
         stack.enter_context(_daemon(["slurmd", "-D", "-f", str(configuration), "-N", host], here))
-        _wait_for(lambda: _is_idle(here), "the node does not become idle", here)
+        wait_until(lambda: here.ask("sinfo", "--noheader", "--format=%t").stdout.strip() == "idle", here.logs)
         yield here
         here.call("scancel", "--user", getpass.getuser())
-        _wait_for(lambda: not here.call("squeue", "--noheader").strip(), "jobs do not end", here)
+        wait_until(lambda: not here.call("squeue", "--noheader").strip(), here.logs)
 
 
 @contextmanager
@@ -132,24 +133,10 @@ def _daemon(command: list[str], here: SlurmHere) -> Iterator[None]:
                 process.wait()
 
 
-def _free_ports() -> tuple[int, int]:
-    with socket.socket() as one, socket.socket() as other:
-        one.bind(("127.0.0.1", 0))
-        other.bind(("127.0.0.1", 0))
-        return one.getsockname()[1], other.getsockname()[1]
-
-
-def _is_idle(here: SlurmHere) -> bool:
-    asked = subprocess.run(
-        ["sinfo", "--noheader", "--format=%t"], env=here.environment, capture_output=True, text=True, check=False
-    )
-    return asked.stdout.strip() == "idle"
-
-
-def _wait_for(condition, what: str, here: SlurmHere, timeout_s: float = 300.0) -> None:  # type: ignore[no-untyped-def]
-    deadline = time.monotonic() + timeout_s
+def wait_until(condition: Callable[[], object], what: Callable[[], str]) -> None:
+    """Wait for a condition; after ten minutes the test fails, with `what` is wrong."""
+    deadline = time.monotonic() + WAIT_S
     while not condition():
         if time.monotonic() > deadline:
-            logs = "\n".join(path.read_text(errors="replace")[-2000:] for path in here.folder.glob("*.log"))
-            pytest.fail(f"Slurm on this machine: {what} within {timeout_s:.0f} s\n{logs}")
-        time.sleep(0.2)
+            pytest.fail(f"not within {WAIT_S:.0f} s: {what()}")
+        time.sleep(0.05)

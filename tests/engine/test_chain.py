@@ -1,4 +1,4 @@
-"""Chains in a plane: servos hold as they should, strings feel what they should, and nothing leaves the plane."""
+"""Chains in a plane: servos hold at their limit, strings and walls account for all momentum, checkpoints keep both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import cases
 import chain_cases
 import numpy as np
 import pytest
-from run_files import series
+from processes import series
 from scenes import CHAIN, changed
 
 Simulate = Callable[..., dict[str, Any]]

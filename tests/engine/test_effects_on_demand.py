@@ -1,7 +1,7 @@
-"""Effects on demand: a scene is made of what it calls for and of nothing else, and no strength has no consequence.
+"""Effects on demand: a scene is made of what it calls for and nothing else; an effect of no strength changes nothing.
 
-What exists is read from YADE's own lists, from the files of the run and from Python's profiler, and is compared with
-what `dem.plan.effects` declares; so an effect that builds more than it says, or says more than it builds, is found.
+What exists is read from YADE's own lists and from the files of the run, and is compared with what `dem.plan.effects`
+declares.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import cases
-import effect_cases
-import h5py
 import meshio
 import numpy as np
 import pytest
+from processes import series
 
 Simulate = Callable[..., dict[str, Any]]
-Columns = dict[str, np.ndarray]
 
 DEPOSIT = {"type": "deposit", "per_layer": 4}
 RELAX = {"type": "relax", "duration_s": 0.04}
@@ -61,7 +59,7 @@ SCENES = {
 def test_a_run_is_made_of_what_its_scene_calls_for_and_of_nothing_else(
     simulate: Simulate, tmp_path: Path, name: str
 ) -> None:
-    made = simulate(effect_cases.inventory, SCENES[name], str(tmp_path / "run"))
+    made = simulate(cases.inventory, SCENES[name], str(tmp_path / "run"))
     # Found in YADE's lists at every sample, in the datasets, in the frames and in the folder, against the declaration.
     assert made["found"] == made["declared"]
     moves, hinges = name == "all", name != "plain"
@@ -93,20 +91,12 @@ def run(worker: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Calla
     return make
 
 
-def columns(out: Path) -> Columns:
-    with h5py.File(out / "series.h5") as file:
-        return {name: dataset[()] for name, dataset in file.items()}
-
-
 def differing(one: Path, other: Path, until: int | None = None) -> list[str]:
-    """Datasets of `one` and arrays of its frames that are not the same, bit by bit, in `other`.
+    """Datasets of `one` and arrays of its frames whose bits differ in `other`, which may have more of them.
 
-    Args:
-        one: a run.
-        other: the same with an effect more; what only it records is not compared.
-        until: samples and frames of phases before this one only.
+    With `until`, samples and frames of the phases before that one.
     """
-    first, second = columns(one), columns(other)
+    first, second = series(one), series(other)
     last = np.count_nonzero(first["phase"] < until) if until else None
     bits = [{name: values[:last].tobytes() for name, values in each.items()} for each in (first, second)]
     parted = sorted(name for name in bits[0] if bits[0][name] != bits[1].get(name))
@@ -126,13 +116,12 @@ def differing(one: Path, other: Path, until: int | None = None) -> list[str]:
 @pytest.mark.parametrize(
     ("plain", "more"),
     [
-        (data(SHAKE), data(SHAKE, recording={"sphere_interval_s": 0.02})),
-        (data(SHAKE), data(SHAKE, recording={"dissipation_interval_s": 1e-3})),
+        (data(SHAKE), data(SHAKE, recording={"sphere_interval_s": 0.02, "dissipation_interval_s": 1e-3})),
         (data({**RELAX, "duration_s": 0.1}), data({**SHAKE, "peak_acceleration_g": 0})),
     ],
-    ids=["sphere glyphs", "energy account", "shaking at Γ = 0"],
+    ids=["sphere glyphs and energy account", "shaking at Γ = 0"],
 )
-def test_what_only_looks_or_has_no_strength_changes_no_bit(
+def test_what_only_records_or_has_no_strength_changes_no_bit(
     run: Callable[[dict[str, Any]], Path], plain: dict[str, Any], more: dict[str, Any]
 ) -> None:
     assert differing(run(plain), run(more)) == []
@@ -144,13 +133,13 @@ def test_the_comparison_sees_the_smallest_change(run: Callable[[dict[str, Any]],
     assert len(differing(run(data(SHAKE)), run(stronger))) > 10
 
 
-# -- found on the way ----------------------------------------------------------------------------------------------
+# -- checkpoints ---------------------------------------------------------------------------------------------------
 
 
 def test_energies_of_contacts_are_known_right_after_a_checkpoint(simulate: Simulate, tmp_path: Path) -> None:
-    """YADE does not save how far bodies overlap; a wall that goes away at a checkpoint made the ledger no number."""
+    # YADE does not save overlaps; a wall that goes away at a checkpoint must not make the ledger NaN.
     scene = data(REMOVE, recording={"dissipation_interval_s": 1e-3})
-    ledger = simulate(effect_cases.account_after_reload, scene, str(tmp_path))
+    ledger = simulate(cases.ledger_after_reload, scene, str(tmp_path))
     assert ledger["before"][0] > 1e-9
     assert ledger["after"] == pytest.approx(ledger["before"], rel=1e-12)
     assert np.isfinite(ledger["dissipated"])

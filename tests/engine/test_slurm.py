@@ -1,20 +1,18 @@
-"""Sweeps through a real Slurm, started here: a run fails, one meets the time limit and goes on with the same bits."""
+"""Sweeps through a real Slurm, started here: a run fails, one meets the time limit and goes on with its bits."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from processes import complete, differing, gate, results
-from slurm_here import SlurmHere, slurm_here
+from slurm_here import SlurmHere, slurm_here, wait_until
 
 SCENE = """\
 schema_version: 1
@@ -46,14 +44,13 @@ schema_version = 1
 name = "here"
 scheduler = "slurm"
 max_array_size = 1001
-signal_lead_s = 40
+signal_lead_s = 70
 default_partition = "only"
 [partitions.only]
 cores_per_node = 6
 memory_per_node_mib = 6000
 max_time = "00:10:00"
 """
-WAIT_S = 600.0
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +67,6 @@ def smarticles(slurm: SlurmHere) -> Callable[..., str]:
     return call
 
 
-def wait_until(condition: Callable[[], object], what: Callable[[], str]) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline, what()
-        time.sleep(0.05)
-
-
 def waits(process: int, number: signal.Signals) -> bool:
     """Whether a process is stopped, and a signal waits for it."""
     status = Path(f"/proc/{process}/status").read_text()
@@ -91,10 +81,7 @@ def states(smarticles: Callable[..., str], out: Path) -> dict[str, Any]:
 
 
 def go_on_when_signalled(run: Path, held: Path) -> None:
-    """Wait until Slurm has told a run that holds itself still that its time limit is near; then let it go on.
-
-    So the limit is met by wall time, however fast or busy the machine is.
-    """
+    """Wait until Slurm signals a stopped run that its time limit is near, and continue it."""
     wait_until(held.exists, lambda: f"{run}: did not come to its second checkpoint")
     process = int((run / ".lock").read_text())
     try:
@@ -159,7 +146,7 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     assert (out / "runs" / "fails.stopped-2" / "failed.json").exists()
 
 
-def test_a_refused_job_is_reported_and_nothing_is_lost(
+def test_a_rejected_job_is_reported_and_nothing_is_lost(
     slurm: SlurmHere, smarticles: Callable[..., str], tmp_path: Path
 ) -> None:
     for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP.replace("relax_s: 0.5", "relax_s: 0.1"))):
@@ -167,17 +154,9 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
     (tmp_path / "here.toml").write_text(
         CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent")
     )
-    command = [
-        sys.executable,
-        "-m",
-        "smarticles",
-        "sweep",
-        str(tmp_path / "sweep.yaml"),
-        "--out",
-        str(tmp_path / "out"),
-    ]
-    command += ["--submit", "slurm", "--cluster", str(tmp_path / "here.toml")]
-    done = subprocess.run(command, env=slurm.environment, capture_output=True, text=True, check=False)
+    words = ["sweep", tmp_path / "sweep.yaml", "--out", tmp_path / "out", "--submit", "slurm", "--cluster"]
+    command = [sys.executable, "-m", "smarticles", *words, tmp_path / "here.toml"]
+    done = slurm.ask(*map(str, command))
     assert done.returncode == 1
     assert "sbatch refused it: " in done.stderr
     assert "invalid partition specified: absent" in done.stderr

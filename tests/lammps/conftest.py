@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from lammps_builds import Build
 
+from dem.engine.cores import most_ranks
+from dem.engine.demand import contact_law_of
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
-from dem.engine.lammps.kind import contact_law_of
-from dem.engine.lammps.ranks import most_ranks
 from dem.errors import RunError
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
@@ -29,8 +28,8 @@ def _installed() -> None:
 
 
 @pytest.fixture
-def build() -> Iterator[Build]:
-    """Builds engines of scenes, on two ranks unless told otherwise, that end with the test."""
+def build() -> Iterator[Callable[..., LammpsEngine]]:
+    """Builds engines of scenes, by default on two ranks, that end with the test."""
     built: list[LammpsEngine] = []
 
     def make(scene: Scene, *, ranks: int = 2, **instead: Any) -> LammpsEngine:

@@ -259,7 +259,7 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
         motors.torque[0] = torque
         before = plain.commands.copy()
         far = before + 1.0
-        plain.look(before - torque, far, 2e-4, 5e-5)
+        plain.update(before - torque, far, 2e-4, 5e-5)
         motors.schedule[0] = motors.command[0] = made._world.bodies.alpha[0]
         made.motors.actuate((made._world.bodies.alpha + 1.0)[None], 2e-4)
         update(made._world.shape, made._world.bodies, made._world.motors)

@@ -14,10 +14,11 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.record.columns import EVERY
 from dem.record.document import Done, Failed, Manifest, Phase
 from dem.record.frame import centreline_mesh
 from dem.record.frames import FrameWriter
-from synthetic.series import write_series
+from dem.record.series import SeriesWriter
 from synthetic.shapes import RADIUS, T1, T2, W, u_shape
 
 PHASES = ("deposit", "relax", "shake", "relax")
@@ -27,12 +28,12 @@ ACTUATED = ("shape-change", "internal-oscillation")
 
 @dataclass(frozen=True, kw_only=True)
 class SyntheticRun:
-    """What a made-up run is to look like; `packing` is φ at the end of each phase.
+    """A made-up run; `packing` is φ at the end of each phase.
 
     `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
     a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
-    `wall_s` [s]; `more` are constant series: name, value. The scene tells of contact where there is a `friction`, which
-    is that of walls too unless these have their own.
+    `wall_s` [s]; `more` are constant series: name, value. The scene has a contact where there is a `friction`, which
+    walls share unless they have their own.
     """
 
     aspect_ratio: float = 0.7
@@ -67,18 +68,10 @@ class SyntheticRun:
 
     @property
     def durations(self) -> dict[str, float]:
-        """How long each type of phase takes [s]."""
-        return {
-            "deposit": 1.0,
-            "relax": 0.5,
-            "shake": self.shake_time,
-            "shape-change": 3.0,
-            "internal-oscillation": self.oscillate_time,
-            "pull-hook": 2.0,
-            "remove-container": 2.0,
-            "arrange": 1.0,
-            "strain": 3.0,
-        }
+        """Duration of each type of phase [s]."""
+        fixed = {"deposit": 1.0, "relax": 0.5, "shape-change": 3.0, "pull-hook": 2.0, "remove-container": 2.0}
+        driven = {"shake": self.shake_time, "internal-oscillation": self.oscillate_time}
+        return {**fixed, **driven, "arrange": 1.0, "strain": 3.0}
 
     def shares(self) -> NDArray[np.float64]:
         """(N,) centres of mass over the second-highest one."""
@@ -126,9 +119,17 @@ def mesh_of(
     )
 
 
-def write_frame(path: Path, vertices: NDArray[np.float64], **told: Any) -> None:
+def write_frame(path: Path, vertices: NDArray[np.float64], **content: Any) -> None:
     """One frame file; keywords as `mesh_of`."""
-    meshio.vtu.write(str(path), mesh_of(vertices, **told))
+    meshio.vtu.write(str(path), mesh_of(vertices, **content))
+
+
+def write_series(directory: Path, columns: Mapping[str, ArrayLike], *, seed: int, scene_sha256: str = "0" * 64) -> None:
+    """Write `series.h5` with some of its columns, and all their samples."""
+    described = {name: EVERY[name] for name in columns}
+    writer = SeriesWriter(directory, described, {"scene_sha256": scene_sha256, "seed": seed})
+    writer.restore({name: np.asarray(values) for name, values in columns.items()})
+    writer.write()
 
 
 def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
@@ -166,14 +167,9 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
 def write_ending(
     directory: Path, phases: Sequence[str], spans: Iterable[tuple[float, float]], *, status: str, wall: float
 ) -> None:
-    """`done.json` or `failed.json`, or neither for a run that is unfinished.
+    """Write `done.json`, `failed.json`, or neither, by status; `spans` are start and end of each phase [s].
 
-    Args:
-        directory: the run directory.
-        phases: their types.
-        spans: start and end of each [s].
-        status: as in `Status`, or unfinished.
-        wall: wall and processor time of each phase [s].
+    Each phase took `wall` of wall and processor time [s].
     """
     timed = [
         {"index": k, "type": kind, "start_s": float(start), "end_s": float(end), "wall_s": wall, "cpu_s": wall}
@@ -246,7 +242,7 @@ def _write_series(directory: Path, run: SyntheticRun, rows: NDArray[np.float64])
 
 
 def write_ended(directory: Path, scene_sha256: str, *, status: str = "done") -> None:
-    """A run of a scene that has ended, as far as sweeps look at it: its manifest and its end."""
+    """Write what sweeps read of a run that has ended: its manifest and its end."""
     directory.mkdir(parents=True)
     write_manifest(directory, SyntheticRun(phases=("deposit",)), scene_sha256=scene_sha256)
     write_ending(directory, ("deposit",), [(0.0, 1.0)], status=status, wall=2.0)

@@ -1,4 +1,4 @@
-"""Run directories of columns that collapse as told: a share of the smarticles leaves, and all of them sink."""
+"""Run directories of columns that collapse: a given share of the smarticles leaves, and all of them sink."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import yaml
 from numpy.typing import NDArray
 
 from dem.record.frames import FrameWriter
-from synthetic import RADIUS, SyntheticRun, W, mesh_of, u_shape, write_ending, write_manifest
-from synthetic.series import write_series
+from synthetic import RADIUS, SyntheticRun, W, mesh_of, u_shape, write_ending, write_manifest, write_series
 
 F = 30.0
 PHASES = ("deposit", "shake", "relax", "remove-container", "shake")
@@ -23,7 +22,7 @@ WITH_WALL = 1.25  # of it: the column sinks when its wall goes
 class Column:
     """A column of `count` smarticles whose share within the radius goes as exp(-(t/tau)^beta).
 
-    Its centre of mass goes from H0 to 0.4 H0 in half that time. It is watched for `watched` [s].
+    Its centre of mass goes from H0 to 0.4 H0 in half that time.
     """
 
     tau: float
@@ -31,7 +30,6 @@ class Column:
     aspect_ratio: float = 0.4
     gamma: float = 2.5
     seed: int = 1
-    watched: float = 3.0
     count: int = 50
     frequency: float = F
     status: str = "done"
@@ -43,7 +41,7 @@ def write_column(directory: Path, column: Column) -> Path:
     directory.mkdir(parents=True)
     known = {"phases": column.phases, "count": column.count, "aspect_ratio": column.aspect_ratio}
     write_manifest(directory, SyntheticRun(seed=column.seed, **known))
-    durations = [1.0, 0.5, 0.2, 0.2, column.watched]
+    durations = [1.0, 0.5, 0.2, 0.2, 3.0]
     ends = np.cumsum(durations[: len(column.phases)])
     starts = ends - durations[: len(column.phases)]
     times = np.arange(1, round(ends[-1] / 0.005) + 1) * 0.005

@@ -1,4 +1,4 @@
-"""Fixtures of whoever reads run directories: smarticles and small runs, in the files of `dem.record`."""
+"""Fixtures of tests that read run directories: smarticles and small runs, in the files of `dem.record`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from dem.record.frames import FrameWriter
-from synthetic import SyntheticRun, mesh_of, write_manifest
-from synthetic.series import write_series
+from synthetic import SyntheticRun, mesh_of, write_manifest, write_series
 from synthetic.shapes import W, bent, random_scene
 
 PHASES = ("deposit", "relax", "shake", "relax")
@@ -68,7 +67,7 @@ def run(make_run):
 
 @pytest.fixture(scope="session")
 def write_frame():
-    """Writes one frame file, spoilt as told, and returns its path; keywords as `mesh_of`."""
+    """Writes one frame file, changed on request, and returns its path; keywords as `mesh_of`."""
 
     def write(directory, vertices=None, *, drop=None, change=None, **keywords):
         vertices = random_scene(2, 0) if vertices is None else vertices

@@ -30,7 +30,7 @@ def pressed(pairs: Sequence[tuple[int, int]], loads: Sequence[float], points: ob
 
 
 def write_forces(directory: Path, found: ContactForces) -> None:
-    """The same forces with every frame of a run."""
+    """Write these forces with every frame of a run."""
     writer = FrameWriter(directory, FORCE)
     for frame in read_frames(directory):
         centres = centres_of_mass(frame.vertices)

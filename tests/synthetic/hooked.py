@@ -7,8 +7,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from synthetic import SyntheticRun, W, write_run
-from synthetic.series import write_series
+from synthetic import SyntheticRun, W, write_run, write_series
 
 GRAVITY = 9.81
 SPEED = W  # of the hook: w per second
@@ -35,12 +34,12 @@ def write_hooked_run(
     """A whole run whose last phase pulls the hook.
 
     Args:
-        directory: The run directory.
-        run: What it is.
-        force: Needed to raise the hook [N], of times since the pull began [s].
-        limit: The force that is to stop the hook [N].
-        stops: When it does so, since the pull began [s].
-        spent: By motors, or by the shaken container, steadily in the third phase [J].
+        directory: the run directory.
+        run: phases and pile.
+        force: needed to raise the hook [N], of times since the pull began [s].
+        limit: force that stops the hook [N].
+        stops: when it does so, since the pull began [s].
+        spent: by motors, or by the shaken container, steadily in the third phase [J].
     """
     write_run(directory, run)
     path = directory / "scene.yaml"

@@ -8,8 +8,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from synthetic import SyntheticRun, write_manifest, write_run
-from synthetic.series import write_series
+from synthetic import SyntheticRun, write_manifest, write_run, write_series
 
 LENGTH, SPEED, INTERVAL = 0.083, 0.02, 0.001  # m, m/s, s
 WIDTH = 0.062
@@ -22,13 +21,9 @@ def write_strained_run(
     channel: float = 0.08,
     **changes: Any,
 ) -> Path:
-    """A whole run of one phase that strains a chain.
+    """A whole run of one phase that strains a chain; `force` is on the pulled string [N], of strains [1].
 
-    Args:
-        directory: The run directory.
-        force: On the pulled string [N], of strains [-].
-        channel: Distance of the walls [m].
-        changes: Of the `SyntheticRun`.
+    `channel` is the distance of the walls [m], `changes` are those of the `SyntheticRun`.
     """
     run = SyntheticRun(phases=("strain",), **{"count": 2, **changes})
     write_run(directory, run)

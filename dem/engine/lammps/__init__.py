@@ -1,1 +1,1 @@
-"""LAMMPS as an engine: sphere chains on several processors and nodes, a child process that is told what to do."""
+"""LAMMPS as an engine: sphere chains on several processors and nodes, in a child process."""

@@ -18,12 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Part:
-    """One part of the container: base + amplitude sin(ω (t - begun)).
-
-    Args:
-        base: height [m].
-        amplitude: [m].
-    """
+    """One part of the container: its height [m] is base + amplitude sin(ω (t - begun))."""
 
     base: float = 0.0
     amplitude: float = 0.0
@@ -31,24 +26,26 @@ class Part:
 
 @dataclass
 class LammpsBoundaries:
-    """See `dem.engine.interface.Boundaries`. Heights are sines of the step, as LAMMPS's variables are.
+    """`dem.engine.interface.Boundaries` on LAMMPS. Heights are sines of the step, as LAMMPS's variables are.
 
     Args:
         cylinder: the container.
-        tell: LAMMPS's ear, for commands.
-        clock: the steps made and the time step [s].
+        send: sends commands to LAMMPS.
+        clock: returns the steps made and the time step [s].
     """
 
     cylinder: Cylinder
-    tell: Callable[[Iterator[str]], None]
+    send: Callable[[Iterator[str]], None]
     clock: Callable[[], tuple[int, float]]
     walled: bool = True
-    """See the interface."""
     _omega: float = 0.0
     _begun: int = 0
     _parts: dict[str, Part] = field(default_factory=lambda: {"floor": Part(), "wall": Part()})
 
-    # -- how they stand ----------------------------------------------------------------------------------------
+    upper_height = math.nan
+    hook_sums = channel_sums = np.zeros((0, 3))
+
+    # -- where they are ----------------------------------------------------------------------------------------
 
     def _phase(self) -> float:
         steps, dt = self.clock()
@@ -60,12 +57,10 @@ class LammpsBoundaries:
 
     @property
     def floor(self) -> float:
-        """See the interface."""
         return self._height("floor")
 
     @property
     def velocity(self) -> float:
-        """See the interface."""
         return self._parts["floor"].amplitude * self._omega * math.cos(self._phase())
 
     @property
@@ -75,7 +70,6 @@ class LammpsBoundaries:
 
     @property
     def wall_bottom(self) -> float:
-        """See the interface."""
         return self._height("wall") + self.cylinder.bottom if self.walled else math.inf
 
     @property
@@ -85,33 +79,24 @@ class LammpsBoundaries:
 
     @property
     def enclosed(self) -> bool:
-        """See the interface."""
         return self.walled and self.wall_bottom < self.floor
 
     @property
     def raised(self) -> float | None:
-        """See the interface: there are no hooks."""
         return 0.0 if self.enclosed else None
-
-    @property
-    def upper_height(self) -> float:
-        """See the interface."""
-        return math.nan
 
     # -- how they move -----------------------------------------------------------------------------------------
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """See the interface."""
         self._hold()
         self._begun, self._omega = self.clock()[0], 2 * math.pi * frequency
         for name in ("floor", "wall") if walls and self.walled else ("floor",):
             self._parts[name].amplitude = amplitude
-        self.tell(self.variables())
+        self.send(self.variables())
 
     def stop(self) -> None:
-        """See the interface."""
         self._hold()
-        self.tell(self.variables())
+        self.send(self.variables())
 
     def _hold(self) -> None:
         for name, part in self._parts.items():
@@ -119,39 +104,24 @@ class LammpsBoundaries:
         self._omega = 0.0
 
     def lift_wall(self, speed: float) -> None:
-        """See the interface; refused before there is an engine."""
         msg = "engine: lammps cannot lift the wall"
         raise RunError(msg)
 
     def raise_upper(self, speed: float) -> None:
-        """See the interface; refused before there is an engine."""
         msg = "engine: lammps has no hooks"
         raise RunError(msg)
 
     def remove_wall(self) -> None:
-        """See the interface."""
         self.walled = False
-        self.tell(iter(("unfix wall", "region wall delete")))
+        self.send(iter(("unfix wall", "region wall delete")))
 
     def variables(self) -> Iterator[str]:
-        """Commands that set the variables which heights are made of."""
+        """Yield commands that set the variables which heights are made of."""
         yield f"variable omega equal {self._omega:.17g}"
         yield f"variable begun equal {self._begun}"
         for name, part in self._parts.items():
             yield f"variable {name}_base equal {part.base:.17g}"
             yield f"variable {name}_amplitude equal {part.amplitude:.17g}"
-
-    # -- what they feel ----------------------------------------------------------------------------------------
-
-    @property
-    def hook_sums(self) -> Array:
-        """See the interface: there are none."""
-        return np.zeros((0, 3))
-
-    @property
-    def channel_sums(self) -> Array:
-        """See the interface: there are none."""
-        return np.zeros((0, 3))
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
@@ -162,6 +132,6 @@ class LammpsBoundaries:
         return {"walled": self.walled, "omega": self._omega, "begun": self._begun, "parts": parts}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken; LAMMPS is told by whoever calls."""
+        """Go on from where `memory` was taken; the caller sends `variables`."""
         self.walled, self._omega, self._begun = memory["walled"], memory["omega"], memory["begun"]
         self._parts = {name: Part(*numbers) for name, numbers in memory["parts"].items()}

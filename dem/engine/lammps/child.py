@@ -1,4 +1,4 @@
-"""LAMMPS as a child process under `mpirun`: started, told commands, heard, and its death explained."""
+"""LAMMPS as a child process under `mpirun`: its start, commands and answers, and why it ended."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ LMP, MPIRUN = "lmp", "mpirun"
 NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")
 """Styles of LAMMPS that the engine is made of."""
 INSTALL = "install it with `make setup-mpi` or `apt-get install lammps openmpi-bin`"
-LOG, SAID, HEARD = "log.lammps", "mpirun.txt", "answers"
-LOOK_S = 0.2  # between looks at whether a child that does not answer is alive
+LOG, SAID, ANSWERS = "log.lammps", "mpirun.txt", "answers"
+POLL_S = 0.2  # between checks whether a child that does not answer is alive
 
-# As root, as in containers, mpirun refuses without these; others do not notice them.
+# As root, as in containers, mpirun does not start without these; for other users they do nothing.
 _ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-# It ends when the run is killed, whatever it is at: it would wait for ever to be heard.
+# It ends when the run is killed: otherwise it would wait for its answer to be read for ever.
 _TIED = ("/usr/bin/setpriv", "--pdeathsig", "TERM")
-# Two words of one program: two runs at once would all be bound to the same first cores.
+# "--bind-to none": two runs at once would be bound to the same first cores.
 _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mpi_yield_when_idle 1".split(),)
 
 
 def lammps_version() -> str:
-    """Version of the LAMMPS that runs.
+    """Return the version of the LAMMPS that runs.
 
     Raises:
         RunError: it or mpirun is not installed, does not start, or lacks what the engine is made of.
@@ -48,18 +48,18 @@ def lammps_version() -> str:
 @lru_cache
 def _version(program: str) -> str:
     try:
-        told = subprocess.run(
+        answer = subprocess.run(
             [program, "-h"], check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         msg = f"{program}: LAMMPS does not start ({error}); {INSTALL}"
         raise RunError(msg) from None
-    found = re.search(r"Simulator - (.+)", told.stdout)
-    if told.returncode or found is None:
-        lines = (told.stderr or told.stdout).strip().splitlines()
+    found = re.search(r"Simulator - (.+)", answer.stdout)
+    if answer.returncode or found is None:
+        lines = (answer.stderr or answer.stdout).strip().splitlines()
         msg = f"{program}: is no LAMMPS that starts ({lines[-1] if lines else 'it says nothing'}); {INSTALL}"
         raise RunError(msg)
-    words = set(told.stdout.split())
+    words = set(answer.stdout.split())
     if missing := [style for style in NEEDED if style not in words]:
         msg = (
             f"{program}: LAMMPS {found[1]} was built without {', '.join(missing)} (its packages GRANULAR and RIGID); "
@@ -70,10 +70,7 @@ def _version(program: str) -> str:
 
 
 class Child:
-    """A LAMMPS that reads commands, on some processors, until it is closed or its parent ends.
-
-    Args:
-        ranks: processes.
+    """A LAMMPS that reads commands, on some ranks, until it is closed or its parent ends.
 
     Raises:
         RunError: it does not start.
@@ -83,10 +80,10 @@ class Child:
         self.ranks = ranks
         self.scratch = Path(tempfile.mkdtemp(prefix="smarticles-lammps-"))
         """Folder of files that it reads and writes."""
-        fifo = self.scratch / HEARD
+        fifo = self.scratch / ANSWERS
         os.mkfifo(fifo)
         # Opened for writing too, so that there is never an end of it.
-        self._heard = os.open(fifo, os.O_RDWR | os.O_NONBLOCK)
+        self._answers = os.open(fifo, os.O_RDWR | os.O_NONBLOCK)
         self._answer = f'print "done" append {fifo} screen no\n'
         tied = _TIED if Path(_TIED[0]).exists() else ()
         command = [*tied, MPIRUN, *_OPTIONS, "-np", str(ranks), LMP, "-nocite", "-screen", "none", "-log", LOG]
@@ -106,11 +103,11 @@ class Child:
             shutil.rmtree(self.scratch, ignore_errors=True)
             msg = f"{MPIRUN}: cannot be started ({error.strerror}); {INSTALL}"
             raise RunError(msg) from None
-        self.close = weakref.finalize(self, _end, self._process, self._heard, self.scratch)
+        self.close = weakref.finalize(self, _end, self._process, self._answers, self.scratch)
         """End it and remove its files; done at the end of the process at the latest."""
 
     def cpu(self) -> float:
-        """Processor time [s] of its ranks on this machine; 0 once it has ended."""
+        """Return the processor time [s] of its ranks on this machine; 0 once it has ended."""
         ticks = 0
         for rank in self.local_ranks():
             # After the name, which may hold anything: utime and stime are the 14th and 15th word of all.
@@ -119,16 +116,16 @@ class Child:
         return ticks / os.sysconf("SC_CLK_TCK")
 
     def local_ranks(self) -> list[int]:
-        """Process ids of its ranks on this machine, the first one first."""
+        """Return the process ids of its ranks on this machine, the first one first."""
         number = self._process.pid
         children = map(int, _text(Path(f"/proc/{number}/task/{number}/children")).split())
         return [child for child in children if _text(Path(f"/proc/{child}/comm")).strip() == LMP]
 
-    def tell(self, *commands: str) -> None:
-        """Let it obey some commands, and wait until it has.
+    def send(self, *commands: str) -> None:
+        """Send commands, and wait until LAMMPS has carried them out.
 
         Raises:
-            RunError: it died; the message says what its own log tells of the cause, and the way out.
+            RunError: it ended; the message gives the cause from its log, and the way out.
         """
         text = "\n".join(commands) + "\n" + self._answer
         assert self._process.stdin is not None
@@ -137,13 +134,13 @@ class Child:
             self._process.stdin.flush()
         except (BrokenPipeError, ValueError):
             self._process.wait()
-        while not select.select([self._heard], [], [], LOOK_S)[0]:
-            if self._process.poll() is not None and not select.select([self._heard], [], [], 0)[0]:
-                raise RunError(self._obituary())
-        os.read(self._heard, 4096)
+        while not select.select([self._answers], [], [], POLL_S)[0]:
+            if self._process.poll() is not None and not select.select([self._answers], [], [], 0)[0]:
+                raise RunError(self._why_it_ended())
+        os.read(self._answers, 4096)
 
-    def _obituary(self) -> str:
-        """What it died of, in one line. Its log stays."""
+    def _why_it_ended(self) -> str:
+        """Return why it ended, in one line, and keep its log."""
         status = self._process.returncode
         log, said = (_text(self.scratch / name) for name in (LOG, SAID))
         cause, way_out = explain(log, said, status)
@@ -154,19 +151,13 @@ class Child:
 
 
 def explain(log: str, said: str, status: int | None) -> tuple[str, str]:
-    """Why LAMMPS ended, and the way out.
-
-    Args:
-        log: LAMMPS's log.
-        said: what it and mpirun printed.
-        status: exit status of mpirun.
-    """
+    """Return why LAMMPS ended, and the way out, from its log, what was printed, and mpirun's exit status."""
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{said}", re.MULTILINE)
     if errors:
         cause = re.sub(r"\s*\([^()]*\.(?:cpp|h):\d+\)\s*$", "", errors[0]).strip()
         last = re.findall(r"^Last command: (.+)", f"{log}\n{said}", re.MULTILINE)
-        told = f"{cause} (command: {' '.join(last[0].split())})" if last else cause
-        return told, next((way_out for words, way_out in _WAYS_OUT if re.search(words, cause)), "see its log")
+        where = f" (command: {' '.join(last[0].split())})" if last else ""
+        return cause + where, next((way_out for words, way_out in _WAYS_OUT if re.search(words, cause)), "see its log")
     killed = re.search(r"process rank (\d+) .*?exited on\s+signal (\d+) \(([^)]*)\)", " ".join(said.split()))
     if killed:
         way_out = "go on from the last checkpoint with `smarticles resume`"
@@ -194,8 +185,8 @@ def _text(path: Path) -> str:
         return ""
 
 
-def _end(process: subprocess.Popen[bytes], heard: int, scratch: Path) -> None:
-    """What is left to do for a child, once."""
+def _end(process: subprocess.Popen[bytes], answers: int, scratch: Path) -> None:
+    """End a child and remove its files."""
     if process.poll() is None:
         process.terminate()
         try:
@@ -208,5 +199,5 @@ def _end(process: subprocess.Popen[bytes], heard: int, scratch: Path) -> None:
             process.stdin.close()
         except OSError:
             pass  # what was not read yet
-    os.close(heard)
+    os.close(answers)
     shutil.rmtree(scratch, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Who touches whom, and how deep, from the places of the spheres: LAMMPS is not asked."""
+"""Contacts and their overlaps from the positions of the spheres, without LAMMPS."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Contacts:
 
     @classmethod
     def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:
-        """Contacts of spheres (N, S, 3) [m] of a radius [m] with each other and with floor and wall."""
+        """Find the contacts of spheres (N, S, 3) [m] of a radius [m] with each other, floor and wall."""
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
         owners = np.repeat(np.arange(count), each)
@@ -58,17 +58,17 @@ class Contacts:
         )
 
     def neighbours(self) -> NDArray[np.int64]:
-        """(N,) how many other smarticles each one touches."""
+        """Return for each smarticle (N,) how many others it touches."""
         ordered = np.sort(self.pairs, axis=1)
         both = np.unique(ordered[:, 0] * self.count + ordered[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
-        """(N,) contacts of each smarticle, spheres counted singly."""
+        """Return the number (N,) of contacts of each smarticle, sphere by sphere."""
         return np.bincount(np.concatenate([self.pairs.ravel(), self.fixed]), minlength=self.count)
 
     def overlaps(self, limit: float, law: ContactLaw) -> Overlaps:
-        """See `dem.engine.interface.Engine.overlaps`."""
+        """Return the overlaps of all contacts, with the smarticles that have one deeper than a limit [m]."""
         deep = np.zeros(self.count, dtype=np.bool_)
         deep[self.pairs[self.depths > limit]] = True
         deep[self.fixed[self.fixed_depths > limit]] = True
@@ -76,7 +76,7 @@ class Contacts:
         return Overlaps(float(depths.max(initial=0.0)), deep, self.elastic_energy(law))
 
     def elastic_energy(self, law: ContactLaw) -> float:
-        """No less than what the springs of all contacts hold [J]: friction bounds tangential ones by normal ones."""
+        """Return an upper bound of the energy in all contacts [J]; friction bounds tangential springs."""
         squares = float((self.depths**2).sum() + (self.fixed_depths**2).sum())
         friction = max(law.friction, law.wall_friction)
         return law.normal_stiffness / 2 * squares * (1 + friction**2 * law.normal_stiffness / law.tangential_stiffness)

@@ -6,7 +6,7 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -15,19 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.engine.interface import Saved
+from dem.engine.interface import MotorReadings, Saved
 from dem.engine.lammps import text
-from dem.engine.lammps.absent import NoMotors, NoStrings, refuse
 from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.engine.lammps.child import Child
 from dem.engine.lammps.contacts import Contacts
-from dem.engine.lammps.ledger import LammpsLedger
 from dem.engine.lammps.text import Moving
 from dem.errors import InputError, RunError
-from dem.physics.contact import ContactLaw
+from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
 
@@ -38,19 +37,82 @@ SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "stat
 HEAD = 9  # lines of a dump before its rows
 
 
-class LammpsEngine:
-    """See `dem.engine.interface.Engine`.
+def absent(what: str) -> NoReturn:
+    """Reject a call for what LAMMPS has none of here; scenes that call for it are rejected before there is an engine.
 
-    LAMMPS moves smarticles; what is asked of them at one instant is told from their poses, which it writes down after
-    each advance.
+    Raises:
+        RunError: always.
+    """
+    msg = f"engine: lammps has no {what}"
+    raise RunError(msg)
+
+
+class NoMotors:
+    """`dem.engine.interface.Motors` of smarticles that stay welded."""
+
+    present = False
+    articulated = False
+    looks_at_once = 1
+    readings: MotorReadings | None = None
+    work = 0.0
+
+    def articulate(self) -> None:
+        absent("motors")
+
+    def weld(self) -> None:
+        pass
+
+    def actuate(self, targets: Array, interval: float) -> None:
+        absent("motors")
+
+    def gaps(self) -> Array:
+        return np.zeros((0, 2))
+
+
+class NoStrings:
+    """`dem.engine.interface.Strings`, of which there are none."""
+
+    tied = False
+    pulled = math.nan
+    sums = ties = np.zeros((0, 3))
+
+    def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
+        absent("strings")
+
+    def untie(self) -> None:
+        pass
+
+
+class LammpsLedger:
+    """`dem.engine.interface.EnergyLedger`; what contacts and boundaries do is not added up."""
+
+    container_work = 0.0
+
+    def __init__(self, moving: Callable[[], bool], stored: Callable[[], float]) -> None:
+        self._moving, self._stored = moving, stored
+        self.added = self.dissipated = 0.0
+
+    @property
+    def given(self) -> float:
+        return math.nan if self._moving() else self.added + self.container_work
+
+    def elastic(self) -> tuple[float, float]:
+        return self._stored(), 0.0
+
+    def take_in(self) -> None:
+        self.added += self.elastic()[0]
+
+
+class LammpsEngine:
+    """`dem.engine.interface.Engine` on LAMMPS.
+
+    LAMMPS moves smarticles; what is asked of them at one instant follows from their poses, which it writes to a file
+    after each advance.
 
     Args:
-        particle: one smarticle.
         cylinder: the container; its floor is at z = 0 at the start.
-        law: contact law.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
-        ranks: processes.
     """
 
     def __init__(
@@ -64,16 +126,13 @@ class LammpsEngine:
         ranks: int = 1,
     ) -> None:
         self.particle = particle
-        """See the interface."""
         self.cylinder = cylinder
-        """See the interface."""
         self.gravity = gravity
-        """See the interface."""
         self.time, self.steps, self.time_step = 0.0, 0, time_step
         self._law = law
         self.child = Child(ranks)
         """LAMMPS."""
-        self._cpu_before = 0.0  # of LAMMPS before it was started anew [s]
+        self._cpu_before = 0.0  # of LAMMPS before it was restarted [s]
         self._moving = Moving.none()
         # Body frame in LAMMPS's own principal frame of each smarticle, known from the first dump on.
         self._frames: Array | None = None
@@ -82,26 +141,24 @@ class LammpsEngine:
         self._seconds = 0.0
         self._thrown = 0.0
         self._contacts: Contacts | None = None
-        self.boundaries = LammpsBoundaries(cylinder, self._told, lambda: (self.steps, self.time_step))
-        """See the interface."""
+        self.boundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
         self.motors, self.strings = NoMotors(), NoStrings()
         self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
-        """See the interface."""
 
-    # -- what LAMMPS is told -----------------------------------------------------------------------------------
+    # -- commands ----------------------------------------------------------------------------------------------
 
-    def _told(self, commands: Iterator[str]) -> None:
-        """Tell LAMMPS something that the next run must be set up for; before there is a box it is told all at once."""
+    def _send(self, commands: Iterator[str]) -> None:
+        """Send commands that the next run must be set up for; before there is a box, `_scene` contains them."""
         self._contacts = None
         if self._box:
-            self.child.tell(*commands)
+            self.child.send(*commands)
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Everything but the bodies, for a LAMMPS that knows nothing; `box` is the command that brings the spheres."""
+        """Yield all commands but those of the bodies, for a new LAMMPS; `box` is the command that reads the spheres."""
         between, at_wall = text.contact_terms(self._law, self.particle.boxes.mass)
         yield from text.before_box(self.particle)
-        # The pile is cut like a cake: a cut across would leave the upper part without work.
+        # Ranks share the pile by vertical cuts: a horizontal one would leave the upper part without work.
         yield "processors * * 1"
         yield box
         yield from text.neighbours(self.particle)
@@ -118,7 +175,7 @@ class LammpsEngine:
     def _bodies(self, file: str) -> Iterator[str]:
         # Last of all, since what it does at the set-up of a run needs the forces of the others.
         yield f"fix bodies all rigid/small molecule infile {file} reinit no"
-        yield from text.looking("bodies.*.dump", when="v_when")
+        yield from text.writing("bodies.*.dump", when="v_when")
 
     def _forget_bodies(self) -> Iterator[str]:
         yield "undump bodies"
@@ -126,7 +183,7 @@ class LammpsEngine:
         yield "unfix bodies"
 
     def _balanced(self) -> Iterator[str]:
-        """Equal shares of the spheres; two halves of a round pile are."""
+        """Yield the command that gives ranks equal shares of the spheres, as two halves of a round pile are."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 
@@ -134,21 +191,18 @@ class LammpsEngine:
 
     @property
     def cpu_elsewhere(self) -> float:
-        """See the interface: of all ranks on this machine."""
         return self._cpu_before + self.child.cpu()
 
     def set_time_step(self, time_step: float) -> None:
-        """See the interface."""
         if time_step == self.time_step:
             return
         if self.boundaries.moving:
             msg = "engine: lammps cannot change the time step while the container moves"
             raise RunError(msg)
         self.time_step = time_step
-        self._told(iter((f"timestep {time_step:.17g}",)))
+        self._send(iter((f"timestep {time_step:.17g}",)))
 
     def advance(self, steps: int) -> None:
-        """See the interface."""
         if steps <= 0:
             return
         if self.count:
@@ -164,7 +218,7 @@ class LammpsEngine:
     def _run(self, steps: int) -> None:
         target = self.steps + steps
         try:
-            self.child.tell(
+            self.child.send(
                 f"variable when equal {target}+1000000000*(step>={target})",
                 f"run {steps} pre {'yes' if self._fresh else 'no'} post no",
             )
@@ -187,13 +241,13 @@ class LammpsEngine:
         )
 
     def _read(self, step: int) -> Array:
-        """(N, 20) numbers of all bodies at a step, as `LOOKED_AT` names them; its file is gone then."""
+        """Return (N, 20) numbers of all bodies at a step, as `WRITTEN` names them, and remove their file."""
         file = self.child.scratch / f"bodies.{step}.dump"
         lines = file.read_text(encoding="ascii").split("\n", HEAD)
-        rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.LOOKED_AT.split()))
+        rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
         file.unlink()
         if len(rows) != self.count:
-            msg = f"LAMMPS told of {len(rows)} of {self.count} smarticles at step {step}"
+            msg = f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}"
             raise RunError(msg)
         ordered: Array = rows[np.argsort(rows[:, 0])]
         return ordered
@@ -202,11 +256,9 @@ class LammpsEngine:
 
     @property
     def count(self) -> int:
-        """See the interface."""
         return len(self._moving.positions)
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """See the interface."""
         new, boxes, before = len(poses.positions), self.particle.boxes, self._moving
         turns = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
         zero, thrown = np.zeros((new, 3)), np.tile([0.0, 0.0, -speed], (new, 1))
@@ -214,17 +266,18 @@ class LammpsEngine:
         added = Moving(poses.positions, turns, thrown, zero, zero, weight)
         spheres = State.rigid(boxes, poses.positions, turns, thrown, zero).spheres(self.particle)
         lines = text.sphere_lines(self.particle, self.cylinder, spheres, title="smarticles", first=self.count)
-        self._moving = Moving(*(np.concatenate([getattr(one, name) for one in (before, added)]) for name in _FIELDS))
+        pairs = zip(vars(before).values(), vars(added).values(), strict=True)
+        self._moving = Moving(*(np.concatenate(pair) for pair in pairs))
         self._write(SPHERES, lines)
         self._write(BODIES, text.body_lines(self.particle, self._moving))
         if self._box:
-            self.child.tell(*self._forget_bodies(), f"read_data {SPHERES} add merge", *self._balanced())
+            self.child.send(*self._forget_bodies(), f"read_data {SPHERES} add merge", *self._balanced())
         else:
-            self.child.tell(*self._scene(f"read_data {SPHERES}"), *self._balanced())
+            self.child.send(*self._scene(f"read_data {SPHERES}"), *self._balanced())
             if self.steps:
-                self.child.tell(f"reset_timestep {self.steps}")
+                self.child.send(f"reset_timestep {self.steps}")
             self._box = True
-        self.child.tell(*self._bodies(BODIES))
+        self.child.send(*self._bodies(BODIES))
         self._frames, self._fresh, self._contacts = None, True, None
         self.ledger.added += boxes.mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += boxes.mass * new * speed
@@ -234,24 +287,20 @@ class LammpsEngine:
             file.writelines(f"{line}\n" for line in lines)
 
     def still(self) -> None:
-        """See the interface."""
         self.ledger.dissipated += self.state().kinetic_energy
         none = np.zeros_like(self._moving.velocities)
         self._moving = replace(self._moving, velocities=none, spins=none, momenta=none)
-        self._told(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
+        self._send(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
 
     def state(self) -> State:
-        """See the interface."""
         now = self._moving
         return State.rigid(self.particle.boxes, now.positions, now.turns, now.velocities, now.spins)
 
     @property
     def impulse(self) -> float:
-        """See the interface."""
         return self._seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
     def unbalanced_force(self) -> float:
-        """See the interface."""
         if not self.count or not self.gravity:
             return math.inf
         weight = self.particle.boxes.mass * self.gravity
@@ -259,45 +308,39 @@ class LammpsEngine:
 
     @property
     def contacts(self) -> Contacts:
-        """Who touches whom at present."""
+        """All contacts at present."""
         if self._contacts is None:
             self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.boundaries)
         return self._contacts
 
     def neighbours(self) -> NDArray[np.int64]:
-        """See the interface."""
         return self.contacts.neighbours()
 
     def touches(self) -> NDArray[np.int64]:
-        """See the interface."""
         return self.contacts.touches()
 
     def overlaps(self, limit: float) -> Overlaps:
-        """See the interface."""
         return self.contacts.overlaps(limit, self._law)
 
     def glance(self, state: State) -> None:
-        """See the interface: there is none."""
+        """Return None: LAMMPS has no shorter way."""
 
     def contact_forces(self) -> NoReturn:
-        """See the interface: LAMMPS keeps them to itself; scenes that ask for them are refused."""
-        refuse("forces at contacts")
+        absent("forces at contacts")
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """See the interface: LAMMPS's restart file with the springs of friction, the bodies, and their poses here.
-
-        LAMMPS orders spheres anew when it reads them: the simulation loads what it has saved, on a LAMMPS that was
-        started anew, since one that had contacts before does not find those of the file.
-        """
+        # LAMMPS's restart file with the springs of friction, the bodies, and their poses here. LAMMPS orders spheres
+        # differently when it reads them: the simulation loads what it has saved, on a LAMMPS that was restarted, since
+        # one that had contacts before does not find those of the file.
         files: dict[str, bytes] = {}
         if self._box:
-            self.child.tell(f"write_restart {RESTART}")
+            self.child.send(f"write_restart {RESTART}")
             for name in (RESTART, f"{RESTART}.rigid"):
                 files[name] = (self.child.scratch / name).read_bytes()
         arrays = io.BytesIO()
-        np.savez(arrays, **{name: getattr(self._moving, name) for name in _FIELDS})
+        np.savez(arrays, **vars(self._moving))
         files[STATE] = arrays.getvalue()
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
@@ -318,7 +361,7 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """See the interface.
+        """Replace the simulation by a saved one of the same scene.
 
         Raises:
             InputError: it was not saved by this engine.
@@ -335,8 +378,8 @@ class LammpsEngine:
                 files = {name: archive.read(name) for name in archive.namelist()}
                 self._box = RESTART in files
                 with np.load(io.BytesIO(files[STATE])) as arrays:
-                    self._moving = Moving(*(arrays[name] for name in _FIELDS))
-        except (zipfile.BadZipFile, KeyError, ValueError) as error:
+                    self._moving = Moving(**arrays)
+        except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
             msg = f"checkpoint: not readable by the lammps engine ({error}); start the run anew"
             raise InputError(msg) from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
@@ -345,20 +388,17 @@ class LammpsEngine:
         self.boundaries.restore(memory["fixtures"])
         self._frames, self._fresh, self._contacts = None, True, None
         if self._box:
-            self._begin_anew(files)
-            self.child.tell(
+            self._restart(files)
+            self.child.send(
                 *self._scene(f"read_restart {RESTART}"), *self._balanced(), *self._bodies(f"{RESTART}.rigid")
             )
 
-    def _begin_anew(self, files: Mapping[str, bytes]) -> None:
+    def _restart(self, files: Mapping[str, bytes]) -> None:
         self._cpu_before += self.child.cpu()
         self.child.close()
         self.child = Child(self.child.ranks)
         for name, data in files.items():
             (self.child.scratch / name).write_bytes(data)
-
-
-_FIELDS = ("positions", "turns", "velocities", "spins", "momenta", "forces")
 
 
 def _turns(rows: Array) -> Array:

@@ -1,19 +1,17 @@
-"""LAMMPS as an engine: what is asked of it before there is a simulation."""
+"""LAMMPS as an engine: what can be asked of it before there is a simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
-from dem.engine.demand import Demand, contact_law_of
-from dem.engine.doing import Doing
+from dem.engine.cores import ranks
+from dem.engine.demand import Activity, Demand, contact_law_of
 from dem.engine.effect import Adds, EffectName
 from dem.engine.lammps.child import lammps_version
-from dem.engine.lammps.cost import seconds_per_second
 from dem.engine.lammps.engine import LammpsEngine
-from dem.engine.lammps.ranks import ranks
 from dem.engine.yade.stable_step import stable_time_step
 
-ADDS = {
+ADDS: Mapping[EffectName, Adds] = {
     EffectName.CONTACT: Adds(
         engines=("neighbour lists", "pair gran/hooke/history", "fix rigid/small"), shapes=("chains of spheres",)
     ),
@@ -24,41 +22,43 @@ ADDS = {
 }
 ORDER = ("neighbour lists", "pair gran/hooke/history", "fix gravity", "fix wall/gran/region", "fix rigid/small")
 
+# Cost on one rank. A step costs by spheres, several times as much while they move, since neighbours are searched again
+# as they do; large piles do not fit into a processor's cache. At each sample of the series LAMMPS writes all bodies to
+# a file, which is read and searched for contacts.
+# Source: results/scaling: steps alone, N = 100 to 5000; results/bench, planned.csv: rest, pours and samples.
+# s per sphere. A pour grows from nothing and would cost half, but for the checks of layers and for adding them.
+STEP: Mapping[Activity, float] = {Activity.POUR: 1.2e-7, Activity.REST: 0.5e-7, Activity.SHAKE: 1.6e-7}
+SAMPLE = (3e-3, 6e-5)  # s, once and for each smarticle
+# Of so many spheres a step takes so much longer each than of a few.
+MANY, LONGER = 100_000, 1.3
+
 
 class LammpsKind:
-    """See `dem.engine.kinds.EngineKind`."""
+    """`dem.engine.kinds.EngineKind` of LAMMPS."""
 
     name = "lammps"
     workers = "ranks"
     damps_once_per_look = False
     idle_knobs: tuple[str, ...] = ("wall_facets", "hinge_stiffness_N_per_m", "control_interval_s")
+    adds = ADDS
+    order = ORDER
 
     def version(self) -> str:
-        """See the interface."""
         return lammps_version()
 
     def threads(self) -> int:
-        """See the interface: ranks."""
         return ranks()
 
-    def adds(self, effect: EffectName) -> Adds:
-        """See the interface."""
-        return ADDS.get(effect, Adds())
-
-    def in_order(self, engines: Sequence[str]) -> tuple[str, ...]:
-        """See the interface."""
-        return tuple(sorted(engines, key=ORDER.index))
-
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """See the interface: that of YADE, whose spheres, law and scheme of integration these are."""
+        # Spheres, law and scheme of integration are YADE's.
         return stable_time_step(scene.particle, contact_law_of(scene))
 
-    def seconds_per_second(self, scene: Demand, time_step: float, doing: Doing) -> float:
-        """See the interface; on one rank."""
-        return seconds_per_second(scene, time_step, doing)
+    def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
+        spheres, per_sphere = len(scene.particle.centres) * scene.count, STEP.get(activity, STEP[Activity.SHAKE])
+        steps = per_sphere * spheres * (1 + LONGER * min(1.0, spheres / MANY)) / time_step
+        return steps + (SAMPLE[0] + SAMPLE[1] * scene.count) / scene.recording.series_interval_s
 
     def build(self, scene: Demand, time_step: float) -> LammpsEngine:
-        """See the interface."""
         return LammpsEngine(
             particle=scene.particle,
             cylinder=scene.cylinder,

@@ -1,4 +1,4 @@
-"""What LAMMPS is told, as text: files of spheres and of bodies, contact, gravity, container.
+"""Commands and files of LAMMPS: spheres, bodies, contact, gravity, container.
 
 Keywords are those of the version of September 2021, which Debian 12 has.
 """
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 NEVER_PULLS = "limit_damping"
 """Of a contact law: the normal force is zero where spring and dashpot together would pull, as on our other engines."""
-SKIN = 0.2  # sphere diameters that neighbours are looked for beyond contact
-LOOKED_AT = (
+SKIN = 0.2  # sphere diameters beyond contact up to which neighbours are listed
+WRITTEN = (
     "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"  # of a body
 )
 
@@ -54,9 +54,9 @@ class Moving:
 
 
 def sphere_masses(particle: Particle) -> Array:
-    """(S,) [kg] that add up to a smarticle's mass, balanced about its centre, so that weight does not turn it.
+    """Return masses (S,) [kg] that sum to a smarticle's, balanced about its centre so that weight does not turn it.
 
-    As near to equal as that goes: those of least squares.
+    As near to equal as that allows, by least squares.
     """
     count = len(particle.centres)
     # Of each sphere: its share of the mass, and of the first moments, which are to vanish.
@@ -70,14 +70,9 @@ def sphere_masses(particle: Particle) -> Array:
 def sphere_lines(
     particle: Particle, cylinder: Cylinder, spheres: Array, *, title: str, first: int = 0
 ) -> Iterator[str]:
-    """All spheres, for `read_data`: number, type, place, diameter, density, smarticle.
+    """Yield all spheres, for `read_data`: number, type, place, diameter, density, smarticle.
 
-    Args:
-        particle: one smarticle.
-        cylinder: the container, for the box.
-        spheres: (N, S, 3) their centres [m].
-        title: the first line.
-        first: number of the first smarticle.
+    Their centres are (N, S, 3) [m], `first` is the number of the first smarticle; the container gives the box.
     """
     count, each = spheres.shape[:2]
     d = particle.chain.diameter
@@ -95,7 +90,7 @@ def sphere_lines(
 
 
 def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
-    """All smarticles, for `fix rigid/small infile`: number, mass, centre, inertia (xx yy zz xy xz yz), motion."""
+    """Yield all smarticles, for `fix rigid/small infile`: number, mass, centre, inertia (xx yy zz xy xz yz), motion."""
     tensors = moving.turns @ np.diag(particle.boxes.inertia) @ np.swapaxes(moving.turns, 1, 2)
     moments = tensors[:, (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     yield str(len(moving.positions))
@@ -106,7 +101,7 @@ def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
 
 
 def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
-    """Numbers of `pair_style gran/hooke/history` between smarticles of a mass [kg], and of `fix wall/gran/region`.
+    """Return the numbers of `pair_style gran/hooke/history` for a mass [kg], and of `fix wall/gran/region`.
 
     kn and ks [N/m]; damping across and along the surface [1/s], which LAMMPS multiplies with the effective mass of the
     two bodies that touch, M/2, or M at a wall; friction; 1: damping along the surface is on; a dashpot never pulls.
@@ -120,7 +115,7 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
 
 
 def before_box(particle: Particle) -> Iterator[str]:
-    """Commands before there is a box."""
+    """Yield the commands before there is a box."""
     yield "units            si"
     yield "# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders."
     yield "newton           off"
@@ -136,20 +131,14 @@ def before_box(particle: Particle) -> Iterator[str]:
 
 
 def neighbours(particle: Particle) -> Iterator[str]:
-    """Commands about who is looked for."""
+    """Yield neighbour-list commands."""
     yield "# Spheres of one smarticle do not touch each other."
     yield f"neighbor         {SKIN * particle.chain.diameter:.9g} bin"
     yield "neigh_modify     delay 0 every 1 check yes exclude molecule/intra all"
 
 
 def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Iterator[str]:
-    """Commands that put floor and wall where the variables `floor_z` and `wall_z` say.
-
-    Args:
-        cylinder: the container.
-        at_wall: numbers of the contact, see `contact_terms`.
-        walled: whether there is a wall.
-    """
+    """Yield the commands of floor and wall at the variables `floor_z` and `wall_z`; `at_wall` of `contact_terms`."""
     extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
     yield "variable         wave equal sin(v_omega*(step-v_begun)*dt)"
     yield "variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave"
@@ -161,14 +150,9 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
         yield f"fix              wall all wall/gran/region {at_wall} region wall"
 
 
-def looking(dump: str, *, when: str) -> Iterator[str]:
-    """Commands that write bodies down.
-
-    Args:
-        dump: the file.
-        when: how often, as `dump_modify every` has it.
-    """
-    count = len(LOOKED_AT.split())
-    yield f"compute          where all rigid/local bodies {LOOKED_AT}"
+def writing(dump: str, *, when: str) -> Iterator[str]:
+    """Yield the commands that write bodies to a file; `when` is that of `dump_modify every`."""
+    count = len(WRITTEN.split())
+    yield f"compute          where all rigid/local bodies {WRITTEN}"
     yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"
     yield f"dump_modify      bodies every {when} first yes format float %.17g"

@@ -15,7 +15,7 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.STRINGS: Adds(engines=("pull",)),
     EffectName.CONTAINER_MOTION: Adds(python="a sine per step"),
     EffectName.ARTICULATION: Adds(python="the plane geometry of every smarticle twice in a step, while articulated"),
-    EffectName.MOTORS: Adds(python="one look of all motors per control period"),
+    EffectName.MOTORS: Adds(python="one control update of all motors per control period"),
     EffectName.HOOKS: Adds(shapes=("square bars",)),
     EffectName.WALL_REMOVAL: Adds(python="the lower edge of a wall, while it is lifted"),
     EffectName.ENERGY_ACCOUNT: Adds(engines=("settle",), python="every contact's velocity twice in a step"),

@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from dem.engine.demand import Demand
-from dem.engine.doing import Doing
+from dem.engine.demand import Activity, Demand
 
 
 class Rates(NamedTuple):
@@ -25,11 +24,11 @@ class Rates(NamedTuple):
     second: float
 
 
-RATES: Mapping[Doing, Rates] = {
-    Doing.POUR: Rates(1.7e-7, 0.1e-3),
-    Doing.REST: Rates(3.6e-7, 0.0),
-    Doing.SHAKE: Rates(2.4e-7, 0.7e-3),
-    Doing.ACTUATE: Rates(3.8e-7, 0.8e-3),
+RATES: Mapping[Activity, Rates] = {
+    Activity.POUR: Rates(1.7e-7, 0.1e-3),
+    Activity.REST: Rates(3.6e-7, 0.0),
+    Activity.SHAKE: Rates(2.4e-7, 0.7e-3),
+    Activity.ACTUATE: Rates(3.8e-7, 0.8e-3),
 }
 LOOK = 2.4e-7  # s, of the motors of a smarticle once
 RIM = 1.1e-7  # s, of one edge of a wall of tiers, per smarticle and step
@@ -42,13 +41,13 @@ MANY, LONGER, GROWTH = 5000, 0.3, 0.8
 MORE_CONTACTS, MORE_PAIRS = 1.4, 1.75
 
 
-def seconds_per_second(scene: Demand, time_step: float, doing: Doing) -> float:
+def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """See `EngineKind.seconds_per_second`."""
     count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
-    rates, links = RATES[doing], 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    rates, links = RATES[activity], 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)
-    if doing is Doing.ACTUATE:
+    if activity is Activity.ACTUATE:
         each += LOOK / scene.fidelity.control_interval_s
     found = count * each * (1 + LONGER * (count / MANY) ** GROWTH)
     for (once, more), interval in ((SAMPLE, recording.series_interval_s), (FRAME, recording.frame_interval_s)):

@@ -12,7 +12,7 @@ from dem.body.chain import Tie
 from dem.engine.links.arrays import Cords
 from dem.engine.links.contact.cords import find_knots
 from dem.engine.links.world import World
-from dem.physics.strings import StringLaw
+from dem.physics.contact import StringLaw
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
-"""How smarticles are made of rigid bodies: welded, one body each, or articulated, three links and two hinges each.
+"""Smarticles as rigid bodies of spheres: welded, one body each, or articulated, three links and two hinges each.
 
 Welding and articulating keep positions, momentum and angular momentum to rounding. Articulating keeps the kinetic
-energy as well; welding takes away that of the links' motion against each other, and says how much.
+energy as well; welding dissipates that of the links' motion against each other.
 """
 
 from __future__ import annotations
@@ -16,25 +16,21 @@ from scipy.spatial.transform import Rotation
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import State
-from dem.engine.yade.clump import Body, clump
+from dem.engine.yade.construction import SMARTICLE_MATERIAL
 from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
-from dem.engine.yade.library import Yade
+from dem.engine.yade.library import Yade, rows_of
 from dem.errors import refuse
 
 Array = NDArray[np.float64]
-
-SMARTICLE_MATERIAL = "smarticle"
 
 
 class Assembly:
     """All smarticles as bodies of YADE.
 
     Args:
-        yade: the simulation.
-        particle: one smarticle.
-        hinge_law: stiffness of the hinges; None where none will be needed.
+        hinge_law: stiffness of the hinges; None: smarticles stay welded.
         planar: whether all motion is confined to the plane z = 0.
-        strengths: (N, 2) factors on what the motors can do [1]; None where all are alike.
+        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.
     """
 
     def __init__(
@@ -57,25 +53,21 @@ class Assembly:
         self._ids: list[int] = []
         self._to_body: list[Any] = []
         self._states: list[Any] = []
-        self._smarticle_of: dict[int, int] = {}
+        self.smarticle_of: dict[int, int] = {}
+        """Smarticle by id of sphere."""
         # Link poses in the frames of welded bodies; of no meaning while articulated.
         self._arms: Array = np.empty((0, LINKS, 3))
         self._turns: Array = np.empty((0, LINKS, 3, 3))
 
     @property
     def count(self) -> int:
-        """Smarticles."""
+        """Number of smarticles."""
         return len(self._spheres)
 
     @property
     def bodies(self) -> Sequence[int]:
         """Ids of the rigid bodies: one per smarticle, or three, in order."""
         return self._ids
-
-    @property
-    def smarticle_of(self) -> Mapping[int, int]:
-        """Smarticle by id of sphere."""
-        return self._smarticle_of
 
     @property
     def link_of(self) -> Mapping[int, tuple[int, int]]:
@@ -88,12 +80,12 @@ class Assembly:
         }
 
     def bind(self) -> None:
-        """Take hold of YADE's objects; loading replaces them all."""
+        """Look up YADE's objects; loading replaces them all."""
         bodies = self._yade.omega.bodies
         self._states = [bodies[body].state for body in self._ids]
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """See `Engine.add`."""
+        """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
         particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
         falling = np.array([0.0, 0.0, -speed])
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
@@ -103,20 +95,17 @@ class Assembly:
                 )
                 for centre in particle.centres
             ]
-            self._smarticle_of.update(dict.fromkeys(spheres, len(self._spheres)))
+            self.smarticle_of.update(dict.fromkeys(spheres, len(self._spheres)))
             self._spheres.append(spheres)
             self._clump(
-                Body(
-                    members=spheres,
-                    local=particle.centres,
-                    mass=particle.boxes.mass,
-                    inertia=particle.boxes.inertia,
-                    position=position,
-                    rotation=rotation.as_matrix(),
-                    velocity=falling,
-                    angular_momentum=still,
-                    planar=self._planar,
-                )
+                members=spheres,
+                local=particle.centres,
+                mass=particle.boxes.mass,
+                inertia=particle.boxes.inertia,
+                position=position,
+                rotation=rotation.as_matrix(),
+                velocity=falling,
+                angular_momentum=still,
             )
         new = len(poses.positions)
         boxes = particle.boxes
@@ -124,7 +113,7 @@ class Assembly:
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
-        """Poses and velocities of all links.
+        """Return poses and velocities of all links.
 
         Raises:
             RunError: the simulation has blown up.
@@ -151,8 +140,8 @@ class Assembly:
         return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
 
     def still(self) -> None:
-        """Take all velocities away, while welded."""
-        assert self.hinges is None  # links that are at rest would be told otherwise by their motors
+        """Set all velocities to zero, while welded."""
+        assert self.hinges is None  # motors would set links in motion again
         nought, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
         # Contact laws read the members' own velocities, before the integrator has moved them.
         for state in (*self._states, *(bodies[sphere].state for spheres in self._spheres for sphere in spheres)):
@@ -189,17 +178,14 @@ class Assembly:
                 nodes[k].append(add_nodes(self._yade, len(own)))
                 spheres = np.flatnonzero(self._particle.links == link)
                 self._clump(
-                    Body(
-                        members=[*(self._spheres[k][s] for s in spheres), *nodes[k][link]],
-                        local=np.concatenate([self._particle.local_centres[spheres], own]),
-                        mass=boxes.link_masses[link],
-                        inertia=inertias[link],
-                        position=state.link_positions[k, link],
-                        rotation=rotation,
-                        velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
-                        angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
-                        planar=self._planar,
-                    )
+                    members=[*(self._spheres[k][s] for s in spheres), *nodes[k][link]],
+                    local=np.concatenate([self._particle.local_centres[spheres], own]),
+                    mass=boxes.link_masses[link],
+                    inertia=inertias[link],
+                    position=state.link_positions[k, link],
+                    rotation=rotation,
+                    velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
+                    angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
                 )
         self.hinges = Hinges(self._yade, self._hinge_law, nodes, state.angles)
         self.hinges.make(self._strengths)
@@ -230,36 +216,27 @@ class Assembly:
         self._dissolve()
         for k in range(state.count):
             self._clump(
-                Body(
-                    members=self._spheres[k],
-                    local=spheres[k] @ axes[k],
-                    mass=boxes.mass,
-                    inertia=moments[k],
-                    position=state.positions[k],
-                    rotation=axes[k],
-                    velocity=state.velocities[k],
-                    angular_momentum=momenta[k],
-                    planar=self._planar,
-                )
+                members=self._spheres[k],
+                local=spheres[k] @ axes[k],
+                mass=boxes.mass,
+                inertia=moments[k],
+                position=state.positions[k],
+                rotation=axes[k],
+                velocity=state.velocities[k],
+                angular_momentum=momenta[k],
             )
         self._arms = np.einsum("nji,nkj->nki", axes, arms)
         self._turns = np.einsum("nji,nkjm->nkim", axes, state.link_rotations)
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """A point of a link while articulated: id of the body, and the point in the body's own frame (3,) [m].
-
-        Args:
-            smarticle: its number.
-            link: 0 barb 1, 1 middle link, 2 barb 2.
-            point: (3,) in the frame of the link [m].
-        """
+        """Return the id of a link's body, and a point (3,) of the link's frame in the body's own [m]; articulated."""
         number = LINKS * smarticle + link
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])
 
-    def _clump(self, body: Body) -> None:
-        number, to_body = clump(self._yade, body)
+    def _clump(self, **body: Any) -> None:
+        number, to_body = clump(self._yade, planar=self._planar, **body)
         self._ids.append(number)
         self._to_body.append(to_body)
         self._states.append(self._yade.omega.bodies[number].state)
@@ -274,7 +251,7 @@ class Assembly:
         if self._planar:
             # YADE keeps no angular momentum of what it turns like a sphere.
             return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
-        return np.array([[m[0], m[1], m[2]] for m in (state.angMom for state in self._states)]).reshape(-1, 3)
+        return rows_of(state.angMom for state in self._states)
 
     # -- memory ------------------------------------------------------------------------------------------------
 
@@ -293,7 +270,7 @@ class Assembly:
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from where `memory` was taken, in a simulation that was loaded."""
         self._spheres = [list(spheres) for spheres in memory["spheres"]]
-        self._smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
+        self.smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
         self._ids = list(memory["bodies"])
         # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.
         self._to_body = [self._yade.quaternion(w, x, y, z) for x, y, z, w in memory["to_body"]]
@@ -315,3 +292,74 @@ def _tensors(state: State) -> tuple[Array, Array]:
     offset = np.einsum("k,nk,ij->nij", boxes.link_masses, squares, np.eye(3))
     offset -= np.einsum("k,nki,nkj->nij", boxes.link_masses, arms, arms)
     return own + offset, arms
+
+
+def clump(
+    yade: Yade,
+    *,
+    members: Sequence[int],
+    local: Array,
+    mass: float,
+    inertia: Array,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    angular_momentum: Array,
+    planar: bool,
+) -> tuple[int, Any]:
+    """Make a rigid body of existing spheres, with a mass and an inertia of its own.
+
+    Args:
+        yade: the simulation.
+        members: ids of its spheres and hinge nodes.
+        local: (k, 3) their centres in the body's principal frame [m].
+        mass: [kg].
+        inertia: (3,) principal moments [kg m²].
+        position: (3,) centre of mass [m].
+        rotation: (3, 3) principal frame to laboratory frame.
+        velocity: (3,) of the centre of mass [m/s].
+        angular_momentum: (3,) about the centre of mass [kg m²/s].
+        planar: whether it only moves along x and y and turns about z, which is then its third principal axis.
+
+    Returns:
+        Its id, and the quaternion that takes YADE's own principal frame of the clump to the body's: q_body =
+        q_clump · this.
+    """
+    # Clumped at the origin in the body frame, then moved: YADE's own mass properties of overlapping spheres depend on
+    # the pose and count overlaps twice. The spheres weigh nothing; one ballast member carries the exact mass and
+    # inertia and is erased again, which leaves the clump's state alone.
+    omega, classes, vector = yade.omega, yade.classes, yade.vector
+    upright = yade.quaternion(1, 0, 0, 0)
+    for member, centre in zip(members, local, strict=True):
+        state = omega.bodies[member].state
+        state.pos, state.ori = vector(*centre), upright
+    ballast = classes.Body()
+    ballast.shape = classes.Box()
+    ballast.material = omega.bodies[members[0]].material
+    ballast.state.mass = mass
+    # Where it turns about the third axis alone, the other moments do not matter. All equal, the axes keep their order,
+    # and YADE's integration of spheres, which it uses where a rotation is blocked, is right.
+    inertia = np.full(3, inertia[2]) if planar else inertia
+    ballast.state.inertia = vector(*inertia)
+    ballast_id = omega.bodies.append(ballast)
+    clump_id = omega.bodies.clump([*members, ballast_id], discretization=0)
+    omega.bodies.erase(ballast_id)
+    state = omega.bodies[clump_id].state
+    # YADE sorts the principal axes: a permutation of ours.
+    principal = state.ori
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    turned = yade.quaternion(w, x, y, z)
+    spin = rotation @ ((rotation.T @ angular_momentum) / inertia)
+    state.ori = turned * principal
+    state.pos = vector(*position)
+    state.vel = vector(*velocity)
+    state.angVel = vector(*spin)
+    state.angMom = vector(*angular_momentum)
+    if planar:
+        state.blockedDOFs = "zXY"
+    for member, arm in zip(members, local @ rotation.T, strict=True):
+        own = omega.bodies[member].state
+        own.pos, own.ori = vector(*(position + arm)), turned
+        # Contact laws read the members' own velocities, before the integrator has moved them for the first time.
+        own.vel, own.angVel = vector(*(velocity + np.cross(spin, arm))), state.angVel
+    return clump_id, principal.inverse()

@@ -1,17 +1,18 @@
-"""What does not give way to smarticles: the container's floor and wall, the hooks, or the walls of a channel."""
+"""Rigid boundaries in YADE: a container of flat facets on a floor, hooks, or table and walls of motion in a plane."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.forces import CHANNEL, FLOOR, LOWER_HOOK, WALL
-from dem.engine.yade.container import WALL_MATERIAL, add_channel, add_container
-from dem.engine.yade.library import Yade
+from dem.engine.yade.construction import WALL_MATERIAL
+from dem.engine.yade.library import Yade, rows_of
 from dem.errors import RunError
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
@@ -21,13 +22,9 @@ Array = NDArray[np.float64]
 
 
 class YadeBoundaries:
-    """The fixed bodies of a simulation, how they move, and what they feel.
+    """`dem.engine.interface.Boundaries` on YADE.
 
-    Args:
-        yade: the simulation.
-        cylinder: the container; its floor is at z = 0 at the start.
-        hooks: the lower and the upper hook; None: nothing of a hook exists.
-        channel: table and walls instead of the container, for motion in a plane.
+    Hooks are the lower and the upper one; a channel takes the place of the container. The floor is at z = 0 at first.
     """
 
     def __init__(
@@ -37,22 +34,20 @@ class YadeBoundaries:
         self._top, self._bottom = cylinder.height, cylinder.bottom
         self._planar = channel is not None
         self.container = add_container(yade, cylinder) if channel is None else add_channel(yade, channel)
-        """Ids of the container's bodies that are there, the floor last."""
-        self.hooks: tuple[tuple[int, ...], ...] = tuple(_add_cross(yade, cross) for cross in hooks or ())
-        """Ids of the bars of the lower and the upper hook; empty in scenes without."""
+        """Ids of the container's bodies that exist, the floor last."""
+        self.hooks: tuple[tuple[int, ...], ...] = tuple(add_cross(yade, cross) for cross in hooks or ())
+        """Ids of the bars of the lower and the upper hook."""
         self._upper_start = hooks[1].height if hooks else 0.0
-        # Bodies whose forces are added up step by step, together for each hook or wall of a channel.
-        self.felt: tuple[tuple[int, ...], ...] = self.hooks
-        if self._planar:
-            self.felt = tuple((wall,) for wall in self.container[:-1])
+        self.felt = tuple((wall,) for wall in self.container[:-1]) if self._planar else self.hooks
+        """Ids of bodies whose forces are summed step by step, together for each hook or wall of a channel."""
         self.moving: list[int] = []
         """Ids of the bodies that move at present, all at one velocity."""
         self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
         self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
-        """Called with what takes contacts away, by whoever keeps an energy ledger."""
+        """Called with a function that takes contacts away; the energy ledger replaces it."""
 
     def bind(self) -> None:
-        """Take hold of YADE's objects; loading replaces them all."""
+        """Look up YADE's objects; loading replaces them all."""
         bodies = self._yade.omega.bodies
         # The wall may be gone from what was loaded.
         self.container = [body for body in self.container if bodies[body] is not None]
@@ -71,20 +66,69 @@ class YadeBoundaries:
         self.moving = list(memory["moving"])
         self._sums = [self._yade.vector(*row) for row in memory["sums"]]
 
-    @property
-    def bodies(self) -> list[int]:
-        """Ids of all bodies that are there."""
-        return [*self.container, *(bar for hook in self.hooks for bar in hook)]
+    # -- where they are ----------------------------------------------------------------------------------------
 
     @property
     def floor(self) -> float:
-        """See `dem.engine.interface.Boundaries`."""
         return float(self._floor.pos[2])
 
     @property
     def velocity(self) -> float:
-        """See `dem.engine.interface.Boundaries`."""
         return float(self._floor.vel[2])
+
+    @property
+    def walled(self) -> bool:
+        return len(self.container) > 1
+
+    @property
+    def wall_bottom(self) -> float:
+        if not self.walled:
+            return math.inf
+        facet = self._yade.omega.bodies[self.container[0]]
+        return float(facet.state.pos[2] + min(corner[2] for corner in facet.shape.vertices))
+
+    @property
+    def enclosed(self) -> bool:
+        return not self._planar and self.walled and self.wall_bottom < self.floor
+
+    @property
+    def raised(self) -> float | None:
+        # Nothing holds a pile back once the wall is gone or lifted, or a hook was pulled out over it; in a plane walls
+        # hold, but the container's limits do not apply.
+        if not self.enclosed:
+            return None
+        if self._upper is None:
+            return 0.0
+        height = self.upper_height - self.floor
+        # Moved by the floor's velocity, step by step: apart from it by rounding, when it was never raised.
+        return None if height > self._top else max(0.0, height - self._upper_start)
+
+    @property
+    def upper_height(self) -> float:
+        assert self._upper is not None  # asked of scenes with hooks only
+        return float(self._upper.pos[2])
+
+    def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
+        """Return what can hold smarticles in scenes with hooks: ids of its bodies, and by how much it was raised [m].
+
+        Raised against the floor, since the start.
+        """
+        if not self.hooks:
+            return {}
+        wall = self.container[:-1]
+        found: dict[str, tuple[Sequence[int], float]] = {
+            "the lower hook": (self.hooks[0], 0.0),
+            "the upper hook": (self.hooks[1], self.upper_height - self.floor - self._upper_start),
+        }
+        return found | ({"the wall": (wall, self.wall_bottom - self.floor - self._bottom)} if wall else {})
+
+    @property
+    def part_of(self) -> Mapping[int, int]:
+        """Place in `dem.body.forces.BOUNDARIES` by id of body."""
+        *walls, floor = self.container
+        numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
+        found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
+        return found | {bar: LOWER_HOOK + k for k, bars in enumerate(self.hooks) for bar in bars}
 
     # -- motion ------------------------------------------------------------------------------------------------
 
@@ -93,8 +137,11 @@ class YadeBoundaries:
             self._yade.omega.bodies[body].state.vel = self._yade.vector(0, 0, speed)
         self.moving = list(bodies)
 
+    @property
+    def _bodies(self) -> list[int]:
+        return [*self.container, *(bar for hook in self.hooks for bar in hook)]
+
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """See `dem.engine.interface.Boundaries`."""
         if self._shaker is None:
             msg = "the engine was built without a shaker"
             raise RunError(msg)
@@ -105,43 +152,22 @@ class YadeBoundaries:
         self._shaker.A = self._yade.vector(0, 0, amplitude)
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
-        self._shaker.ids = self.moving = self.bodies if walls else self.container[-1:]
+        self._shaker.ids = self.moving = self._bodies if walls else self.container[-1:]
         self._shaker.dead = False
 
-    def stop(self) -> None:
-        """See `dem.engine.interface.Boundaries`."""
-        if self._shaker is not None:
-            self._shaker.dead = True
-        self._move(self.bodies, 0.0)
-        self.moving = []
-
-    def power(self) -> float:
-        """Power of what moves on the smarticles in the step that was just made [W]."""
-        # What smarticles exert on it is the opposite of what it exerts on them.
-        lift = self._yade.utils.sumForces(self.moving, self._yade.vector(0, 0, 1))
-        return -float(lift * self._yade.omega.bodies[self.moving[0]].state.vel[2])
-
-    # -- wall --------------------------------------------------------------------------------------------------
-
-    @property
-    def walled(self) -> bool:
-        """Whether the wall is there, wherever it is."""
-        return len(self.container) > 1
-
-    @property
-    def wall_bottom(self) -> float:
-        """Height of the wall's lower edge [m]; inf without a wall."""
-        if not self.walled:
-            return math.inf
-        facet = self._yade.omega.bodies[self.container[0]]
-        return float(facet.state.pos[2] + min(corner[2] for corner in facet.shape.vertices))
-
     def lift_wall(self, speed: float) -> None:
-        """Move the wall upwards at a speed [m/s] from now on."""
         self._move(self.container[:-1], speed)
 
+    def raise_upper(self, speed: float) -> None:
+        self._move(self.hooks[1], speed)
+
+    def stop(self) -> None:
+        if self._shaker is not None:
+            self._shaker.dead = True
+        self._move(self._bodies, 0.0)
+        self.moving = []
+
     def remove_wall(self) -> None:
-        """See `dem.engine.interface.Boundaries`."""
         self.book_removal(self._remove_wall)
 
     def _remove_wall(self) -> None:
@@ -150,20 +176,16 @@ class YadeBoundaries:
             self._yade.omega.bodies.erase(body)
         self.container = self.container[-1:]
 
-    # -- hooks -------------------------------------------------------------------------------------------------
+    # -- forces ------------------------------------------------------------------------------------------------
 
-    @property
-    def upper_height(self) -> float:
-        """Height of the upper hook's centre [m]."""
-        assert self._upper is not None  # asked of scenes with hooks only
-        return float(self._upper.pos[2])
-
-    def raise_upper(self, speed: float) -> None:
-        """Move the upper hook upwards at a speed [m/s] from now on."""
-        self._move(self.hooks[1], speed)
+    def power(self) -> float:
+        """Return the power of what moves on the smarticles, in the step that was just made [W]."""
+        # What smarticles exert on it is the opposite of what it exerts on them.
+        lift = self._yade.utils.sumForces(self.moving, self._yade.vector(0, 0, 1))
+        return -float(lift * self._yade.omega.bodies[self.moving[0]].state.vel[2])
 
     def feel(self) -> None:
-        """Take note of the forces on hooks or walls of a channel in the step that was just made."""
+        """Add up the forces on hooks or walls of a channel in the step that was just made."""
         force = self._yade.omega.forces.f
         for k, (first, *others) in enumerate(self.felt):
             total = force(first)
@@ -173,79 +195,73 @@ class YadeBoundaries:
 
     @property
     def hook_sums(self) -> Array:
-        """(2, 3) forces of the smarticles on the lower and the upper hook, summed over all steps so far [N].
-
-        A difference of two over the steps between them is a mean that misses no impact.
-        """
         return self._totals[: len(self.hooks)]
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) the same for the lower and the upper wall of a channel; (0, 3) without walls."""
         return self._totals[len(self.hooks) :]
 
     @property
     def _totals(self) -> Array:
-        return np.array([[s[0], s[1], s[2]] for s in self._sums]).reshape(-1, 3)
-
-    def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
-        """What smarticles can hold on to, in scenes with hooks: ids of its bodies, and how far it was raised [m].
-
-        Raised against the floor, since the start.
-        """
-        if not self.hooks:
-            return {}
-        floor, wall = self.floor, self.container[:-1]
-        found: dict[str, tuple[Sequence[int], float]] = {
-            "the lower hook": (self.hooks[0], 0.0),
-            "the upper hook": (self.hooks[1], self.upper_height - floor - self._upper_start),
-        }
-        return found | ({"the wall": (wall, self.wall_bottom - floor - self._bottom)} if wall else {})
-
-    @property
-    def part_of(self) -> Mapping[int, int]:
-        """Place in `dem.body.forces.BOUNDARIES` by id of body."""
-        *walls, floor = self.container
-        numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
-        found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
-        return found | {bar: LOWER_HOOK + k for k, bars in enumerate(self.hooks) for bar in bars}
-
-    # -- what smarticles may do --------------------------------------------------------------------------------
-
-    @property
-    def enclosed(self) -> bool:
-        """Whether nothing can leave the container: the wall is there, and begins below the floor."""
-        return not self._planar and self.walled and self.wall_bottom < self.floor
-
-    @property
-    def raised(self) -> float | None:
-        """How far the pile may have been raised by a hook [m]; None where nothing holds it back any more.
-
-        That is when the wall is gone or lifted, or a hook was pulled out over it; or in a plane, where walls hold but
-        the container's limits do not apply.
-        """
-        if not self.enclosed:
-            return None
-        if self._upper is None:
-            return 0.0
-        height = self.upper_height - self.floor
-        # Moved by the floor's velocity, step by step: apart from it by rounding, when it was never raised.
-        return None if height > self._top else max(0.0, height - self._upper_start)
+        return rows_of(self._sums)
 
 
-def _add_cross(yade: Yade, cross: Cross) -> tuple[int, ...]:
-    """Add the bars of a hook.
+def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
+    """Add the container, its floor at z = 0.
 
-    Boxes, not rows of spheres: the faces are flat and the edges square as asked for, a sphere has one contact with a
-    bar wherever it touches it, and forces are those of two bodies.
+    Returns:
+        Ids of its bodies: the wall from below, and the floor last.
     """
+    # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
+    bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
+    rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
+    bodies = []
+    for k, ring in enumerate(rings):
+        bodies += list(_band(yade, (ring, bottoms[k]), (ring, bottoms[k + 1])))
+        if k + 1 < len(rings):
+            # The ceiling of the part of a tier that the next one does not cover.
+            bodies += list(_band(yade, (ring, bottoms[k + 1]), (rings[k + 1], bottoms[k + 1])))
+    # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
+    bodies.append(yade.utils.wall(0, axis=2, sense=1, material=WALL_MATERIAL))
+    return [yade.omega.bodies.append(body) for body in bodies]
+
+
+def _ring(cylinder: Cylinder, radius: float) -> Array:
+    """(n + 1, 2) corners of the wall's polygon [m], the first one again at the end."""
+    corner = cylinder.corner_radius_of(radius)
+    angles = 2 * math.pi * np.arange(cylinder.facets + 1) / cylinder.facets
+    return np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
+
+
+def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> Iterator[Any]:
+    """Facets between two rings, each with its height [m]."""
+    for (start, end), (above_start, above_end) in zip(pairwise(one[0]), pairwise(other[0]), strict=True):
+        a, b = yade.vector(*start, one[1]), yade.vector(*end, one[1])
+        c, d = yade.vector(*above_end, other[1]), yade.vector(*above_start, other[1])
+        yield yade.utils.facet([a, b, c], material=WALL_MATERIAL, fixed=True)
+        yield yade.utils.facet([a, c, d], material=WALL_MATERIAL, fixed=True)
+
+
+def add_channel(yade: Yade, channel: Channel) -> list[int]:
+    """Add walls and table, the centrelines' plane at z = 0.
+
+    Returns:
+        Ids of the lower and the upper wall, where there are walls, and of the table last.
+    """
+    bodies = []
+    if channel.width is not None:
+        # As the container's floor, each pushes to its own side whatever happens.
+        for side in (-1, 1):
+            place = side * channel.width / 2
+            bodies.append(yade.utils.wall(place, axis=1, sense=-side, material=WALL_MATERIAL))
+    bodies.append(yade.utils.wall(channel.table, axis=2, sense=1, material=WALL_MATERIAL))
+    return [int(yade.omega.bodies.append(body)) for body in bodies]
+
+
+def add_cross(yade: Yade, cross: Cross) -> tuple[int, ...]:
+    """Add the bars of a hook, as boxes: flat faces, square edges, and one contact with each sphere."""
+    boxes = [(yade.vector(*bar.middle, cross.height), yade.vector(*bar.half)) for bar in cross.bars]
     return tuple(
-        int(
-            yade.omega.bodies.append(
-                yade.utils.box(
-                    yade.vector(*bar.middle, cross.height), yade.vector(*bar.half), material=WALL_MATERIAL, fixed=True
-                )
-            )
-        )
-        for bar in cross.bars
+        int(yade.omega.bodies.append(yade.utils.box(middle, half, material=WALL_MATERIAL, fixed=True)))
+        for middle, half in boxes
     )

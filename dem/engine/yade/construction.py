@@ -1,24 +1,24 @@
-"""What each effect adds on YADE, by name, and materials and engines made of it: of what exists, nothing else."""
+"""What each effect adds on YADE, by name, and the materials and engines made of it; nothing else exists."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from dem.engine.effect import Adds, EffectName
-from dem.engine.yade.assembly import SMARTICLE_MATERIAL
-from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.hinges import HINGE_MATERIAL, HingeLaw
 from dem.engine.yade.library import Yade
 from dem.physics.contact import ContactLaw
 
-# In every step: contacts give forces, what is driven gets its velocity, then everything moves.
+SMARTICLE_MATERIAL, WALL_MATERIAL = "smarticle", "wall"
+
 ORDER = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "HarmonicMotionEngine", "NewtonIntegrator")
+"""Engines of a step: contacts give forces, the container gets its velocity, then everything moves."""
 
 # Gravity, friction and restitution are numbers of the integrator and of the one contact law that YADE has for springs
-# with dashpots: there is none without friction or without dashpots, so that a scene that sets them to zero has the same
-# sums with a zero in them. The torque cap is a comparison in each look; the law slip gives each bond of a shaft a cap.
+# with dashpots, zero where a scene sets them to zero. The torque cap is a comparison in each control update; the law
+# slip gives each bond of a shaft a cap.
 ADDS: Mapping[EffectName, Adds] = {
     EffectName.CONTACT: Adds(
         engines=("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator"),
@@ -49,7 +49,7 @@ ADDS: Mapping[EffectName, Adds] = {
         shapes=("GridNode",),
         python="while articulated three bodies and four bonds per smarticle; a shorter time step throughout",
     ),
-    EffectName.MOTORS: Adds(python="two readings per smarticle and look"),
+    EffectName.MOTORS: Adds(python="two readings per smarticle and control update"),
     EffectName.HOOKS: Adds(
         functors=("Bo1_Box_Aabb", "Ig2_Box_Sphere_ScGeom"),
         shapes=("Box",),
@@ -60,28 +60,22 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.CHECKPOINTS: Adds(python="saves and reloads the simulation once per checkpoint"),
 }
 
-# How far a sphere may move before neighbours are looked for again, in radii: a larger distance means more pairs to look
-# at in every step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.2 costs
-# 17 % less than 0.4, 0.1 as much as 0.2.
+# How far a sphere may move before neighbours are searched again, in radii: a larger distance means more pairs in every
+# step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.2 costs 17 % less than
+# 0.4, 0.1 as much as 0.2.
 VERLET_DISTANCE = 0.15
-
-
-def in_order(engines: Sequence[str]) -> tuple[str, ...]:
-    """Engines in the order in which a step runs them."""
-    return tuple(sorted(engines, key=ORDER.index))
 
 
 def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
     """Add the materials of smarticles, container and, where there are any, hinges."""
-    # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen
-    # such that the series with a smarticle's gives the wall's. Density zero: the spheres weigh nothing, the
-    # mass comes from a ballast that is taken away again (see `dem.engine.yade.clump`).
+    # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen such
+    # that the series with a smarticle's gives the wall's. Density zero: see `dem.engine.yade.assembly.clump`.
     between = 2 * law.normal_damping
     wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
     dampings = {SMARTICLE_MATERIAL: between, WALL_MATERIAL: wall}
     for label in adds.materials:
         if label == HINGE_MATERIAL:
-            # Every bond is given its stiffness by hand; this only tells YADE which law it belongs to.
+            # Bonds get their stiffness one by one; the material only selects YADE's law for them.
             material = yade.classes.CohFrictMat(density=0, young=1, poisson=0, isCohesive=False, label=label)
         else:
             material = yade.classes.ViscElMat(
@@ -96,24 +90,9 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
 
 
 def add_engines(
-    yade: Yade,
-    adds: Adds,
-    law: ContactLaw,
-    *,
-    hinges: HingeLaw | None,
-    gravity: float,
-    radius: float,
+    yade: Yade, adds: Adds, law: ContactLaw, *, hinges: HingeLaw | None, gravity: float, radius: float
 ) -> None:
-    """Make the engines and give them to the simulation.
-
-    Args:
-        yade: the simulation.
-        adds: what is to be made, see `ADDS`.
-        law: contact law.
-        hinges: stiffness of the hinges, where there are any.
-        gravity: g, downwards [m/s²].
-        radius: of the spheres [m].
-    """
+    """Make the engines and give them to the simulation; g is downwards [m/s²], the spheres have a radius [m]."""
     classes = yade.classes
     # The materials of smarticles and wall are the first two.
     friction = classes.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
@@ -128,15 +107,11 @@ def add_engines(
         },
         "InsertionSortCollider": {"verletDist": VERLET_DISTANCE * radius},
         "HarmonicMotionEngine": {"dead": True},
-        "NewtonIntegrator": {
-            "damping": 0,
-            "gravity": yade.vector(0, 0, -gravity),
-            "exactAsphericalRot": True,
-        },
+        "NewtonIntegrator": {"damping": 0, "gravity": yade.vector(0, 0, -gravity), "exactAsphericalRot": True},
     }
 
     def functors(prefix: str) -> list[Any]:
-        # YADE's names tell which dispatcher a functor is for.
+        # The beginning of a functor's name is that of its dispatcher.
         return [getattr(classes, name)(**settings.get(name, {})) for name in adds.functors if name.startswith(prefix)]
 
     dispatched = {
@@ -144,5 +119,6 @@ def add_engines(
         "InteractionLoop": (functors("Ig2_"), functors("Ip2_"), functors("Law2_")),
     }
     yade.omega.engines = [
-        getattr(classes, name)(*dispatched.get(name, ()), **settings.get(name, {})) for name in in_order(adds.engines)
+        getattr(classes, name)(*dispatched.get(name, ()), **settings.get(name, {}))
+        for name in sorted(adds.engines, key=ORDER.index)
     ]

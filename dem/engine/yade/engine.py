@@ -20,12 +20,11 @@ from dem.engine.interface import Saved
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.construction import ADDS, add_engines, add_materials
-from dem.engine.yade.forces import contact_forces
+from dem.engine.yade.contacts import contact_forces, measure_overlaps
 from dem.engine.yade.hinges import HingeLaw
 from dem.engine.yade.ledger import YadeLedger
-from dem.engine.yade.library import load_yade
+from dem.engine.yade.library import load_yade, rows_of
 from dem.engine.yade.motors import YadeMotors
-from dem.engine.yade.overlaps import measure_overlaps
 from dem.engine.yade.strings import YadeStrings
 from dem.errors import RunError
 from dem.physics.contact import ContactLaw
@@ -41,22 +40,19 @@ SCRATCH = ".engine.partial.yade"
 
 
 class YadeEngine:
-    """The running simulation on YADE; see `dem.engine.interface.Engine`.
+    """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        particle: one smarticle.
         cylinder: the container; its floor is at z = 0 at the start.
-        law: contact law.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
         shaken: whether the container will move; the engine that moves it exists only then.
-        hinges: stiffness of the hinges and what all motors have in common; None where smarticles stay welded: then
-            nothing of a hinge exists.
+        hinge_law: with `motor_law`, None where smarticles stay welded: then nothing of a hinge exists.
         track_work: whether to add up the work of the moving container.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.
-        strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
+        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.
 
     Raises:
         RunError: YADE is not installed.
@@ -71,7 +67,8 @@ class YadeEngine:
         gravity: float,
         time_step: float,
         shaken: bool,
-        hinges: tuple[HingeLaw, MotorLaw] | None = None,
+        hinge_law: HingeLaw | None = None,
+        motor_law: MotorLaw | None = None,
         track_work: bool = False,
         dissipation_interval: float | None = None,
         hooks: tuple[Cross, Cross] | None = None,
@@ -85,7 +82,6 @@ class YadeEngine:
         self.cylinder = cylinder
         self.cpu_elsewhere = 0.0
         self.gravity = gravity
-        hinge_law, motor_law = hinges or (None, None)
         self._assembly = Assembly(self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths)
         self._smarticle_seconds = 0.0
         self._thrown = 0.0
@@ -95,54 +91,28 @@ class YadeEngine:
             EffectName.CONTACT: True,
             EffectName.CONTAINER: channel is None,
             EffectName.CONTAINER_MOTION: shaken,
-            EffectName.ARTICULATION: hinges is not None,
+            EffectName.ARTICULATION: hinge_law is not None,
             EffectName.HOOKS: hooks is not None,
         }
         adds = Adds.together(ADDS[effect] for effect, on in called_for.items() if on)
         add_materials(self._yade, adds, law)
         self.boundaries = YadeBoundaries(self._yade, cylinder, hooks, channel)
-        """The container and the hooks, or the channel."""
         self.ledger = YadeLedger(
-            self._yade,
-            self._assembly,
-            self.boundaries,
-            works=track_work,
-            dissipation_interval=dissipation_interval,
+            self._yade, self._assembly, self.boundaries, works=track_work, dissipation_interval=dissipation_interval
         )
-        """Work and dissipation since the start."""
         self.boundaries.book_removal = self.ledger.removed
         self.motors = YadeMotors(self._yade, self._assembly, self.ledger, motor_law, strengths)
-        """What moves the barbs."""
         self.strings = YadeStrings(self._yade, self._assembly)
-        """What pulls a chain."""
-        add_engines(
-            self._yade,
-            adds,
-            law,
-            hinges=hinge_law,
-            gravity=gravity,
-            radius=particle.radius,
-        )
+        add_engines(self._yade, adds, law, hinges=hinge_law, gravity=gravity, radius=particle.radius)
         self.set_time_step(time_step)
         self.boundaries.bind()
         self._assembly.bind()
 
-    def _store(self, file: Path) -> None:
-        try:
-            self._omega.save(str(file))
-        except RuntimeError as error:  # of the stream that YADE's library writes into
-            msg = (
-                f"{file}: the state cannot be written ({error}); free space, or raise the limit of a file's size, and "
-                "go on with `smarticles run … --resume`; the checkpoint before is whole"
-            )
-            raise RunError(msg) from error
+    # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """See the interface.
-
-        YADE orders bodies and contacts anew when it loads, and sums of forces depend on their order: the simulation
-        loads what it has saved, so that one that goes on from there gives the same bits.
-        """
+        # YADE orders bodies and contacts differently when it loads, and sums of forces depend on their order: the
+        # simulation loads what it has saved, so that one that goes on from there gives the same bits.
         file = scratch / SCRATCH
         try:
             self._store(file)
@@ -163,7 +133,6 @@ class YadeEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """See the interface."""
         file = scratch / SCRATCH
         try:
             file.write_bytes(saved.content)
@@ -171,12 +140,22 @@ class YadeEngine:
         finally:
             file.unlink(missing_ok=True)
 
+    def _store(self, file: Path) -> None:
+        try:
+            self._omega.save(str(file))
+        except RuntimeError as error:  # of the stream that YADE's library writes into
+            msg = (
+                f"{file}: the state cannot be written ({error}); free space, or raise the limit of a file's size, and "
+                "go on with `smarticles run … --resume`; the checkpoint before is whole"
+            )
+            raise RunError(msg) from error
+
     def _load(self, file: Path, saved: Saved) -> None:
         memory = saved.memory
         self._omega.load(str(file), quiet=True)
         self._assembly.restore(memory["assembly"])
         self._smarticle_seconds = memory["smarticle_seconds"]
-        self._thrown = memory.get("thrown", 0.0)  # there was no such thing once
+        self._thrown = memory.get("thrown", 0.0)  # absent in older checkpoints
         self.boundaries.restore(memory["fixtures"])
         self.strings.restore(memory["strings"])
         self.ledger.restore(memory["account"])
@@ -185,17 +164,7 @@ class YadeEngine:
         self._assembly.bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
-    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """See the interface."""
-        self._assembly.add(poses, speed=speed)
-        mass, new = self.particle.boxes.mass, len(poses.positions)
-        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
-        self._thrown += mass * new * speed
-
-    def still(self) -> None:
-        """See the interface."""
-        self.ledger.dissipated += self.state().kinetic_energy
-        self._assembly.still()
+    # -- time --------------------------------------------------------------------------------------------------
 
     def set_time_step(self, time_step: float) -> None:
         """Take steps of another length [s] from now on.
@@ -208,29 +177,22 @@ class YadeEngine:
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
         return float(self._omega.time)
 
     @property
     def steps(self) -> int:
-        """Steps made."""
         return int(self._omega.iter)
 
     def advance(self, steps: int) -> None:
-        """Advance by whole steps; none for a number that is not positive.
-
-        Raises:
-            RunError: YADE stopped before the last step.
-        """
         if steps <= 0:
             return
         step, target, felt = self._omega.step, self.steps + steps, bool(self.boundaries.felt)
-        strings = self.strings.taut
+        tied = self.strings.tied
         # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
-            if strings is not None:
-                self.ledger.container_work += strings.pull(self.time_step)
+            if tied:
+                self.ledger.container_work += self.strings.pull(self.time_step)
             self.ledger.step(number, step)
             if felt:
                 self.boundaries.feel()
@@ -241,22 +203,30 @@ class YadeEngine:
             raise RunError(msg)
         self._smarticle_seconds += steps * self.time_step * self.count
 
+    # -- smarticles --------------------------------------------------------------------------------------------
+
     @property
     def count(self) -> int:
-        """Smarticles present."""
         return self._assembly.count
+
+    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        self._assembly.add(poses, speed=speed)
+        mass, new = self.particle.boxes.mass, len(poses.positions)
+        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        self._thrown += mass * new * speed
+
+    def still(self) -> None:
+        self.ledger.dissipated += self.state().kinetic_energy
+        self._assembly.still()
+
+    def state(self) -> State:
+        return self._assembly.state()
 
     @property
     def impulse(self) -> float:
-        """See the interface."""
         return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
-    def state(self) -> State:
-        """Poses and velocities of all smarticles."""
-        return self._assembly.state()
-
     def neighbours(self) -> NDArray[np.int64]:
-        """(N,) int64: how many other smarticles each one touches."""
         touching: set[tuple[int, int]] = set()
         smarticle_of = self._assembly.smarticle_of
         for interaction in self._omega.interactions:
@@ -266,53 +236,40 @@ class YadeEngine:
                 continue
             if interaction.phys.normalForce.squaredNorm() > 0:
                 touching.add((first, second) if first < second else (second, first))
-        result = np.zeros(self.count, dtype=np.int64)
-        for pair in touching:
-            result[list(pair)] += 1
-        return result
+        pairs = np.array(list(touching), dtype=np.int64).ravel()
+        return np.bincount(pairs, minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
-        """(N,) int64: contacts of each smarticle with others and with the container, spheres counted singly."""
-        result = np.zeros(self.count, dtype=np.int64)
+        # Contacts of spheres are counted one by one.
         smarticle_of = self._assembly.smarticle_of
-        for interaction in self._omega.interactions:
-            if interaction.isReal:
-                for body in (interaction.id1, interaction.id2):
-                    k = smarticle_of.get(body)
-                    if k is not None:
-                        result[k] += 1
-        return result
+        bodies = (body for i in self._omega.interactions if i.isReal for body in (i.id1, i.id2))
+        owners = [smarticle_of[body] for body in bodies if body in smarticle_of]
+        return np.bincount(np.array(owners, dtype=np.int64), minlength=self.count)
 
     def overlaps(self, limit: float) -> Overlaps:
-        """See the interface."""
         return measure_overlaps(self._yade, self._assembly, self.boundaries, self._law, limit)
 
     def contact_forces(self) -> ContactForces:
-        """See the interface; those of the last step."""
         return contact_forces(self._yade, self._assembly, self.boundaries)
 
     def glance(self, state: State) -> None:
-        """See the interface: there is none."""
+        """Return None: YADE has no shorter way."""
 
     def container_force(self) -> Array:
-        """(3,) [N]: force of the smarticles on the container in the last step."""
+        """Return the force (3,) of the smarticles on the container in the last step [N]."""
         force = np.zeros(3)
         for body in self.boundaries.container:
             force += self._omega.forces.f(body)
         return force
 
     def unbalanced_force(self) -> float:
-        """Mean net force on a smarticle over its weight [1]: 0 for a still pile, 1 in free fall, inf when empty.
-
-        YADE's own measure leaves gravity out for a body whose contact forces are exactly zero or balance exactly, and
-        so calls a still pile unbalanced.
-        """
+        # YADE's own measure leaves gravity out for a body whose contact forces are exactly zero or balance exactly, and
+        # so calls a still pile unbalanced.
         if self._loaded is not None and self._loaded[0] == self.steps:
             return self._loaded[1]
         if not self.count or not self.gravity:
             return math.inf
         weight = self.particle.boxes.mass * self.gravity
-        rows = [(f[0], f[1], f[2]) for f in map(self._omega.forces.f, self._assembly.bodies)]
-        forces = np.array(rows).reshape(self.count, -1, 3).sum(axis=1)
+        forces = rows_of(map(self._omega.forces.f, self._assembly.bodies)).reshape(self.count, -1, 3).sum(axis=1)
         forces[:, 2] -= weight
         return float(np.linalg.norm(forces, axis=1).mean() / weight)

@@ -29,7 +29,7 @@ SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torqu
 DAMPER_SHARE = 0.25  # of the pin's stiffness
 DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
 DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
-LOOKS_PER_TILT = 10  # looks of the motor control between corrections of the tilt's drift
+LOOKS_PER_TILT = 10  # control updates between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
 BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
@@ -43,8 +43,8 @@ class HingeLaw:
         pin_stiffness: against the links coming apart [N/m].
         tilt_stiffness: against their leaving the common plane [N m/rad].
         shaft_stiffness: twist stiffness of the motor's shaft [N m/rad].
-        torque_cap: torque at which a shaft slips [N m]; None: never.
-        shaft_damping: what the motors add to the shafts' stiffness [N m s/rad]; for the stable time step only.
+        torque_cap: at which a shaft slips [N m]; None: never.
+        shaft_damping: of the motors [N m s/rad]; for the stable time step only.
         damper_time: the dampers' time of relaxation where they are stiff [s]; at least a time step.
     """
 
@@ -57,17 +57,17 @@ class HingeLaw:
 
     @property
     def damper_stiffness(self) -> float:
-        """Of the damper's spring, across the axis [N/m]."""
+        """Stiffness of the damper's spring, across the axis [N/m]."""
         return DAMPER_SHARE * self.pin_stiffness
 
     @property
     def damper_viscosity(self) -> float:
-        """Of the damper's dashpot [N s/m]."""
+        """Viscosity of the damper's dashpot [N s/m]."""
         return max(DAMPER_VISCOSITY, self.damper_stiffness * self.damper_time)
 
 
 def hinge_nodes(boxes: Boxes, link: int) -> Array:
-    """(n, 3) hinge nodes of a link in its own frame [m].
+    """Return the hinge nodes (n, 3) of a link in its own frame [m].
 
     A barb has one hinge, at its start, with a node at the centre and one at the end of the axis, half the thickness t1
     above the plane; the middle link has a node at the centre of each of its two hinges.
@@ -94,8 +94,6 @@ class Hinges:
     """All hinges of N articulated smarticles.
 
     Args:
-        yade: the simulation.
-        law: stiffness.
         nodes: per smarticle the node ids of its links, as `hinge_nodes` orders them.
         angles: (N, 2) angles of the barbs where the bonds were made [rad].
     """
@@ -108,16 +106,12 @@ class Hinges:
         self._pins: list[Any] = []
         self._shafts: list[tuple[Any, Any]] = []
         self._ends: list[tuple[Any, Any]] = []
-        # What YADE works out of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
+        # What YADE computes of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
         self._loaded: tuple[Array, Array] | None = None
         self._looks = 0
 
     def make(self, strengths: Array | None = None) -> None:
-        """Make the bonds, between links that are where they belong.
-
-        Args:
-            strengths: (N, 2) factors on stiffness and cap of the shafts [1]; None: all are alike.
-        """
+        """Make the bonds; `strengths` are factors (N, 2) on stiffness and cap of the shafts [1], None: all equal."""
         factors = np.ones_like(self._angles) if strengths is None else strengths
         for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
@@ -125,7 +119,7 @@ class Hinges:
         self.bind()
 
     def bind(self) -> None:
-        """Take hold of YADE's bonds; loading replaces them all."""
+        """Look up YADE's bonds; loading replaces them all."""
         interactions = self._yade.omega.interactions
         self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
         shafts = [interactions[end, middle] for _, end, middle in self._hinges()]
@@ -170,7 +164,7 @@ class Hinges:
             phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
 
     def moved(self) -> None:
-        """A step has been made: YADE knows the bonds' shape again."""
+        """Read the bonds' shape from YADE again, after a step."""
         self._loaded = None
 
     def _twists(self) -> Array:
@@ -182,25 +176,21 @@ class Hinges:
         return 2 * NODE_RADIUS - np.array([geom.penetrationDepth for geom in self._pins])
 
     def angles(self) -> Array:
-        """(N, 2) angles of the barbs [rad], from the twist of the shafts."""
+        """Return the barbs' angles (N, 2) [rad], from the twist of the shafts."""
         result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
         return result
 
     def rates(self) -> Array:
-        """(N, 2) how fast the barbs turn against their middle links [rad/s], half a step behind the angles."""
+        """Return the rates (N, 2) of the barbs' angles [rad/s], half a step behind the angles."""
         up = self._yade.vector(0, 0, 1)
         turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
         result: Array = -SENSE * np.array(turning).reshape(-1, 2)
         return result
 
     def set_torques(self, torques: Array, time_step: float) -> None:
-        """Twist the shafts such that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
+        """Twist the shafts so that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
 
-        YADE adds up twist and tilt step by step; set anew from the angles now and then, neither drifts.
-
-        Args:
-            torques: on the barbs.
-            time_step: dt [s].
+        YADE sums twist and tilt step by step, of a length dt [s]; set from the angles now and then, neither drifts.
         """
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
@@ -220,28 +210,24 @@ class Hinges:
             phys.moment_bending = ((middle.ori * up).cross(axis) + turn - axis * axis.dot(turn)) * tilt
 
     def torques(self) -> Array:
-        """(N, 2) torques on the barbs at present [N m], as YADE has them."""
+        """Return YADE's present torques (N, 2) on the barbs [N m]."""
         moments = [geom.normal.dot(phys.moment_twist) for geom, phys in self._shafts]
         result: Array = -SENSE * np.array(moments).reshape(-1, 2)
         return result
 
     def gaps(self) -> Array:
-        """(N, 2) how far the two links of each hinge are apart [m]."""
+        """Return the distances (N, 2) of the two links of each hinge [m]."""
         return self._gaps().reshape(-1, 2)
 
     def elastic_energy(self) -> float:
-        """Energy in pins, dampers and shafts that tilt [J]; not in their twist, which belongs to the motors."""
+        """Return the energy in pins, dampers and tilted shafts [J]; the motors have that of their twist."""
         dampers = self._damper_forces() / self._law.damper_stiffness
         pins = self._law.pin_stiffness * (self.gaps() ** 2).sum()
         tilts = sum(phys.moment_bending.squaredNorm() for _, phys in self._shafts) / self._law.tilt_stiffness
         return float(0.5 * (pins + dampers + tilts))
 
     def damped(self, time_step: float) -> float:
-        """Energy that the dampers dissipate in a step [J].
-
-        Args:
-            time_step: dt [s].
-        """
+        """Return the energy that the dampers dissipate in a step of a length dt [s], [J]."""
         # YADE relaxes a damper's force by this share in each step.
         share = time_step * self._law.damper_stiffness / self._law.damper_viscosity
         return self._damper_forces() * (2 * share - share**2) / (2 * self._law.damper_stiffness)
@@ -264,7 +250,7 @@ class Hinges:
 
     @classmethod
     def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Hinges:
-        """The hinges of a simulation that was loaded."""
+        """Return the hinges of a simulation that was loaded."""
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
         hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])

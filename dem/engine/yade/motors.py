@@ -1,4 +1,4 @@
-"""The motors of a simulation on YADE: what decides, and the hinges that it acts on."""
+"""The motors of a simulation on YADE: their control, and the hinges that it acts on."""
 
 from __future__ import annotations
 
@@ -19,101 +19,71 @@ Array = NDArray[np.float64]
 
 
 class YadeMotors:
-    """See `dem.engine.interface.Motors`.
+    """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
 
-    Args:
-        yade: the simulation.
-        assembly: the smarticles.
-        ledger: gets what welding dissipates.
-        law: what all motors have in common; None in scenes without any.
-        strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
-    """
+    looks_at_once = 1  # between two control updates YADE comes back to Python anyhow
 
     def __init__(
-        self,
-        yade: Yade,
-        assembly: Assembly,
-        ledger: YadeLedger,
-        law: MotorLaw | None,
-        strengths: Array | None,
+        self, yade: Yade, assembly: Assembly, ledger: YadeLedger, law: MotorLaw | None, strengths: Array | None
     ) -> None:
         self._yade = yade
         self._assembly = assembly
         self._ledger = ledger
         self._law = law
         self._strengths = strengths
-        self.deciding: Motors | None = None
-        """What the motors decide, look by look; None before the first articulation."""
+        self.control: Motors | None = None
+        """Commands, torques and work; None before the first articulation."""
 
     @property
     def present(self) -> bool:
-        """See the interface."""
         return self._law is not None
 
     @property
     def articulated(self) -> bool:
-        """See the interface."""
         return self._assembly.hinges is not None
 
     def articulate(self) -> None:
-        """See the interface: welded smarticles are split into hinged links."""
         if self.articulated:
             return
         assert self._law is not None  # the engine was built for scenes that never articulate
         self._assembly.articulate()
-        # Spheres of one smarticle may touch each other from now on: neighbours must be looked for anew.
+        # Spheres of one smarticle may touch each other from now on: neighbours must be searched again.
         collider = self._yade.classes.InsertionSortCollider
         next(engine for engine in self._yade.omega.engines if isinstance(engine, collider)).doSort = True
         angles = self._hinges.angles()
-        if self.deciding is None:
-            self.deciding = Motors(self._law, angles, self._strengths)
+        if self.control is None:
+            self.control = Motors(self._law, angles, self._strengths)
         else:
-            self.deciding.engage(angles)
+            self.control.engage(angles)
 
     def weld(self) -> None:
-        """See the interface: motors that hold, at a third of the cost."""
+        # Motors that hold would do, at three times the cost.
         self._ledger.dissipated += self._assembly.weld()
 
-    @property
-    def looks_at_once(self) -> int:
-        """See the interface: between two looks YADE comes back to Python anyhow."""
-        return 1
-
     def actuate(self, targets: Array, interval: float) -> None:
-        """See the interface."""
-        assert self.deciding is not None  # only articulated smarticles are actuated
+        assert self.control is not None  # only articulated smarticles are actuated
         time_step = float(self._yade.omega.dt)
-        rates = self._hinges.rates() if self.deciding.law.damping else None
-        torques = self.deciding.look(self._hinges.angles(), targets[0], interval, time_step, rates)
+        rates = self._hinges.rates() if self.control.law.damping else None
+        torques = self.control.update(self._hinges.angles(), targets[0], interval, time_step, rates)
         self._hinges.set_torques(torques, time_step)
 
     @property
     def readings(self) -> MotorReadings | None:
-        """See the interface."""
-        told = self.deciding
-        if told is None:
+        now = self.control
+        if now is None:
             return None
         return MotorReadings(
-            schedule=told.schedule,
-            commands=told.commands,
-            torques=told.torques,
-            work=told.work,
-            halted=told.halted,
+            schedule=now.schedule, commands=now.commands, torques=now.torques, work=now.work, halted=now.halted
         )
 
     @property
     def work(self) -> float:
-        """See the interface."""
-        if self.deciding is None:
+        if self.control is None:
             return 0.0
-        if self.articulated:
-            return self.deciding.work_until(self._hinges.angles())
-        return float(self.deciding.work.sum())
+        return self.control.work_until(self._hinges.angles()) if self.articulated else float(self.control.work.sum())
 
     def gaps(self) -> Array:
-        """See the interface."""
-        hinges = self._assembly.hinges
-        return np.zeros((self._assembly.count, 2)) if hinges is None else hinges.gaps()
+        return self._hinges.gaps() if self.articulated else np.zeros((self._assembly.count, 2))
 
     @property
     def _hinges(self) -> Hinges:
@@ -123,11 +93,11 @@ class YadeMotors:
     @property
     def memory(self) -> dict[str, Any] | None:
         """Plain data that `restore` needs besides the loaded simulation."""
-        return None if self.deciding is None else self.deciding.memory
+        return None if self.control is None else self.control.memory
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
         """Go on from where `memory` was taken."""
         if memory is not None:
             assert self._law is not None  # a checkpoint belongs to its scene
-            self.deciding = Motors(self._law, np.zeros((self._assembly.count, 2)), self._strengths)
-            self.deciding.restore(memory)
+            self.control = Motors(self._law, np.zeros((self._assembly.count, 2)), self._strengths)
+            self.control.restore(memory)

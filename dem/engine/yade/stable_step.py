@@ -25,16 +25,15 @@ CONTACTS_IN_A_ROW = 3
 
 
 def stable_time_step(particle: Particle, law: ContactLaw) -> float:
-    """Largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
+    """Return the largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
 
     Modes are masses on parallel springs and dashpots: the lightest points of two smarticles against each other and
     against the container, `CONTACTS_AT_A_TIP` contacts each; a pile of smarticles lying flat, every sphere in contact
     with the neighbours above and below that move against it, which is the stiffest of any such pile and stiffer than
     one lying on the container; and the same pile in which all roll alike, surfaces rubbing against those above and
-    below, stiffer still for bars with barbs below l/w = 0.2, which have little inertia about themselves. Smarticles
-    that break the flat or the rolling mode do not blow up but chatter for ever, which shakes the pile and lets it
-    compact. YADE takes the dashpot's velocity half a step late, so a mode is stable while ω²dt² + 2c dt ≤ 4 with
-    ω² = K/m, c = C/m.
+    below, stiffer still for bars with barbs below l/w = 0.2, which have little inertia about themselves. A step that is
+    too long for the flat or the rolling mode makes smarticles chatter without end, and the pile compacts. YADE takes
+    the dashpot's velocity half a step late, so a mode is stable while ω²dt² + 2c dt ≤ 4 with ω² = K/m, c = C/m.
 
     Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1; chain of equal masses at the
     edge of its band, K = 4k.
@@ -60,17 +59,12 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
 
 
 def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
-    """Largest stable time step [s] of an articulated smarticle, over its stiffest modes of hinges and contact together.
+    """Return the largest stable time step [s] of an articulated smarticle, over modes of hinges and contact together.
 
-    Three free links, 18 degrees of freedom, joined by the springs of the pins, in the same three surroundings as in
+    Three free links, 18 degrees of freedom, joined by the springs of the pins, in the surroundings of
     `stable_time_step`: the tip of a barb against another such tip, against the container, and all of it in a flat pile.
     With M, K and C the matrices of mass, stiffness and damping, stable while K dt² + 2 C dt - 4 M has no positive
     eigenvalue.
-
-    Args:
-        particle: one smarticle.
-        law: contact law.
-        hinges: stiffness of the hinges.
     """
     boxes = particle.boxes
     mass = _mass_matrix(boxes)
@@ -99,17 +93,13 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
 def planar_stable_time_step(
     particle: Particle, law: ContactLaw, hinges: HingeLaw, strings: Sequence[tuple[float, float]] = ()
 ) -> float:
-    """The same for smarticles that lie flat in a plane, where none lies on another.
+    """Return the largest stable time step [s] of articulated smarticles that lie flat in a plane, none on another.
 
     The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
     among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it,
     of a thicker one those of its outer row; and a barb with a string at its tip.
 
-    Args:
-        particle: one smarticle.
-        law: contact law.
-        hinges: stiffness of the hinges.
-        strings: stiffness [N/m] and damping [N s/m] of each.
+    Strings have a stiffness [N/m] and a damping [N s/m] each.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)

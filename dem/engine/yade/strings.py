@@ -1,7 +1,7 @@
 """The two strings that hold and pull a chain, in YADE: forces set before every step.
 
-Each is anchored at a point in space; one of the two moves. Their forces are worked out from where the tied links are
-and how fast they move, as YADE's contact laws do, and so have the stability of such a contact.
+Each is anchored at a point in space; one of the two moves. Their forces follow from positions and velocities of the
+tied links as YADE's contact laws have them, and so have the stability of such a contact.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.chain import Tie
-from dem.body.state import State
 from dem.engine.yade.assembly import Assembly
-from dem.engine.yade.library import Yade
-from dem.physics.strings import StringLaw
+from dem.engine.yade.library import Yade, rows_of
+from dem.physics.contact import StringLaw
 
 Array = NDArray[np.float64]
 
@@ -40,38 +39,47 @@ class End:
     speed: float
 
 
-class TautStrings:
-    """Strings at work.
+class YadeStrings:
+    """`dem.engine.interface.Strings` on YADE."""
 
-    Args:
-        yade: the simulation.
-        law: what they have in common.
-        ends: one for each string.
-    """
-
-    def __init__(self, yade: Yade, law: StringLaw, ends: Sequence[End]) -> None:
+    def __init__(self, yade: Yade, assembly: Assembly) -> None:
         self._yade = yade
-        self._law = law
-        self._ends = ends
-        self._anchors = [yade.vector(*end.anchor) for end in ends]
-        self._sums = [yade.vector(0, 0, 0) for _ in ends]
-        self.bind()
+        self._assembly = assembly
+        self._law: StringLaw | None = None
+        self._bind([], [], [])
 
-    def bind(self) -> None:
-        """Take hold of YADE's objects; loading replaces them all."""
-        bodies = self._yade.omega.bodies
-        self._states = [bodies[end.body].state for end in self._ends]
-        self._arms = [self._yade.vector(*end.arm) for end in self._ends]
+    def _bind(self, ends: Sequence[End], anchors: Sequence[Sequence[float]], sums: Sequence[Sequence[float]]) -> None:
+        vector, bodies = self._yade.vector, self._yade.omega.bodies
+        self._ends = ends
+        self._states = [bodies[end.body].state for end in ends]
+        self._arms = [vector(*end.arm) for end in ends]
+        self._anchors = [vector(*anchor) for anchor in anchors]
+        self._sums = [vector(*total) for total in sums]
+
+    @property
+    def tied(self) -> bool:
+        return bool(self._ends)
+
+    def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
+        state, ends = self._assembly.state(), []
+        for tie, speed in zip(ties, speeds, strict=True):
+            point = np.array([tie.along, 0.0, 0.0])
+            body, arm = self._assembly.anchor(tie.smarticle, tie.link, point)
+            place = state.link_positions[tie.smarticle, tie.link]
+            place = place + state.link_rotations[tie.smarticle, tie.link] @ point
+            away = math.copysign(1.0, place[0])
+            anchor = [float(place[0] + away * math.sqrt(law.length**2 - place[1] ** 2)), 0.0, 0.0]
+            ends.append(End(body=body, arm=arm.tolist(), anchor=anchor, speed=away * speed))
+        self._law = law
+        self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
 
     def pull(self, time_step: float) -> float:
-        """Set the forces of the step that begins, and move the anchors on.
-
-        Args:
-            time_step: dt [s].
+        """Set the forces of the step that begins, of a length dt [s], and move the anchors on.
 
         Returns:
             Work of the strings on the links in the step [J], to first order in dt.
         """
+        assert self._law is not None  # called while strings are tied only
         work = 0.0
         forces, vector = self._yade.omega.forces, self._yade.vector
         for k, (end, state) in enumerate(zip(self._ends, self._states, strict=True)):
@@ -89,131 +97,39 @@ class TautStrings:
             work += force.dot(motion) * time_step
         return work
 
-    def release(self) -> None:
-        """Let go."""
+    def untie(self) -> None:
         for end in self._ends:
             self._yade.omega.forces.setPermF(end.body, self._yade.vector(0, 0, 0))
             self._yade.omega.forces.setPermT(end.body, self._yade.vector(0, 0, 0))
+        self._bind([], [], [])
 
     @property
     def sums(self) -> Array:
-        """(strings, 3) forces on the links, summed over all steps so far [N]."""
-        return np.array([[s[0], s[1], s[2]] for s in self._sums])
-
-    @property
-    def anchors(self) -> Array:
-        """(strings, 3) where the other ends are [m]."""
-        return np.array([[a[0], a[1], a[2]] for a in self._anchors])
+        return rows_of(self._sums)
 
     @property
     def pulled(self) -> float:
-        """How far the anchors have moved apart since the strings were tied [m]."""
-        begun = [end.anchor for end in self._ends]
-        return float(np.ptp(self.anchors[:, 0]) - np.ptp(np.array(begun)[:, 0]))
+        begun = np.array([end.anchor for end in self._ends])
+        return float(np.ptp(rows_of(self._anchors)[:, 0]) - np.ptp(begun[:, 0]))
 
     @property
     def ties(self) -> Array:
-        """(strings, 3) where the strings are tied [m]."""
-        points = [state.pos + state.ori * arm for state, arm in zip(self._states, self._arms, strict=True)]
-        return np.array([[p[0], p[1], p[2]] for p in points])
-
-    @property
-    def memory(self) -> dict[str, Any]:
-        """Plain data that `restored` needs."""
-        return {
-            "law": asdict(self._law),
-            "ends": [asdict(end) for end in self._ends],
-            "anchors": self.anchors.tolist(),
-            "sums": self.sums.tolist(),
-        }
-
-    @classmethod
-    def restored(cls, yade: Yade, memory: Mapping[str, Any]) -> TautStrings:
-        """The strings of a simulation that was loaded."""
-        strings = cls(yade, StringLaw(**memory["law"]), [End(**end) for end in memory["ends"]])
-        strings._anchors = [yade.vector(*anchor) for anchor in memory["anchors"]]
-        strings._sums = [yade.vector(*total) for total in memory["sums"]]
-        return strings
-
-
-def tied(state: State, assembly: Assembly, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> list[End]:
-    """Strings from some points of articulated smarticles, taut, their other ends outwards on the x-axis.
-
-    Args:
-        state: the smarticles.
-        assembly: their bodies.
-        ties: the points.
-        law: what the strings have in common.
-        speeds: of their other ends, away from the origin [m/s].
-    """
-    ends = []
-    for tie, speed in zip(ties, speeds, strict=True):
-        point = np.array([tie.along, 0.0, 0.0])
-        body, arm = assembly.anchor(tie.smarticle, tie.link, point)
-        place = state.link_positions[tie.smarticle, tie.link]
-        place = place + state.link_rotations[tie.smarticle, tie.link] @ point
-        away = math.copysign(1.0, place[0])
-        anchor = np.array([place[0] + away * math.sqrt(law.length**2 - place[1] ** 2), 0.0, 0.0])
-        ends.append(End(body=body, arm=arm.tolist(), anchor=anchor.tolist(), speed=away * speed))
-    return ends
-
-
-class YadeStrings:
-    """The strings of a simulation, tied or not; see `dem.engine.interface.Strings`.
-
-    Args:
-        yade: the simulation.
-        assembly: the smarticles.
-    """
-
-    def __init__(self, yade: Yade, assembly: Assembly) -> None:
-        self._yade = yade
-        self._assembly = assembly
-        self.taut: TautStrings | None = None
-        """The strings at work; None where none is tied."""
-
-    @property
-    def tied(self) -> bool:
-        """See the interface."""
-        return self.taut is not None
-
-    def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """See the interface."""
-        ends = tied(self._assembly.state(), self._assembly, ties, law, speeds)
-        self.taut = TautStrings(self._yade, law, ends)
-
-    def untie(self) -> None:
-        """See the interface."""
-        if self.taut is not None:
-            self.taut.release()
-            self.taut = None
-
-    @property
-    def sums(self) -> Array:
-        """See the interface."""
-        return self._at_work.sums
-
-    @property
-    def pulled(self) -> float:
-        """See the interface."""
-        return self._at_work.pulled
-
-    @property
-    def ties(self) -> Array:
-        """See the interface."""
-        return self._at_work.ties
-
-    @property
-    def _at_work(self) -> TautStrings:
-        assert self.taut is not None  # asked while strings are tied only
-        return self.taut
+        return rows_of(state.pos + state.ori * arm for state, arm in zip(self._states, self._arms, strict=True))
 
     @property
     def memory(self) -> dict[str, Any] | None:
         """Plain data that `restore` needs besides the loaded simulation."""
-        return None if self.taut is None else self.taut.memory
+        if self._law is None or not self.tied:
+            return None
+        return {
+            "law": asdict(self._law),
+            "ends": [asdict(end) for end in self._ends],
+            "anchors": rows_of(self._anchors).tolist(),
+            "sums": self.sums.tolist(),
+        }
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
-        """Go on from where `memory` was taken."""
+        """Go on from where `memory` was taken, in a simulation that was loaded."""
         if memory is not None:
-            self.taut = TautStrings.restored(self._yade, memory)
+            self._law = StringLaw(**memory["law"])
+            self._bind([End(**end) for end in memory["ends"]], memory["anchors"], memory["sums"])

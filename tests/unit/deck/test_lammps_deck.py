@@ -1,4 +1,4 @@
-"""A scene as a deck of LAMMPS: what is in it, what is refused, and what the distribution's LAMMPS makes of it."""
+"""A scene as a deck of LAMMPS: what is in it, what is rejected, and what the distribution's LAMMPS makes of it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from synthetic import SyntheticRun, mesh_of, write_ending, write_manifest
 
 from dem.body.state import State
-from dem.deck.lammps import BODIES, DATA, DECK, DUMP, write_deck
-from dem.deck.passive import passive
+from dem.deck import BODIES, DATA, DECK, DUMP, passive, write_deck
 from dem.errors import InputError
 from dem.record.frames import FrameWriter
 from dem.scene.reading import parse_scene
@@ -61,20 +60,20 @@ def words(deck: str, first: str) -> list[list[str]]:
 def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
     scene = scene_of(source(tmp_path / "run"))
     write_deck(scene, tmp_path / "deck")
-    particle, told = scene.particle, passive(scene, "x")
+    particle, given = scene.particle, passive(scene)
     count = len(particle.centres)
     text = (tmp_path / "deck" / DATA).read_text().partition("Atoms # hybrid sphere bond\n\n")
     rows = np.array([line.split() for line in text[2].splitlines()], float)
     assert f"{2 * count} atoms" in text[0]
     assert np.array_equal(rows[:, 0], np.arange(1, 2 * count + 1))
-    assert np.array_equal(rows[:, 2:5].reshape(2, count, 3), told.state.spheres(particle))
+    assert np.array_equal(rows[:, 2:5].reshape(2, count, 3), given.state.spheres(particle))
     assert np.array_equal(rows[:, 7], np.repeat([1, 2], count))
     assert set(rows[:, 5]) == {scene.sphere_diameter}
     masses = (rows[:, 6] * math.pi / 6 * rows[:, 5] ** 3).reshape(2, count)
     assert masses.min() > 0
     assert masses.sum(axis=1) == pytest.approx(particle.boxes.mass, rel=1e-12)
-    # Weight turns nobody: spheres are balanced about the centre of mass, which equal ones are not.
-    levers = rows[:, 2:5].reshape(2, count, 3) - told.state.positions[:, None]
+    # Weight turns no smarticle: spheres are balanced about the centre of mass, which equal ones are not.
+    levers = rows[:, 2:5].reshape(2, count, 3) - given.state.positions[:, None]
     balance = np.einsum("ns,nsi->ni", masses, levers) / particle.boxes.mass
     assert np.abs(balance).max() < 1e-15
     assert np.linalg.norm(levers.mean(axis=1), axis=1).min() > 1e-5
@@ -84,13 +83,13 @@ def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
         value = np.array(line.split(), float)
         assert len(value) == 20
         assert (value[0], value[1]) == (k + 1, particle.boxes.mass)
-        assert np.array_equal(value[2:5], told.state.positions[k])
+        assert np.array_equal(value[2:5], given.state.positions[k])
         xx, yy, zz, xy, xz, yz = value[5:11]
         # The same tensor, link by link.
         whole = np.zeros((3, 3))
         for link in range(3):
-            frame, mass = told.state.link_rotations[k, link], particle.boxes.link_masses[link]
-            arm = told.state.link_positions[k, link] - told.state.positions[k]
+            frame, mass = given.state.link_rotations[k, link], particle.boxes.link_masses[link]
+            arm = given.state.link_positions[k, link] - given.state.positions[k]
             whole += frame @ np.diag(particle.boxes.link_inertias[link]) @ frame.T
             whole += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
         np.testing.assert_allclose([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], whole, atol=1e-12 * whole.max())
@@ -112,7 +111,7 @@ OPEN, SWING = {"type": "shape-change"}, {"type": "internal-oscillation", "theta_
         ([{"type": "pull-hook"}], HOOKS, ["hooks", "phases.1 (pull-hook)"]),
     ],
 )
-def test_what_cannot_be_carried_over_is_refused_by_name(
+def test_what_cannot_be_carried_over_is_rejected_by_name(
     tmp_path: Path, phases: list[dict[str, Any]], changes: dict[str, Any], named: list[str]
 ) -> None:
     scene = scene_of(source(tmp_path / "run"), *phases, **changes)
@@ -163,15 +162,15 @@ def test_lammps_takes_it_as_it_is(tmp_path: Path) -> None:
     command = [LMP, "-in", DECK, "-log", "log.txt"]
     done = subprocess.run(command, cwd=tmp_path / "deck", capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    told, dt = passive(scene, "x"), passive(scene, "x").time_step
+    given, dt = passive(scene), passive(scene).time_step
     frames = dumped(tmp_path / "deck" / DUMP)
-    np.testing.assert_allclose(frames[0][:, :3], told.state.positions, rtol=1e-11)
+    np.testing.assert_allclose(frames[0][:, :3], given.state.positions, rtol=1e-11)
     assert not frames[0][:, 3:6].any()
     # The one that hangs falls freely, and does not turn: its weight pulls at its centre of mass.
     falling = [step for step in frames if 0 < step * dt < math.sqrt(2 * (HEIGHT - 2e-3) / 9.81)]
     assert len(falling) > 3
     for step in falling:
-        drop = told.state.positions[1] - frames[step][1, :3]
+        drop = given.state.positions[1] - frames[step][1, :3]
         # Leapfrog from rest: exact but for half a step's fall.
         assert drop == pytest.approx([0, 0, 9.81 * (step * dt) ** 2 / 2], abs=9.81 * step * dt * dt)
         assert np.abs(frames[step][1, 6:] - frames[0][1, 6:]).max() < 1e-9

@@ -1,4 +1,4 @@
-"""Damping from restitution, and a scene's numbers in its contact law."""
+"""Damping from restitution, a scene's numbers in its contact law, and strings."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scenes import small
 from scipy.integrate import solve_ivp
 
-from dem.engine.yade.kind import contact_law_of
-from dem.physics.contact import damping_ratio, restitution_of, typical_effective_mass
+from dem.engine.demand import contact_law_of
+from dem.physics.contact import StringLaw, damping_ratio, restitution_of, typical_effective_mass
 
 
 def rebound(zeta: float) -> float:
@@ -66,3 +66,11 @@ def test_law_carries_the_scenes_numbers() -> None:
     # The same damping ratio in both: against the wall one typical mass moves, between smarticles half of it.
     for damping, moved in ((law.wall_damping, mass), (law.normal_damping, mass / 2)):
         assert damping / (2 * math.sqrt(800 * moved)) == pytest.approx(damping_ratio(0.4), rel=1e-12)
+
+
+def test_a_string_pulls_and_never_pushes() -> None:
+    law = StringLaw(length=0.1, stiffness=5000.0, damping=2.0)
+    assert law.tension(0.1001, 0.0) == pytest.approx(0.5)
+    assert law.tension(0.1001, 0.1) == pytest.approx(0.7)
+    assert law.tension(0.1001, -1.0) == 0
+    assert law.tension(0.0999, 10.0) == 0

@@ -167,17 +167,17 @@ def at_most(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-def read_and_plan(text: str, folder: Path) -> str | None:
-    """The line with which a scene is refused; None where it is planned."""
+def read_and_plan(content: str, folder: Path) -> str | None:
+    """The line with which a scene is rejected; None where it is planned."""
     file = folder / "scene.yaml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(content, encoding="utf-8")
     # Collecting what thousands of scenes before have left takes a second, and is not what this one costs.
     gc.disable()
     begun = time.process_time()
     try:
         with at_most(5 * MOST_S):
             planned = plan(read_scene(file, []))
-            told = planned.to_text()
+            text = planned.to_text()
             json.dumps(planned.to_dict(), allow_nan=False)
     except InputError as error:
         line = str(error)
@@ -189,7 +189,7 @@ def read_and_plan(text: str, folder: Path) -> str | None:
         took = time.process_time() - begun
         gc.enable()
         assert took <= MOST_S, f"took {took:.2f} s"
-    assert not {"nan", "inf"} & set(told.replace(",", " ").split()), told
+    assert not {"nan", "inf"} & set(text.replace(",", " ").split()), text
     return None
 
 
@@ -201,7 +201,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def as_yaml(data: Any) -> str:
-    """The data as a file; text that YAML cannot hold is left out, as nobody can write it there."""
+    """The data as a file; text that YAML cannot hold is left out."""
     try:
         return str(yaml.safe_dump(data, allow_unicode=True, sort_keys=False)).encode("utf-8", "replace").decode()
     except yaml.YAMLError:

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.plan.choice import Expectation, choose, pick
-from dem.plan.measured import Error, Measured, read_table
+from dem.plan.choice import Error, Measured, choose, pick, read_table
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -42,10 +41,10 @@ def table_file(tmp_path: Path) -> Path:
     return file
 
 
-def expected(fidelity: str, error: float, hours: float, *, band: float = 0.01) -> Expectation:
+def expected(fidelity: str, error: float, hours: float, *, band: float = 0.01) -> Measured:
     errors = (Error(of="φ_0", value=error / 2, band=band), Error(of="φ_f", value=-error, band=band))
-    measured = Measured(fidelity=fidelity, errors=errors, seeds=3, ratio=1.0, is_reference=fidelity == "reference")
-    return Expectation(measured=measured, hours=hours)
+    exact = fidelity == "reference"
+    return Measured(fidelity=fidelity, errors=errors, seeds=3, ratio=1.0, is_reference=exact, hours=hours)
 
 
 THREE = [expected("draft", 0.06, 0.5), expected("standard", 0.02, 2.0), expected("reference", 0.0, 30.0)]
@@ -77,7 +76,7 @@ def test_a_table_is_read(table_file: Path) -> None:
 def test_the_cheapest_within_the_error_or_the_finest_within_the_hours(
     max_error: float | None, max_hours: float | None, picked: str
 ) -> None:
-    assert pick(THREE, max_error=max_error, max_hours=max_hours)[0].measured.fidelity == picked
+    assert pick(THREE, max_error=max_error, max_hours=max_hours)[0].fidelity == picked
 
 
 @pytest.mark.parametrize(
@@ -109,7 +108,7 @@ def test_limits_that_cannot_be_kept_say_which_gives_way(
 def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -> None:
     scene = scene_of(fidelity={"base": "draft", "pitch": 1.1})
     chosen = choose(scene, read_table(table_file), max_error=0.03)
-    assert chosen.fidelity == "standard"
+    assert chosen.expected.fidelity == "standard"
     plain = plan(scene_of(fidelity="standard"))
     assert chosen.expected.hours == pytest.approx(2 * plain.wall_s / 3600)
     # The plan that is shown beside it has the same hours: one number stands.
@@ -149,20 +148,20 @@ def test_engines_are_chosen_between_against_one_reference(tmp_path: Path) -> Non
     assert names == ["draft on yade", "standard on yade", "draft on links", "standard on links", "reference on links"]
     scene = scene_of()
     chosen = choose(scene, table, max_error=0.03)
-    assert (chosen.engine, chosen.fidelity) == ("links", "standard")
+    assert (chosen.expected.engine, chosen.expected.fidelity) == ("links", "standard")
     assert chosen.planned == plan(scene_of(engine="links", fidelity="standard")).corrected(1)
     assert chosen.to_text().startswith("engine links, fidelity standard: the cheapest within --max-error 0.03\n")
     assert chosen.to_text().endswith("use it: --engine links --set fidelity=standard")
     assert chosen.to_dict()["engine"] == "links"
     # The reference where the hours allow it, whatever stands before or after it in the table.
-    assert choose(scene, table, max_hours=1e6).expected.measured.name == "reference on links"
+    assert choose(scene, table, max_hours=1e6).expected.name == "reference on links"
     own = choose(scene, read_table(file, engine="yade"), max_error=0.03)
-    assert (own.engine, own.fidelity) == ("yade", "standard")
+    assert (own.expected.engine, own.expected.fidelity) == ("yade", "standard")
     assert not any("no finished runs" in note for note in own.notes)
 
 
 def test_of_what_the_hours_allow_the_most_exact_is_taken() -> None:
-    links = replace(expected("standard", 0.01, 0.1), measured=replace(THREE[0].measured, engine="links"))
+    links = replace(THREE[0], engine="links", hours=0.1)
     assert pick([*THREE[:2], links], max_error=None, max_hours=4)[0] is THREE[1]
-    exact = replace(links, measured=replace(expected("standard", 0.01, 0.1).measured, engine="links"))
+    exact = replace(expected("standard", 0.01, 0.1), engine="links")
     assert pick([*THREE[:2], exact], max_error=None, max_hours=4)[0] is exact

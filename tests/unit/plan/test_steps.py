@@ -16,7 +16,7 @@ from dem.scene.scene import Scene
 DEPOSIT = {"type": "deposit"}
 
 
-def refusal(scene: Scene) -> str:
+def rejection(scene: Scene) -> str:
     with pytest.raises(InputError) as caught:
         time_steps(scene)
     return str(caught.value)
@@ -27,7 +27,7 @@ def fastest(scene: Scene) -> float:
 
 
 @pytest.mark.parametrize("kind", ["remove-container", "pull-hook"])
-def test_what_is_lifted_or_pulled_too_fast_is_refused(kind: str) -> None:
+def test_what_is_lifted_or_pulled_too_fast_is_rejected(kind: str) -> None:
     def moved_at(speed: float, fidelity: Any = "draft") -> Scene:
         phases = [DEPOSIT, {"type": kind, "speed_m_per_s": speed, "duration_s": 3.0}]
         return small({"hooks": {}, "phases": phases, "fidelity": fidelity})
@@ -35,13 +35,13 @@ def test_what_is_lifted_or_pulled_too_fast_is_refused(kind: str) -> None:
     most = fastest(moved_at(0.01))
     assert 0.3 < most < 1
     time_steps(moved_at(0.999 * most))
-    told = refusal(moved_at(10.0))
+    error = rejection(moved_at(10.0))
     assert re.fullmatch(
         rf"phases\.1\.speed_m_per_s: 10 m/s \({kind}\) is 0\.\d+ sphere diameters in a time step of \S+ s, which "
         r"contacts cannot follow; use at most (\S+) m/s or a shorter fidelity\.time_step_s",
-        told,
+        error,
     )
-    offered = re.search(r"at most (\S+) m/s", told)
+    offered = re.search(r"at most (\S+) m/s", error)
     assert offered is not None
     time_steps(moved_at(float(offered[1])))
     assert float(offered[1]) == pytest.approx(most, rel=0.01)
@@ -50,8 +50,7 @@ def test_what_is_lifted_or_pulled_too_fast_is_refused(kind: str) -> None:
     time_steps(moved_at(10.0, {"base": "draft", "time_step_s": step}))
 
 
-@pytest.mark.parametrize("fidelity", ["draft", "standard", "reference"])
-@pytest.mark.parametrize("series", [0.004, 0.0033, 1e-5])
+@pytest.mark.parametrize(("fidelity", "series"), [("draft", 0.004), ("standard", 0.0033), ("reference", 1e-5)])
 def test_time_step_divides_the_recording_intervals(fidelity: str, series: float) -> None:
     changes = {"fidelity": fidelity, "recording": {"series_interval_s": series}}
     changes["recording"] |= {"frame_interval_s": 10 * series, "checkpoint_interval_s": None}
@@ -71,7 +70,7 @@ def test_stiff_hinges_and_shafts_shorten_the_step(key: str, value: float) -> Non
     usual = small({"phases": phases})
     changed = {"fidelity": {key: value}} if key.startswith("hinge") else {"motor": {"stiffness_N_m_per_rad": value}}
     stiff = small({"phases": phases, **changed})
-    # A shaft of 3e-3 N m/rad is far from ruling the step, one of 10 blew up before it was counted.
+    # A shaft of 3e-3 N m/rad is far from ruling the step, one of 10 rules it.
     assert time_step(stiff) < 0.5 * time_step(usual)
     barb = stiff.smarticle.boxes
     if key == "stiffness":
@@ -93,7 +92,7 @@ def test_phases_before_the_motors_have_the_step_of_a_scene_without() -> None:
     assert time_steps(scene)[0] > 1.5 * shortest
 
 
-def test_a_servo_must_look_at_every_step() -> None:
+def test_a_servo_needs_a_control_update_in_every_step() -> None:
     assert time_step(chain()) == pytest.approx(1e-4)
     with pytest.raises(InputError, match=r"fidelity.control_interval_s: 0.0005 s is 5 time steps, but a servo"):
         time_step(chain({"fidelity.control_interval_s": 5e-4}))

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 import yaml
 
-from dem.plan.outlook import plan
-from dem.plan.protocol import protocol_lines
+from dem.plan.outlook import plan, protocol_lines
 from dem.scene.reading import dump_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.protocol import PROTOCOLS

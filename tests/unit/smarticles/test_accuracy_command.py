@@ -198,7 +198,7 @@ def test_limits_of_a_plan_that_make_no_sense_are_status_2(
 def test_without_a_table_the_planner_says_how_to_make_one(
     base: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dem.plan.measured.SHIPPED", tmp_path / "none.csv")
+    monkeypatch.setattr("dem.plan.choice.SHIPPED", tmp_path / "none.csv")
     said = smarticles("plan", base, "--max-hours", "4")
     assert said.status == 2
     assert "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv" in said.err

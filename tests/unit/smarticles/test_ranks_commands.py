@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
-from dem.engine.lammps.ranks import RANKS
+from dem.engine.cores import RANKS
 from dem.run.run import manifest
 from dem.scene.reading import dump_scene, load_scene
 

@@ -1,4 +1,4 @@
-"""Forces of strings: springs with a dashpot that pull and never push, as `dem.physics.strings.StringLaw` says."""
+"""Forces of strings: springs with a dashpot that pull and never push, as `dem.physics.contact.StringLaw` says."""
 
 from __future__ import annotations
 

@@ -1,39 +1,133 @@
 """A scene as an input deck of LAMMPS: `in.lammps`, `spheres.data`, `bodies.txt`.
 
-Smarticles are rigid bodies of spheres (`fix rigid/small`) that touch by a spring with a dashpot and a sliding friction
-with memory (`gran/hooke/history`), as on YADE. Keywords are those of the version of January 2022, which Debian 12 has.
+Only passive scenes: given poses that rest, are shaken, and lose their wall. Smarticles are rigid bodies of spheres
+(`fix rigid/small`) that touch by a spring with a dashpot and a sliding friction with memory (`gran/hooke/history`), as
+on YADE. Keywords are those of the version of January 2022, which Debian 12 has.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from dem.deck.passive import PassivePhase, PassiveScene, passive
+from dem.body.state import State
+from dem.engine.demand import contact_law_of
 from dem.engine.lammps import text
 from dem.engine.lammps.text import Moving
 from dem.errors import InputError
+from dem.phases.relax import Relax
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
-from dem.phases.take_over import TakeOver
+from dem.phases.take_over import TakeOver, poses_of
+from dem.physics.contact import ContactLaw
+from dem.plan.steps import time_steps
 from dem.record.files import write_text
+from dem.scene.carried import foreign
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
+Array = NDArray[np.float64]
+PassivePhase = TakeOver | Relax | Shake | RemoveContainer
+
+
 DECK, DATA, BODIES, DUMP = "in.lammps", "spheres.data", "bodies.txt", "bodies.dump"
+
+# Sphere diameters. Contacts of piles at rest are 0.02 deep at most; those of links are 0.2 deep and more as spheres,
+# and smarticles would fly apart.
+DEEPEST = 0.05
+
+
+@dataclass(frozen=True)
+class PassiveScene:
+    """A scene without motors, its time step [s], and its smarticles at the beginning, at rest."""
+
+    scene: Scene
+    first: TakeOver
+    phases: Sequence[PassivePhase]
+    time_step: float
+    law: ContactLaw
+    state: State
+
+    @property
+    def turns(self) -> Array:
+        """(N, 3, 3) body frame to laboratory frame."""
+        own = self.scene.particle.boxes.link_rotations[1]
+        turns: Array = self.state.link_rotations[:, 1] @ own.T
+        return turns
+
+    @property
+    def spheres(self) -> Array:
+        """(N, S, 3) centres of the spheres [m]."""
+        return self.state.spheres(self.scene.particle)
+
+
+def passive(scene: Scene) -> PassiveScene:
+    """Return a scene with its poses.
+
+    Raises:
+        InputError: it has what LAMMPS cannot compute, all of it by name; or its poses are those of another engine.
+    """
+    found = list(_foreign(scene))
+    if found:
+        msg = (
+            f"cannot be carried over to LAMMPS: {'; '.join(found)}; leave that out, or run the scene here "
+            "(smarticles run)"
+        )
+        raise InputError(msg)
+    first, *others = scene.phases
+    assert isinstance(first, TakeOver)  # all others were named
+    first.ready(scene)
+    poses = poses_of(scene, first.taken)
+    turns, still = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
+    given = PassiveScene(
+        scene=scene,
+        first=first,
+        phases=[first, *(phase for phase in others if isinstance(phase, Relax | Shake | RemoveContainer))],
+        time_step=min(time_steps(scene)),
+        law=contact_law_of(scene),
+        state=State.rigid(scene.particle.boxes, poses.positions, turns, still, still),
+    )
+    spheres = given.spheres
+    owners = np.repeat(np.arange(len(spheres)), spheres.shape[1])
+    near = cKDTree(spheres.reshape(-1, 3))
+    pairs = near.query_pairs(scene.sphere_diameter * (1 - DEEPEST), output_type="ndarray")
+    deep = pairs[owners[pairs[:, 0]] != owners[pairs[:, 1]]]
+    if len(deep):
+        msg = (
+            f"phases.0.run: {len(deep)} pairs of spheres in {first.taken} overlap by more than {DEEPEST:g} diameters, "
+            "as those of another engine or fidelity do, and would fly apart in LAMMPS; run this scene's take-over "
+            "and a relax phase here (engine: yade), and take over that run"
+        )
+        raise InputError(msg)
+    return given
+
+
+def _foreign(scene: Scene) -> Iterator[str]:
+    """What LAMMPS cannot compute, by key and name."""
+    if scene.smooth:
+        yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
+    yield from foreign(scene)
+    for index, phase in enumerate(scene.phases):
+        if phase.pours:
+            yield f"phases.{index} ({phase.kind}): a pour (run it here, and begin with take-over of that run)"
+        elif not phase.actuates and not isinstance(phase, PassivePhase):
+            yield f"phases.{index} ({phase.kind})"
 
 
 def write_deck(scene: Scene, folder: Path) -> None:
     """Write the deck of a scene into a folder of its own.
 
     Raises:
-        InputError: the scene has what LAMMPS cannot be told, or the folder is there already.
+        InputError: the scene has what LAMMPS cannot compute, or the folder exists already.
         RunError: it cannot be written.
     """
-    told = passive(scene, "LAMMPS")
+    given = passive(scene)
     if folder.exists():
         msg = f"--output {folder}: exists; choose another name"
         raise InputError(msg)
@@ -42,38 +136,31 @@ def write_deck(scene: Scene, folder: Path) -> None:
     except OSError as error:
         msg = f"--output {folder}: cannot be made ({error.strerror}); choose another place"
         raise InputError(msg) from None
-    for name, lines in ((DATA, _data(told)), (BODIES, _bodies(told)), (DECK, _deck(told))):
+    spheres, state = given.spheres, given.state
+    still = np.zeros((state.count, 3))
+    title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
+    contents = {
+        DATA: text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title),
+        BODIES: text.body_lines(scene.particle, Moving(state.positions, given.turns, still, still, still, still)),
+        DECK: _deck(given),
+    }
+    for name, lines in contents.items():
         write_text(folder / name, "\n".join(lines) + "\n")
 
 
-def _data(told: PassiveScene) -> Iterator[str]:
-    """All spheres."""
-    scene, spheres = told.scene, told.spheres
-    title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
-    return text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title)
-
-
-def _bodies(told: PassiveScene) -> Iterator[str]:
-    """All smarticles, at rest."""
-    still = np.zeros((told.state.count, 3))
-    return text.body_lines(told.scene.particle, Moving(told.state.positions, told.turns, still, still, still, still))
-
-
-def _deck(told: PassiveScene) -> Iterator[str]:
-    scene, law, boxes = told.scene, told.law, told.scene.particle.boxes
-    d, dt, cylinder = scene.sphere_diameter, told.time_step, scene.cylinder
+def _deck(given: PassiveScene) -> Iterator[str]:
+    scene, law, boxes = given.scene, given.law, given.scene.particle.boxes
+    d, dt, cylinder = scene.sphere_diameter, given.time_step, scene.cylinder
     each = len(scene.particle.centres)
     before_box, neighbours = "\n".join(text.before_box(scene.particle)), "\n".join(text.neighbours(scene.particle))
     between, at_wall = text.contact_terms(law, boxes.mass)
     container = "\n".join(text.container(cylinder, at_wall))
     frame = _steps(scene.recording.frame_interval_s, dt)
     columns = " ".join(f"c_where[{k}]" for k in range(1, 12))
-    first = told.phases[0]
-    assert isinstance(first, TakeOver)
     yield f"""\
 # {_one_line(scene.name)}: {scene.count} smarticles of {each} spheres of {1e3 * d:.4g} mm
 # l/w = {scene.smarticle.aspect_ratio:g}. Made by smarticles export --to lammps, of the scene {scene_hash(scene)[:12]}.
-# Poses: frame {first.frame} of a run, SHA-256 {first.sha256}
+# Poses: frame {given.first.frame} of a run, SHA-256 {given.first.sha256}
 # Run:   lmp -in {DECK}        on n processors: mpirun -np n lmp -in {DECK}
 # Gives: {DUMP}, every {scene.recording.frame_interval_s:g} s: number from 1, centre of mass, velocity, quaternion
 #        (w, x, y, z) of each smarticle.
@@ -114,14 +201,14 @@ compute          where all rigid/local bodies mol x y z vx vy vz quatw quati qua
 dump             bodies all local {frame} {DUMP} {columns}
 dump_modify      bodies format float %.12g"""
     walled = True
-    for index, phase in enumerate(told.phases):
+    for index, phase in enumerate(given.phases):
         yield f"\n# -- phase {index}: {phase.kind} " + "-" * 40
-        yield from _phase(told, phase, walled=walled)
+        yield from _phase(given, phase, walled=walled)
         walled = walled and not isinstance(phase, RemoveContainer)
 
 
-def _phase(told: PassiveScene, phase: PassivePhase, *, walled: bool) -> Iterator[str]:
-    dt, gravity = told.time_step, told.scene.gravity_m_per_s2
+def _phase(given: PassiveScene, phase: PassivePhase, *, walled: bool) -> Iterator[str]:
+    dt, gravity = given.time_step, given.scene.gravity_m_per_s2
     if isinstance(phase, TakeOver):
         hold = phase.settle.hold_s
         yield "# Springs of friction begin anew: the pile settles a little, for as long as it must be still in a run."

@@ -1,8 +1,11 @@
-"""What the engine lammps refuses, what it says to LAMMPS, and what it works out itself; without LAMMPS."""
+"""LAMMPS as an engine, without running it: what is rejected, commands, contacts, a child that is missing or ends."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +15,12 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.state import State
 from dem.engine.lammps.boundaries import LammpsBoundaries
+from dem.engine.lammps.child import NEEDED, Child, explain
 from dem.engine.lammps.contacts import Contacts
-from dem.engine.lammps.text import Moving, contact_terms
-from dem.errors import InputError
+from dem.engine.lammps.text import contact_terms
+from dem.errors import InputError, RunError
 from dem.physics.contact import contact_law
+from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
 from dem.setting.container import Cylinder
 
@@ -44,20 +49,20 @@ PHASES = [{"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0
         ),
     ],
 )
-def test_what_it_cannot_compute_is_refused_by_name_when_the_scene_is_read(
+def test_what_it_cannot_compute_is_rejected_by_name_when_the_scene_is_read(
     changes: dict[str, Any], named: list[str] | None
 ) -> None:
     data = changed(SMALL, {"engine": "lammps", **changes})
     if named is None:
         assert parse_scene(data, source="x").engine == "lammps"
         return
-    with pytest.raises(
-        InputError, match=r"engine: lammps cannot compute .*; leave that out, or use engine: yade or"
-    ) as e:
+    with pytest.raises(InputError) as error:
         parse_scene(data, source="x")
+    (line,) = str(error.value).splitlines()
+    assert "engine: lammps cannot compute" in line
+    assert "; leave that out, or use engine: yade or" in line
     for each in named:
-        assert each in str(e.value)
-    assert len(str(e.value).splitlines()) == 1
+        assert each in line
     assert parse_scene({**data, "engine": "yade"}, source="x").engine == "yade"
 
 
@@ -74,16 +79,8 @@ def test_damping_is_given_by_mass_as_lammps_multiplies_it() -> None:
     assert between[4:] == [law.friction, 1]
 
 
-def moving(count: int) -> tuple[Any, Moving]:
-    scene, rng = small(), np.random.default_rng(4)
-    turns = Rotation.random(count, random_state=rng).as_matrix()
-    vectors = (rng.normal(size=(count, 3)) for _ in range(5))
-    places, *rest = vectors
-    return scene, Moving(places, turns, *rest)
-
-
 @pytest.fixture
-def told() -> list[str]:
+def commands() -> list[str]:
     return []
 
 
@@ -93,17 +90,17 @@ def clock() -> list[float]:
 
 
 @pytest.fixture
-def boundaries(told: list[str], clock: list[float]) -> LammpsBoundaries:
+def boundaries(commands: list[str], clock: list[float]) -> LammpsBoundaries:
     cylinder = Cylinder(radius=0.02, height=0.05, facets=64)
-    return LammpsBoundaries(cylinder, told.extend, lambda: (int(clock[0]), clock[1]))
+    return LammpsBoundaries(cylinder, commands.extend, lambda: (int(clock[0]), clock[1]))
 
 
 def test_floor_and_wall_are_where_lammps_s_variables_put_them(
-    boundaries: LammpsBoundaries, told: list[str], clock: list[float]
+    boundaries: LammpsBoundaries, commands: list[str], clock: list[float]
 ) -> None:
     clock[0] = 30
     boundaries.shake(amplitude=1e-3, frequency=25.0)
-    values = dict(line.split()[1::2] for line in told)
+    values = dict(line.split()[1::2] for line in commands)
     assert values["begun"] == "30"
     clock[0] = 90  # 6 ms later
     omega, t = 2 * math.pi * 25, 6e-3
@@ -116,13 +113,13 @@ def test_floor_and_wall_are_where_lammps_s_variables_put_them(
     boundaries.stop()
     clock[0] = 500
     assert (boundaries.floor, boundaries.velocity, boundaries.moving) == (height, 0.0, False)
-    del told[:]
+    del commands[:]
     boundaries.remove_wall()
-    assert told == ["unfix wall", "region wall delete"]
+    assert commands == ["unfix wall", "region wall delete"]
     assert (boundaries.walled, boundaries.enclosed, boundaries.raised) == (False, False, None)
     boundaries.shake(amplitude=1e-3, frequency=25.0, walls=True)
-    assert "variable wall_amplitude equal 0" in told
-    again = LammpsBoundaries(boundaries.cylinder, told.extend, lambda: (510, 1e-4))
+    assert "variable wall_amplitude equal 0" in commands
+    again = LammpsBoundaries(boundaries.cylinder, commands.extend, lambda: (510, 1e-4))
     again.restore(boundaries.memory)
     clock[0] = 510
     assert again.floor == boundaries.floor != height
@@ -154,9 +151,90 @@ def test_contacts_are_those_of_all_pairs_of_spheres(boundaries: LammpsBoundaries
     assert np.array_equal(found.touches(), touches)
     assert np.array_equal(found.neighbours(), neighbours)
     law = contact_law(scene.particle, scene.contact, 250.0)
-    told = found.overlaps(radius, law)
-    assert told.deepest == pytest.approx(max(depths), rel=1e-12)
-    assert 0 < told.deep.sum() < count
+    overlaps = found.overlaps(radius, law)
+    assert overlaps.deepest == pytest.approx(max(depths), rel=1e-12)
+    assert 0 < overlaps.deep.sum() < count
     normal = 250 / 2 * sum(depth**2 for depth in depths)
-    assert told.elastic_energy == pytest.approx(normal * (1 + 0.4**2 / 0.82), rel=1e-12)
+    assert overlaps.elastic_energy == pytest.approx(normal * (1 + 0.4**2 / 0.82), rel=1e-12)
     assert Contacts.of(np.zeros((0, 18, 3)), radius, boundaries).touches().shape == (0,)
+
+
+HELP = "Large-scale Atomic/Molecular Massively Parallel Simulator - {version}\n\n" + " ".join(NEEDED)
+Programs = Callable[..., Path]
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Programs:
+    """Makes programs that are all that is found; each a shell script."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+
+    def make(**scripts: str) -> Path:
+        for name, text in scripts.items():
+            (folder / name).write_text(f"#!/bin/sh\n{text}\n")
+            (folder / name).chmod(0o755)
+        return folder
+
+    return make
+
+
+def said(version: str = "29 Sep 2021", *, without: str = "") -> str:
+    text = HELP.format(version=version).replace(without, "") if without else HELP.format(version=version)
+    return f"while read -r line; do echo \"$line\"; done <<'E'\n{text}\nE"
+
+
+@pytest.mark.parametrize(("there", "missing"), [({}, "lmp of LAMMPS"), ({"lmp": said()}, "mpirun of Open MPI")])
+def test_what_is_missing_is_named_and_no_directory_is_left(
+    programs: Programs, there: dict[str, str], missing: str, tmp_path: Path
+) -> None:
+    programs(**there)
+    way_out = r"`make setup-mpi` or `apt-get install lammps openmpi-bin`, or use engine: yade"
+    with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
+        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+KILLED = """\
+--------------------------------------------------------------------------
+mpirun noticed that process rank 1 with PID 0 on node box exited on
+signal 9 (Killed).
+--------------------------------------------------------------------------
+"""
+UNKNOWN = "ERROR: Unknown fix style nonsense (../modify.cpp:899)\nLast command: fix bogus all   nonsense\n"
+
+
+@pytest.mark.parametrize(
+    ("log", "printed", "cause", "way_out"),
+    [
+        ("", KILLED, "rank 1 was ended by signal 9 (Killed)", "if memory ran out.*fewer --ranks; go on .*resume"),
+        ("", KILLED.replace("9 (Killed)", "11 (Segmentation fault)"), "signal 11 (Segm", "^go on from the last check"),
+        (UNKNOWN, "", "Unknown fix style nonsense (command: fix bogus all nonsense)", "does not know .*setup-mpi"),
+        ("ERROR: Lost atoms: original 180 (../thermo.cpp:438)", "", "Lost atoms: original", "fly apart.*low"),
+        ("", "ERROR on proc 1: Failed to allocate 8 bytes for array x (../memory.cpp:66)", "Failed", "memory is short"),
+        ("", "There are not enough slots available in the system", "fewer cores than ranks", "fewer --ranks"),
+        ("units si", "", "exit status 3 (it says nothing)", "see its log"),
+    ],
+)
+def test_why_it_ended_is_read_from_its_own_log(log: str, printed: str, cause: str, way_out: str) -> None:
+    found = explain(log, printed, 3)
+    assert cause in found[0]
+    assert "cpp" not in found[0]
+    assert re.search(way_out, found[1])
+
+
+def test_the_error_of_a_child_that_ends_names_its_log_and_its_folder_is_gone(
+    programs: Programs, tmp_path: Path
+) -> None:
+    echo = "\n".join(f"echo '{line}'" for line in KILLED.splitlines())
+    programs(mpirun=f"read -r line\n{echo}\nexit 137")
+    child = Child(2)
+    with pytest.raises(
+        RunError, match=r"^LAMMPS ended: rank 1 was ended by signal 9 \(Killed\); .*; its log: /"
+    ) as error:
+        child.send("run 1")
+    assert not child.scratch.exists()
+    kept = Path(str(error.value).rpartition("its log: ")[2])
+    assert "signal 9 (Killed)" in kept.read_text()
+    kept.unlink()
+    kept.parent.rmdir()

@@ -1,0 +1,133 @@
+"""A plan: which effects a scene calls for, warnings, costs on the links engine."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from scenes import small
+
+from dem.engine.effect import Adds
+from dem.plan.effects import ADDS, decide
+from dem.plan.outlook import Plan, plan, warnings_of
+from dem.record.columns import (
+    COLUMNS,
+    ENERGY_COLUMNS,
+    HOOK_COLUMNS,
+    LEDGER_COLUMNS,
+    MOTOR_COLUMNS,
+    RELEASE_COLUMNS,
+    STRAIN_COLUMNS,
+)
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+
+DEPOSIT = {"type": "deposit"}
+ACTUATED = [DEPOSIT, {"type": "relax"}, {"type": "shape-change"}, {"type": "internal-oscillation", "theta_deg": 5}]
+PLAIN = {"phases": [DEPOSIT, {"type": "relax"}], "recording.checkpoint_interval_s": None}
+ALWAYS = {"contact", "container", "gravity", "friction", "restitution", "series", "frames"}
+
+ACTUATION = {"articulation", "motors", "torque cap"}
+CALLS: list[tuple[dict[str, Any], set[str]]] = [
+    ({"phases": [DEPOSIT, {"type": "shake"}]}, {"container motion"}),
+    ({"phases": ACTUATED}, ACTUATION),
+    ({"phases": ACTUATED, "motor": {"law": "slip"}}, ACTUATION),
+    ({"hooks": {}}, {"hooks"}),
+    ({"phases": [DEPOSIT, {"type": "remove-container"}]}, {"wall removal"}),
+    ({"recording.energy": True}, {"energies"}),
+    ({"recording.dissipation_interval_s": 1e-3}, {"energies", "energy account"}),
+    ({"recording.sphere_interval_s": 0.04}, {"sphere glyphs"}),
+    ({"recording.checkpoint_interval_s": 0.4}, {"checkpoints"}),
+]
+
+
+def on(scene: Scene) -> set[str]:
+    return {decision.name for decision in decide(scene) if decision.on}
+
+
+def test_a_plain_scene_calls_for_the_plain_effects() -> None:
+    scene = small(PLAIN)
+    assert on(scene) == ALWAYS
+    assert plan(scene).engines == ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
+    for decision in decide(scene):
+        assert decision.why
+        assert decision.on or decision.adds == Adds()
+
+
+@pytest.mark.parametrize(("changes", "called"), CALLS)
+def test_each_effect_is_called_for_by_its_own_part_of_the_scene(changes: dict[str, Any], called: set[str]) -> None:
+    scene = small(PLAIN | changes)
+    assert on(scene) == ALWAYS | called
+    planned = plan(scene)
+    plain = Adds.together(effect.adds for effect in plan(small(PLAIN)).effects)
+    added = Adds.together(effect.adds for effect in planned.effects)
+    assert added != plain  # an effect without any trace would need no declaration
+    assert set(plain.engines) <= set(added.engines)
+    assert set(planned.engines) == set(added.engines)
+    assert json.loads(json.dumps(planned.to_dict()))["effects"][0]["adds"]["engines"] == list(plain.engines)
+
+
+def test_every_column_belongs_to_one_effect() -> None:
+    declared = [name for adds in ADDS.values() for name in adds.series]
+    tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
+    assert sorted(declared) == sorted(name for table in tables for name in table)
+    assert len(set(declared)) == len(declared)
+
+
+def test_a_plain_scene_has_no_warnings() -> None:
+    assert warnings_of(small()) == ()
+    assert plan(small()).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
+)
+def test_an_interval_longer_than_the_run_gives_a_warning(key: str, left_out: str) -> None:
+    assert warnings_of(small({f"recording.{key}": 0.88})) == ()
+    scene = small({f"recording.{key}": 10.0})
+    (warning,) = plan(scene).warnings
+    assert warning == (
+        f"recording.{key}: 10 s is longer than the whole run, about 0.9 s, so that {left_out}; shorten it, or lengthen "
+        "the run"
+    )
+    assert warning == warnings_of(scene)[0]
+    assert f"warning: {warning}" in plan(scene).to_text().splitlines()
+    assert json.loads(json.dumps(plan(scene).to_dict()))["warnings"] == [warning]
+
+
+def test_knobs_that_do_nothing_on_links_give_a_warning_where_they_are_set() -> None:
+    assert warnings_of(small({"engine": "links"})) == ()
+    knobs = {"base": "draft", "pitch": 0.5, "wall_facets": 128}
+    assert warnings_of(small({"fidelity": knobs})) == ()
+    (warning,) = warnings_of(small({"engine": "links", "fidelity": knobs}))
+    assert warning == (
+        "fidelity: pitch (0.5), wall_facets (128) have no meaning on the engine links; leave out what does nothing"
+    )
+
+
+def rates(made: Plan) -> dict[str, float]:
+    """Seconds per simulated second by type of phase."""
+    return {phase.type: phase.wall_s / phase.estimate_s for phase in made.phases}
+
+
+def bench(activity: dict[str, object], count: int = 270) -> Plan:
+    """A scene of `benchmarks.engines`, in a container as wide as keeps the pile's height."""
+    radius = 0.0234 * (count / 270) ** 0.5
+    phases = [{"type": "deposit", "per_layer": max(4, count // 27)}, {"duration_s": 2.0, **activity}]
+    data = {"schema_version": 1, "engine": "links", "seed": 1, "count": count, "container": {"radius_m": radius}}
+    return plan(parse_scene({**data, "phases": phases}, source="test"))
+
+
+@pytest.mark.parametrize(
+    ("made", "kind", "measured"),
+    [
+        # results/bench: idle, three seeds each.
+        (bench({"type": "shake"}), "shake", 0.98),
+        (bench({"type": "internal-oscillation", "theta_deg": 10.0}), "internal-oscillation", 1.74),
+        # results/bench/cost.csv, by what a busy machine adds, 0.63.
+        (bench({"type": "relax"}), "relax", 0.63 * 1.83),
+    ],
+)
+def test_costs_are_those_measured(made: Plan, kind: str, measured: float) -> None:
+    assert rates(made)[kind] == pytest.approx(measured, rel=0.25)
