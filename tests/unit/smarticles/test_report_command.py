@@ -17,7 +17,7 @@ from scenes import small
 
 from dem.scene.reading import dump_scene, scene_hash
 from smarticles.reporting.charts import thinned
-from smarticles.reporting.page import Table
+from smarticles.reporting.page import numbers
 from smarticles.sweeps import make_folder
 from studies.registry import study_file
 
@@ -84,7 +84,7 @@ def test_the_page_of_a_run_tells_everything(run: Path, smarticles: Smarticles) -
     assert page.row("container motion", "on")[2].startswith("phase 2: Γ = 2")
     assert page.row("rows") == ["rows", "2", "1"]
     assert page.row("links", "draft")[-1] == "this one"
-    assert "This scene changes rows, which the table does not know of." in page.text
+    assert "This scene changes rows, which the table does not cover." in page.text
     assert page.row("warning: two hooks") == ["warning: two hooks", "3 ×"]
     assert page.row("seed")[1] == "1"
     assert "smarticles run pile/scene.yaml --out pile-again" in page.text
@@ -230,7 +230,7 @@ def test_a_thinned_curve_keeps_its_extremes() -> None:
     ],
 )
 def test_columns_of_numbers_are_known(cells: list[str], numeric: bool) -> None:
-    assert Table(caption="", header=["a"], rows=[[cell] for cell in cells]).numeric == [numeric]
+    assert numbers(cells) is numeric
 
 
 def test_a_long_table_says_what_is_left_out(tmp_path: Path, smarticles: Smarticles) -> None:
