@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_overwrite, positive_number
+from smarticles.command_line import Commands, add_overwrite, positive_number
 
 _PICTURE_SUFFIX = ".png"
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")

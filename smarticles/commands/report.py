@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.parsing import Commands, add_overwrite, add_slots
+from smarticles.command_line import Commands, add_jobs, add_overwrite
 
 
 def add(commands: Commands) -> None:
@@ -32,7 +32,7 @@ repeat it. The file holds all that it shows: it can be sent, kept, and opened wi
     report.add_argument(
         "--accuracy", type=Path, metavar="FILE.csv", help="measured errors of fidelities; default: those that ship"
     )
-    add_slots(report)
+    add_jobs(report)
     add_overwrite(report)
 
 
@@ -70,13 +70,13 @@ def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
     Raises:
         InputError: the directory is none of these, or a file of it is damaged.
     """
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
-    from templates.local.runner import slots_here  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     if (directory / OF_SWEEP).is_file():
-        return sweep_page(open_folder(directory), accuracy, jobs=jobs or slots_here())
+        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores())
     if (directory / MANIFEST).is_file():
         return run_page(directory, accuracy)
     if (directory / PROVENANCE).is_file():

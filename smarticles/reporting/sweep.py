@@ -31,7 +31,7 @@ from smarticles.reporting.run import (
     warning_blocks,
 )
 from studies.registry import STUDIES
-from templates.sweep.folder import Folder, RunStatus, count_states
+from templates.sweep.folder import Folder, RunStatus
 from templates.sweep.sweep_file import SEED
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     )
     lead = [
         ("runs", str(len(states))),
-        *((state, str(number)) for state, number in count_states(states).items()),
+        *((state, str(number)) for state, number in Counter(one.state for one in states).items()),
         ("varies", ", ".join(name for name, values in varied.items() if len(values) > 1) or "nothing"),
     ]
     return page(folder.name, "study" if study in STUDIES else "sweep", lead, sections, folder.path)

@@ -14,8 +14,7 @@ from command_cases import Smarticles
 from syrupy.assertion import SnapshotAssertion
 
 from dem.errors import InputError, RunError
-from smarticles.main import build_parser, guarded
-from smarticles.stopping import orderly_stop
+from smarticles.main import build_parser, guarded, orderly_stop
 
 COMMANDS = {
     "run", "plan", "schema", "doctor", "measure", "render", "view", "export", "sweep", "status", "resume", "study",
@@ -115,8 +114,9 @@ class TestGuarded:
             ),
             (
                 ModuleNotFoundError("No module named 'pandas'", name="pandas"),
-                1,
-                "error: the Python package 'pandas' is not installed; run `make setup`, then `smarticles doctor`",
+                2,
+                "error: the Python package 'pandas' is missing; install it: pip install smarticles, "
+                "or `make setup` in the repository",
             ),
             (
                 ZeroDivisionError("division by zero"),

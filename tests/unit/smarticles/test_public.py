@@ -14,7 +14,7 @@ import smarticles
 from dem.errors import InputError, RunError
 from dem.scene.reading import parse_scene
 from dem.setting.fidelity import fidelities
-from smarticles.scene_sweep import write_sweep
+from smarticles.public import write_sweep
 from smarticles.sweeps import make_folder
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep

@@ -11,7 +11,7 @@ from command_cases import Smarticles, WriteRun
 from PIL import Image
 
 from postprocess.pictures.canvas import VIEWS
-from smarticles.layout import Cell, columns
+from smarticles.command_line import Cell, columns
 
 
 def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:

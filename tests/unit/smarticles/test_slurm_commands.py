@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from command_cases import SWEEP, Smarticles
 
-from templates.slurm import queue as slurm
+from templates.slurm import submission as slurm
 
 LARGE = ("--cluster", "example-large")
 

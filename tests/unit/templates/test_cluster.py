@@ -8,7 +8,7 @@ import pytest
 
 from dem.errors import InputError
 from templates.slurm.cluster import Cluster, format_time, load_cluster, parse_time, shipped_clusters
-from templates.slurm.request import Request, Wishes, plan_request
+from templates.slurm.job import Request, Wishes, plan_request
 
 FILE = """\
 schema_version = 1
@@ -128,7 +128,7 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
         ({"time": "1-00:01:00"}, "--time 1-00:01:00: partition long of mine allows 1-00:00:00"),
         ({"time": "00:31:00", "partition": "short"}, "partition short of mine allows 00:30:00"),
         ({"time": "soon"}, "--time: 'soon' is not a time"),
-        ({"time": "2"}, "--time 2: runs are told to stop 120 s before the end"),
+        ({"time": "2"}, "--time 2: runs are asked to stop 120 s before the end"),
         ({"runs_per_task": 17}, "--runs-per-task 17: partition long of mine has 16 cores"),
         ({"runs_per_task": 16, "memory_mib": 2001}, "16 × 2001 MiB are more than the 32000 MiB"),
         ({"memory_mib": 40000}, "--runs-per-task 1: 1 × 40000 MiB are more than"),

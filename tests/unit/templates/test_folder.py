@@ -12,7 +12,7 @@ from sweep_cases import SWEEP, MakeFolder
 
 from dem.errors import InputError
 from dem.scene.reading import load_scene, scene_hash
-from templates.sweep.folder import Folder, count_states, open_folder
+from templates.sweep.folder import Folder, open_folder
 
 
 def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> None:
@@ -143,7 +143,6 @@ def test_states_of_its_runs(make_folder: MakeFolder) -> None:
         ("stopped", None, 1.5),
         ("missing", None, None),
     ]
-    assert count_states(found) == {"done": 1, "failed": 1, "stopped": 1, "missing": 1}
     assert json.loads(json.dumps(found[2].to_dict()))["checkpoint_s"] == 1.2
 
 

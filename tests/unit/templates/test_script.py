@@ -16,8 +16,7 @@ import pytest
 
 from dem.errors import InputError
 from templates.slurm.cluster import Cluster, load_cluster
-from templates.slurm.request import Wishes, plan_request
-from templates.slurm.script import job_name, render_script
+from templates.slurm.job import Wishes, job_name, plan_request, render_script
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden"
 PLAIN = "/home/user/sweeps/friction"

@@ -12,12 +12,23 @@ from sweep_cases import MakeFolder
 from synthetic import write_ended
 
 from dem.errors import InputError, RunError
-from templates.slurm import queue as slurm
 from templates.slurm import submission
 from templates.slurm.cluster import load_cluster
-from templates.slurm.queue import STATES, QueueError, Task, parse_job_id, parse_queue
-from templates.slurm.request import Wishes, plan_request
-from templates.slurm.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
+from templates.slurm.job import Wishes, plan_request
+from templates.slurm.submission import (
+    STATES,
+    QueueError,
+    Task,
+    draft,
+    merged,
+    parse_job_id,
+    parse_queue,
+    reject_queued,
+    submissions,
+    tasks_of_runs,
+    to_submit,
+    write,
+)
 from templates.sweep.folder import Folder, RunStatus
 
 
@@ -92,7 +103,7 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         assert command[0] == "squeue"
         return "\n".join(lines)
 
-    monkeypatch.setattr(slurm, "_call", call)
+    monkeypatch.setattr(submission, "_call", call)
     return lines
 
 
@@ -163,12 +174,12 @@ def test_queue_and_directory_together(directory: str, slurm_state: str, state: s
 
 
 def test_nothing_is_computed_here_while_it_is_in_the_queue(folder: Folder, queue: list[str]) -> None:
-    refuse_queued(folder)
+    reject_queued(folder)
     submitted(folder)
-    refuse_queued(folder)
+    reject_queued(folder)
     queue.append("test.tt|12|0|RUNNING|None")
     with pytest.raises(InputError, match=r"in Slurm's queue \(jobs 12\).*scancel 12"):
-        refuse_queued(folder)
+        reject_queued(folder)
 
 
 def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,11 +188,11 @@ def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypa
     def call(command: tuple[str, ...], _: Path | None) -> str:
         raise subprocess.CalledProcessError(1, command, stderr="Unable to contact\nslurm controller")
 
-    monkeypatch.setattr(slurm, "_call", call)
+    monkeypatch.setattr(submission, "_call", call)
     with pytest.raises(QueueError, match="the queue cannot be asked: Unable to contact slurm controller"):
         tasks_of_runs(submissions(folder.path))
     with pytest.raises(InputError, match="was submitted to Slurm"):
-        refuse_queued(folder)
+        reject_queued(folder)
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"job_id": "x"}'])
