@@ -82,7 +82,7 @@ class Snapshot:
     @property
     def rows(self) -> list[tuple[str, ...]]:
         """Name, phase, simulated time, packing fraction and wall time of the running ones."""
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for name, wall, progress in self.running:
             end = " s" if progress.end_s is None else f" of {progress.end_s:.2f} s"
             simulated = "starting" if progress.time_s is None else f"{progress.time_s:.2f}{end}"

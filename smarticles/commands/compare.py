@@ -190,7 +190,9 @@ def compare(one: Path, other: Path) -> Comparison:
         versions=differences(_made_by(first), _made_by(second)),
         only={},
         bits={first.manifest.name: same_bits(first, second)},
-        measures=_beside(*(measured([run.path]) if has_frames(run.path) else None for run in (first, second)), PHASE),
+        measures=_beside(
+            *(measured([run.path]) if has_frames(run.path) else None for run in (first, second)), keys=PHASE
+        ),
     )
 
 
@@ -222,7 +224,7 @@ def _sweeps(one: Folder, other: Folder) -> Comparison:
         versions=differences(*(_versions(runs.values()) for runs in (first, second))),
         only={A: [name for name in first if name not in second], B: [name for name in second if name not in first]},
         bits={name: same_bits(first[name], second[name]) for name in begun},
-        measures=_beside(*(grouped(measured([folder.path]), keys) for folder in (one, other)), keys),
+        measures=_beside(*(grouped(measured([folder.path]), keys) for folder in (one, other)), keys=keys),
     )
 
 
@@ -293,7 +295,7 @@ def _differ(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.bool_]:
     return unlike
 
 
-def _beside(one: pd.DataFrame | None, other: pd.DataFrame | None, keys: Sequence[str]) -> pd.DataFrame:
+def _beside(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> pd.DataFrame:
     """Return quantities of two tables beside each other, one row per place and quantity."""
     import pandas as pd  # noqa: PLC0415
 

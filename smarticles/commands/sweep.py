@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.record.names import OF_SWEEP
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_engine, add_jobs, columns, positive_int
 
@@ -105,7 +106,7 @@ def _place(arguments: argparse.Namespace) -> Path:
 def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
     """Render the submission of all runs of a new sweep, or of what is missing of one that is there."""
     from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
-    from templates.sweep.folder import MANIFEST, entry_of, open_folder  # noqa: PLC0415
+    from templates.sweep.folder import entry_of, open_folder  # noqa: PLC0415
 
     out = _place(arguments)
     if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
@@ -115,7 +116,7 @@ def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) ->
         )
         raise InputError(msg)
     entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
-    if (out / MANIFEST).exists():
+    if (out / OF_SWEEP).exists():
         # Where nothing is missing, the limits are checked for all runs.
         entries = to_submit(open_folder(out), tasks_of_runs(submissions(out))) or entries
     return sweeps.draft_of(out, name, entries, arguments)

@@ -178,7 +178,8 @@ def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequen
         for value, group in [("all", final)] if parted is None else final.groupby(parted, sort=False):
             rows = group.sort_values(across)
             means, errors = (shown.factor * rows[n] for n in (quantity.header, marked(quantity.header, "SE")))
-            groups["all" if parted is None else f"{parted} = {value}"] = tuple(map(list, (rows[across], means, errors)))
+            name = "all" if parted is None else f"{parted} = {value}"
+            groups[name] = (rows[across].tolist(), means.tolist(), errors.tolist())
         heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"
         values = final[quantity.header] * shown.factor
         alt = f"{quantity.label} against {across}, from {values.min():.3g} to {values.max():.3g}"
