@@ -71,22 +71,6 @@ def test_a_dry_run_shows_ladder_and_hours_and_writes_nothing(base: Path, smartic
     assert sorted(base.parent.iterdir()) == before
 
 
-def test_what_takes_too_long_is_listed_as_left_out(base: Path, smarticles: Smarticles) -> None:
-    said = smarticles("accuracy", base, "--dry-run", "--knobs", "fidelity", "--max-run-hours", "0.003")
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert lines[-2].startswith("left out: fidelity reference: a run is expected to take ")
-    assert lines[-1].startswith("2 settings × 3 seeds = 6 runs")
-
-
-def test_one_seed_is_warned_of(base: Path, smarticles: Smarticles) -> None:
-    said = smarticles("accuracy", base, "--dry-run", "--seeds", "4")
-    assert said.status == 0
-    assert said.err == (
-        "smarticles: warning: one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3\n"
-    )
-
-
 def test_a_ladder_is_an_ordinary_sweep(base: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     out = tmp_path / "ladder"
     written(base, out, smarticles)

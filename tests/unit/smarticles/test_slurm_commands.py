@@ -114,18 +114,6 @@ def test_a_sweep_is_submitted_followed_and_resumed(
     assert (out / "jobs/002/runs.txt").read_text() == "n5\n"
 
 
-def test_an_unknown_state_is_an_error(
-    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str]
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
-    queue.append("NAME|7|0|DREAMING|None")
-    for command in (("status", out), ("resume", out, "--submit", "slurm")):
-        said = smarticles(*command)
-        assert said.status == 1
-        assert "task 7_0 is DREAMING, a state that is not known here" in said.err
-
-
 def test_status_says_when_the_queue_does_not_answer(
     sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -153,19 +141,3 @@ def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: P
     sweep_file.write_text(SWEEP)
     assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "1").status == 2
     assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "2").status == 0
-
-
-def test_status_of_a_thousand_runs(tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    points = [{"name": f"s{k}", "scene_sha256": "x", "expected_s": 1.0, "values": {"seed": k}} for k in range(1000)]
-    (out / "runs").mkdir(parents=True)
-    (out / "sweep.json").write_text(json.dumps({"format": 1, "name": "many", "command": "c", "points": points}))
-    for number, point in enumerate(points):
-        run = out / "runs" / str(point["name"])
-        run.mkdir()
-        (run / "run.json").write_text("{}")
-        (run / ("done.json" if number % 2 else "progress.json")).write_text(
-            json.dumps({"status": "done", "time_s": 1.0, "steps": 1, "wall_s": 1.0, "phases": []})
-        )
-    said = smarticles("status", out)
-    assert said.out.splitlines()[-1] == "many: 1000 runs, 500 stopped, 500 done"

@@ -88,11 +88,6 @@ def test_on_one_engine_nothing_comes_again(write_sweep: WriteSweep) -> None:
         on_engine(load_sweep(write_sweep(grid, scene=ENGINE_SCENE)), "links")
 
 
-def test_points_that_come_again_count(write_sweep: WriteSweep) -> None:
-    with pytest.raises(InputError, match="5 runs, more than 4"):
-        expand(load_sweep(write_sweep(AGAIN, scene=ENGINE_SCENE)), max_points=4)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -301,30 +296,6 @@ def test_a_variable_that_changes_nothing_is_an_error(write_sweep: WriteSweep) ->
     sweep = load_sweep(write_sweep(scene=SCENE.replace("{{ count }}", "10")))
     with pytest.raises(InputError, match=r"n10_seed1 and n20_seed1 are the same scene .*count 10"):
         expand(sweep)
-
-
-def test_an_undefined_variable_in_the_scene_is_an_error(write_sweep: WriteSweep) -> None:
-    sweep = load_sweep(write_sweep(scene=SCENE.replace("{{ count }}", "{{ cuont }}")))
-    with pytest.raises(InputError, match=r"scene.yaml.j2, line 4: 'cuont' is undefined; did you"):
-        expand(sweep)
-
-
-def test_a_scene_with_an_unknown_key_is_an_error(write_sweep: WriteSweep) -> None:
-    sweep = load_sweep(write_sweep(scene=f"{SCENE}gravitty: 3\n"))
-    with pytest.raises(InputError, match=r"rendered for run n10_seed1: .*gravitty"):
-        expand(sweep)
-
-
-def test_a_hostile_value_reaches_the_scene_as_it_is(write_sweep: WriteSweep) -> None:
-    hostile = "x: 1\nseed: 99 # '\"{{ 1 }}"
-    text = sweep_with("{grid: {count: [5]}}", more="repeats: {seeds: [1]}").replace(
-        "points:", f"constants: {{title: {hostile!r}}}\npoints:"
-    )
-    text = text.replace(repr(hostile), '"x: 1\\nseed: 99 # \'\\"{{ 1 }}"')
-    scene = SCENE.replace("name: test", "name: {{ title }}")
-    (point,) = points(text, write_sweep, scene=scene)
-    assert point.scene.name == hostile
-    assert point.scene.seed == 1
 
 
 def test_not_text_is_an_input_error(tmp_path: Path) -> None:

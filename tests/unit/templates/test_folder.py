@@ -31,13 +31,6 @@ def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> 
     assert content["points"][0]["expected_s"] == 10.0
 
 
-def test_runs_start_the_longest_first(make_folder: MakeFolder) -> None:
-    folder = make_folder()
-    assert not folder.manifest.seed_by_seed
-    started = [entry.name for entry in folder.in_order_of_start(folder.entries)]
-    assert started == ["n20_seed1", "n20_seed2", "n10_seed1", "n10_seed2"]
-
-
 def test_runs_start_seed_by_seed_where_the_sweep_says_so(make_folder: MakeFolder) -> None:
     folder = make_folder(SWEEP.replace("{seeds: [1, 2]}", "{seeds: [2, 1], seed_by_seed: true}"))
     assert folder.manifest.seed_by_seed
@@ -110,11 +103,6 @@ def test_foreign_directories_and_files_are_refused(make_folder: MakeFolder, tmp_
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.tex"]
     with pytest.raises(InputError, match=r"thesis.tex: is a file; give a directory"):
         make_folder(out="out/thesis.tex")
-
-
-def test_an_empty_directory_is_used(make_folder: MakeFolder, tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    assert len(make_folder().entries) == 4
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 2}', '{"format": 1, "points": [{}]}'])

@@ -151,15 +151,6 @@ def test_the_same_again_keeps_finished_runs_and_sets_others_aside(folder: Folder
     assert statuses(third) == ["kept"] * 4
 
 
-def test_a_finished_run_of_another_scene_is_set_aside(folder: Folder) -> None:
-    run_folder(folder, Watcher(), command=fake(), **QUICK)
-    manifest = folder.run(folder.entries[0]) / "run.json"
-    manifest.write_text(manifest.read_text().replace(folder.entries[0].scene_sha256, "other"))
-    outcomes = run_folder(folder, Watcher(), command=fake(), **QUICK)
-    assert statuses(outcomes) == ["done", "kept", "kept", "kept"]
-    assert (folder.path / "runs" / "n10_seed1.stopped-1" / "done.json").exists()
-
-
 def test_ctrl_c_stops_all_runs_and_leaves_usable_directories(folder: Folder) -> None:
     waiting = {"n20_seed1": "wait", "n20_seed2": "wait"}
     watcher = Watcher(when=lambda now: sum(said.phi is not None for *_, said in now.running) == 2)
