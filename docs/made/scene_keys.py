@@ -18,7 +18,7 @@ _HEAD = ("key", "type", "unit", "range", "default", "meaning")
 
 
 def scene_keys() -> str:
-    """One table for the scene itself, and one for every mapping and kind of phase and motion in it."""
+    """Return one table for the scene itself, and one for every mapping and kind of phase and motion in it."""
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
     schema = json_schema()
@@ -33,10 +33,10 @@ def _groups(schema: Schema) -> Iterator[tuple[str, list[str]]]:
     """Definitions in the order in which a reader meets them."""
     phases = _kinds(schema["properties"]["phases"]["items"])
     motions = _kinds(next(iter(_options(schema["$defs"]["Actuate"]["properties"]["barbs"]))))
-    told = {*phases, *motions}
+    listed = {*phases, *motions}
     yield "Phases", phases
     yield "Motions of the barbs", motions
-    yield "Mappings", [name for name in schema["$defs"] if name not in told]
+    yield "Mappings", [name for name in schema["$defs"] if name not in listed]
 
 
 def _kinds(choice: Schema) -> list[str]:
@@ -54,7 +54,7 @@ def _part(name: str, definition: Schema) -> str:
 
 
 def anchor(name: str) -> str:
-    """Where the page tells of a definition of the schema."""
+    """Return the anchor of a definition of the schema."""
     return f"scene-{name.lower()}"
 
 
@@ -88,10 +88,10 @@ def _options(entry: Schema) -> Iterator[Schema]:
 
 
 def _type(entry: Schema) -> str:
-    told = [_one_type(option) for option in _options(entry)]
+    listed = [_one_type(option) for option in _options(entry)]
     if any(option.get("type") == "null" for option in entry.get("anyOf", ())):
-        told.append("null")
-    return " or ".join(told)
+        listed.append("null")
+    return " or ".join(listed)
 
 
 def _one_type(entry: Schema) -> str:
