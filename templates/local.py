@@ -60,14 +60,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Snapshot:
-    """All runs at one moment.
-
-    Attributes:
-        total: how many runs there are, kept ones included.
-        ended: how many of them ended, also by failure.
-        running: name, wall time so far [s] and progress of those being computed.
-        left_s: expected wall time left [s].
-    """
+    """All runs at one moment; `running` has name, wall time so far [s] and progress of those being computed."""
 
     total: int
     ended: int
@@ -99,12 +92,7 @@ def duration(seconds: float) -> str:
 
 
 class Display:
-    """One line per run and a bar, redrawn in place, at a terminal; lines now and then elsewhere.
-
-    Args:
-        console: where to.
-        interval_s: least time between two lines about the running ones [s].
-    """
+    """One line per run and a bar, redrawn in place, at a terminal; elsewhere a line at intervals [s]."""
 
     def __init__(self, console: Console, interval_s: float = 30.0) -> None:
         self._console = console

@@ -93,33 +93,31 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
+    nodes = math.ceil(ranks / partition.cores)
+    runs = _runs_per_task(len(expected_s), partition, 1 if ranks > 1 else wishes.runs_per_task, memory)
+    tasks = math.ceil(len(expected_s) / runs)
+    given = f"--runs-per-task {runs}"
+    msg = ""
     if ranks > 1 and wishes.runs_per_task not in (None, 1):
         msg = f"--runs-per-task {wishes.runs_per_task}: a run on {ranks} ranks is alone in its task; leave it out"
-        raise InputError(msg)
-    nodes = math.ceil(ranks / partition.cores)
-    if nodes > 1 and cluster.container is not None:
+    elif nodes > 1 and cluster.container is not None:
         msg = (
             f"--ranks {ranks}: {where} has {partition.cores} cores per node, and from an image mpirun reaches no other "
             f"node; give at most {partition.cores}, or a cluster without a container"
         )
-        raise InputError(msg)
-    wanted = 1 if ranks > 1 else wishes.runs_per_task
-    runs = _runs_per_task(len(expected_s), cluster, partition, wanted, memory)
-    if runs > partition.cores:
-        msg = f"--runs-per-task {runs}: {where} has {partition.cores} cores per node; give at most that many"
-        raise InputError(msg)
-    if runs * memory > partition.memory_mib:
+    elif runs > partition.cores:
+        msg = f"{given}: {where} has {partition.cores} cores per node; give at most that many"
+    elif runs * memory > partition.memory_mib:
         msg = (
-            f"--runs-per-task {runs}: {runs} × {memory} MiB are more than the {partition.memory_mib} MiB of a node in "
-            f"{where}; give fewer runs, or less with --memory"
+            f"{given}: {runs} × {memory} MiB are more than the {partition.memory_mib} MiB of a node in {where}; "
+            "give fewer runs, or less with --memory"
         )
-        raise InputError(msg)
-    tasks = math.ceil(len(expected_s) / runs)
-    if tasks > cluster.max_array_size:
+    elif tasks > cluster.max_array_size:
         msg = (
             f"{len(expected_s)} runs, {runs} per task, make an array of {tasks} tasks; {cluster.name} allows "
             f"{cluster.max_array_size}: give a larger --runs-per-task (up to {partition.cores}), or a smaller sweep"
         )
+    if msg:
         raise InputError(msg)
     # Costs are those of one core; the gain by ranks is unknown, and left out.
     longest = TIME_MARGIN * max(expected_s)
@@ -139,7 +137,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
     )
 
 
-def _runs_per_task(count: int, cluster: Cluster, partition: Partition, wanted: int | None, memory: int) -> int:
+def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
     """Return what is wanted, but no more than there are runs; by default a full node, with tasks of equal size."""
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)

@@ -1,22 +1,6 @@
-"""The sweep file: how one template makes many scenes.
+"""The sweep file: how one template makes many scenes; `smarticles sweep --help` shows one with all its keys.
 
-schema_version: 1
-name: friction                      # what the sweep is called
-template: scene.yaml.j2             # Jinja2 template of a scene, beside this file
-run_name: "mu{{ '%.1f' | format(friction) }}_seed{{ seed }}"
-constants: {count: 100}             # the same in every point
-points:                             # any of these; several are crossed with each other
-  table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file, all or some
-  list: [{friction: 0.4, count: 100}]                       # points written out
-  zip: {friction: [0.2, 0.4], count: [90, 100]}             # first with first, second with second
-  grid: {friction: [0.2, 0.4], count: [90, 100]}            # every combination
-derived: {half: "(count / 2) | round | int"}                # expressions, in order
-repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
-                                    # `seed_by_seed: true` beside it: all points with the first seed come first
-                                    # `more: {seeds: [4], only: {friction: [0.2]}}`: more of some points, afterwards
-again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
-variants:                           # JSON merge patches (RFC 7386) of this file; null removes a key
-  quick: {constants: {count: 20}, repeats: {seeds: [1]}}    # FILE@quick; FILE@code,quick applies two, in this order
+Variants are JSON merge patches (RFC 7386) of the file: FILE@quick applies one, FILE@code,quick two in this order.
 """
 
 from __future__ import annotations
@@ -82,22 +66,21 @@ class Points(Strict):
 
     @model_validator(mode="after")
     def _check(self) -> Points:
-        if self.table is None and self.list_ is None and self.zip_ is None and self.grid is None:
+        rows, zip_, grid = self.list_ or [], self.zip_ or {}, self.grid or {}
+        if not (self.table or rows or zip_ or grid):
             msg = "no points: give at least one of table, list, zip, grid"
             raise ValueError(msg)
-        for row in self.list_ or []:
-            if set(row) != set((self.list_ or [row])[0]):
+        for row in rows:
+            if set(_names(row)) != set(rows[0]):
                 msg = f"list: every point needs the same variables: got {row!r}"
                 raise ValueError(msg)
-        for columns in (self.zip_, self.grid, *(self.list_ or [])):
-            _names(columns or {})
-        for source, columns in (("zip", self.zip_), ("grid", self.grid)):
-            for name, values in (columns or {}).items():
+        for source, columns in (("zip", zip_), ("grid", grid)):
+            for name, values in _names(columns).items():
                 _finite(values)
                 if not values:
                     msg = f"{source}: {name} has no values"
                     raise ValueError(msg)
-        lengths = {name: len(values) for name, values in (self.zip_ or {}).items()}
+        lengths = {name: len(values) for name, values in zip_.items()}
         if len(set(lengths.values())) > 1:
             msg = f"zip: lists of unequal length: got {lengths}"
             raise ValueError(msg)
@@ -115,7 +98,7 @@ Seeds = Annotated[tuple[int, ...], AfterValidator(_once_each)]
 
 
 class MoreSeeds(Strict):
-    """Further seeds of some points, where an answer asks for them; after those that all points have."""
+    """Further seeds of some points, after those that all points have."""
 
     seeds: Seeds = Field(min_length=1, description="seeds beside those of all points, one run each")
     only: dict[str, list[Value]] = Field(
@@ -195,18 +178,7 @@ class SweepFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep file and everything it refers to.
-
-    Args:
-        path: the sweep file.
-        text: its text.
-        content: what it says.
-        template: path of the scene template.
-        template_text: its text.
-        table: rows of the table that are kept; empty without a table.
-        table_path: the table's file, or None.
-        table_text: the table's text, or None.
-    """
+    """A sweep file with its text, its scene template, and its table, of which `table` has the rows that are kept."""
 
     path: Path
     text: str
@@ -215,10 +187,6 @@ class Sweep:
     template_text: str
     table: tuple[Mapping[str, Value], ...] = ()
     table_text: str | None = None
-
-
-VARIANT = "@"
-"""Stands between a sweep file and the names of its variants, which commas separate: `strength.yaml@code,quick`."""
 
 
 def load_sweep(path: Path) -> Sweep:
@@ -230,7 +198,7 @@ def load_sweep(path: Path) -> Sweep:
     Raises:
         InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
     """
-    name, _, variants = path.name.partition(VARIANT)
+    name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
     if variants and isinstance(data, dict):
