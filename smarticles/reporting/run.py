@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
 from dem.plan.measured import QUANTITIES, Error, read_table
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
@@ -78,7 +79,7 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
         ("Final state", picture_blocks(directory)),
         ("Against time", _curves(run)),
         ("Scene", scene_blocks(directory, scene, why_not)),
-        ("Effects", _effects(scene)),
+        ("Effects", effect_blocks([] if scene is None else [scene])),
         ("Settings and their accuracy", accuracy_blocks(scene, accuracy)),
         ("Warnings", warning_blocks({"": directory})),
         ("How to repeat it", _repeat(run)),
@@ -214,12 +215,16 @@ def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Mar
     return blocks
 
 
-def _effects(scene: Scene | None) -> list[Markup]:
-    if scene is None:
-        return []
-    rows = [[e.name, "on" if e.on else "off", e.why, e.adds.to_text()] for e in plan(scene).effects]
-    caption = "What acts in this scene and why; an effect that is off costs nothing"
-    return [table(caption, ["effect", "", "why", "what it adds"], rows)]
+def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
+    """Return the effects that scenes call for: in how many each is on, and why in the first where it is."""
+    rows = []
+    for same in zip(*map(decide, scenes), strict=True):
+        on = [effect for effect in same if effect.on]
+        effect = (on or same)[0]
+        state = f"{len(on)} of {len(same)}" if len(same) > 1 else "on" if on else "off"
+        rows.append([effect.name, state, effect.why, effect.adds.to_text()])
+    caption = "What acts and why; an effect that is off costs nothing"
+    return [table(caption, ["effect", "on in scenes", "why", "what it adds"], rows)] if rows else []
 
 
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:

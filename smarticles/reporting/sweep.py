@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from dem.errors import InputError
-from dem.plan.effects import decide
 from dem.record.run import Run
 from dem.scene.reading import load_scene
 from postprocess.measures.registry import shown_quantities
@@ -23,6 +22,7 @@ from smarticles.reporting.charts import against_variable
 from smarticles.reporting.page import Section, embedded, figure, listing, page, table, word, words
 from smarticles.reporting.run import (
     accuracy_blocks,
+    effect_blocks,
     frame_table,
     picture_blocks,
     provenance_table,
@@ -87,7 +87,7 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
                 *(listing(name, text, folded=True) for name, text in folder.manifest.files.items()),
             ],
         ),
-        ("Effects", _effects(scenes)),
+        ("Effects", effect_blocks(list(scenes.values()))),
         ("Settings and their accuracy", accuracy_blocks(scene, accuracy)),
         ("Warnings", warning_blocks({entry.name: folder.run(entry) for entry in folder.entries})),
         ("How to repeat it", _repeat(folder) + (_origin(results) if analysed else [])),
@@ -199,18 +199,6 @@ def _pictures(folder: Folder) -> list[Markup]:
         for entry in chosen
         for block in picture_blocks(folder.run(entry), name=entry.name, turn=entry is chosen[-1])
     ]
-
-
-def _effects(scenes: Mapping[str, Scene]) -> list[Markup]:
-    """In how many scenes each effect is on, and why in the first where it is."""
-    decided = [decide(scene) for scene in scenes.values()]
-    rows = []
-    for same in zip(*decided, strict=True):
-        on = [effect for effect in same if effect.on]
-        effect = (on or same)[0]
-        rows.append([effect.name, f"{len(on)} of {len(decided)}", effect.why, effect.adds.to_text()])
-    caption = "What acts, in how many of the scenes, and why; an effect that is off costs nothing"
-    return [table(caption, ["effect", "on in", "why", "what it adds"], rows)] if rows else []
 
 
 def _repeat(folder: Folder) -> list[Markup]:

@@ -179,7 +179,7 @@ def test_a_refused_job_is_reported_and_nothing_is_lost(
     command += ["--submit", "slurm", "--cluster", str(tmp_path / "here.toml")]
     done = subprocess.run(command, env=slurm.environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "sbatch refused it: " in done.stderr
+    assert "sbatch rejects it: " in done.stderr
     assert "invalid partition specified: absent" in done.stderr
     assert json.loads((tmp_path / "out/jobs/001/job.json").read_text()).get("job_id") is None
     (tmp_path / "here.toml").write_text(CLUSTER)
