@@ -47,12 +47,6 @@ def test_importing_it_loads_nothing() -> None:
     assert not loaded & set(HEAVY)
 
 
-def test_a_scene_needs_neither_engine_nor_measures() -> None:
-    loaded = loaded_by("from smarticles import Scene, load_scene")
-    assert "dem" in loaded
-    assert not loaded & {"pandas", "postprocess", "pyvista", "vtkmodules", "yade"}
-
-
 def test_every_name_is_there_and_the_stub_tells_the_same() -> None:
     stub = ast.parse(Path(smarticles.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
     told = {
@@ -81,11 +75,6 @@ def test_a_run_directory_is_read_part_by_part(write_run: WriteRun, tmp_path: Pat
     assert found.frames is found.frames
 
 
-def test_what_is_no_run_directory_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no-run"):
-        smarticles.read(tmp_path / "no-run")
-
-
 def test_a_scene_that_is_not_valid_is_refused_with_the_way_out(tmp_path: Path) -> None:
     (tmp_path / "scene.yaml").write_text("schema_version: 1\nseed: 1\ncount: -5\nphases: [{type: deposit}]\n")
     with pytest.raises(InputError, match=r"scene.yaml: count: -5 is out of range; use "):
@@ -99,14 +88,6 @@ def test_a_directory_that_holds_something_else_is_left_alone(tmp_path: Path) -> 
     with pytest.raises((InputError, RunError), match=r"yade|--out "):
         smarticles.run(scene, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
-def test_a_series_is_a_table_with_a_column_per_component(write_run: WriteRun, tmp_path: Path) -> None:
-    found = smarticles.read(write_run(tmp_path / "run", phases=("deposit", "relax", "shape-change", "relax")))
-    table = found.series.table()
-    assert list(table.columns[:2]) == ["time_s", "phase"]
-    assert {"angle_rad barb 1", "angle_rad barb 2"} <= {*table.columns}
-    assert table["com_height_m"].tolist() == found.series["com_height_m"].tolist()
 
 
 def test_a_table_of_a_run_has_a_row_per_phase_or_frame(write_run: WriteRun, tmp_path: Path) -> None:

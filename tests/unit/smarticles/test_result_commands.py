@@ -10,8 +10,6 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from PIL import Image
 
-from smarticles.command_line import Cell, columns
-
 
 def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
@@ -251,15 +249,3 @@ def test_render_says_what_has_no_meaning(
     said = smarticles("render", tmp_path, *words)
     assert said.status == 2
     assert message in said.err
-
-
-def test_columns() -> None:
-    text = columns(["name", "value", "note"], [["a", 1.23456, "x y"], ["long", None, ""], ["b", float("nan"), ""]])
-    assert text.splitlines() == [
-        "name  value  note",
-        "a     1.235  x y",
-        "long      -",
-        "b         -",
-    ]
-    assert columns(["a", "b"], []) == "a  b"
-    assert columns(["φ"], [[Cell("0.10")], [Cell("-")]]).splitlines() == ["   φ", "0.10", "   -"]

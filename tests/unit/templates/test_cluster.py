@@ -52,17 +52,12 @@ def test_shipped_clusters_are_valid(name: str) -> None:
         ("max_array_size", "max_aray_size", "^[^ ]*: unknown key 'max_aray_size'; did you mean 'max_array_size'?"),
         ("max_time", "maxtime", "partitions.long: unknown key 'maxtime'; did you mean 'max_time'?"),
         ('name = "mine"', "", "name: missing"),
-        ("= 100", "= 0", "max_array_size: 0 is out of range; use at least 1"),
         ('"1-00:00:00"', '"a day"', "'a day' is not a time; write D-HH:MM:SS"),
         ('= "long"', '= "logn"', "default_partition: there is no 'logn'; did you mean 'long'?"),
         ('name = "mine"', 'name = "my cluster"', "name: 'my cluster' would need quoting in a job script; use letters"),
         ('name = "mine"', 'name = "m"\nmodules = ["a; rm -rf /"]', "modules.0: .*rm -rf"),
         ('name = "mine"', 'name = "m"\noptions = ["--x\\n#SBATCH --y"]', "options.0: "),
-        ('"slurm"', "5", "scheduler: 5 is not known; use 'slurm'"),
-        ('"slurm"', '"slurn"', "scheduler: 'slurn' is not known; did you mean 'slurm'"),
         ("= 16", '= "16"', "partitions.long.cores_per_node: '16' is no whole number from 1"),
-        ("= 16", "= 0", 'cores_per_node: 0 is no whole number from 1; give one, or "here"'),
-        ("= 100", '= "100"', "max_array_size: got the text '100', expected a number; leave out the quotes"),
         ("schema_version = 1", "schema_version = ", "not valid TOML: .*line 1"),
         ('"slurm"', '"pbs"', "scheduler: 'pbs' is not known; use 'slurm'"),
     ],
@@ -158,9 +153,3 @@ def test_an_array_of_exactly_the_limit_is_given_and_one_more_is_not(cluster: Clu
     assert planned(cluster, 100, runs_per_task=1).tasks == 100
     with pytest.raises(InputError, match=r"101 runs, 1 per task, make an array of 101 tasks; mine allows 100"):
         planned(cluster, 101, runs_per_task=1)
-
-
-def test_a_cluster_may_be_this_machine() -> None:
-    _, partition = load_cluster("local-slurm").partition(None)
-    assert partition.cores >= 1
-    assert partition.memory_mib > 100
