@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError, RunError
@@ -22,36 +23,20 @@ if TYPE_CHECKING:
     from templates.sweep.sweep_file import Sweep
 
 
-def make_folder(
-    file: Path,
-    out: Path,
-    command: str,
-    constants: Mapping[str, str] | None = None,
-    *,
-    engine: str | None = None,
-    max_points: int | None = None,
-) -> Folder:
+def make_folder(file: Path, out: Path, command: str) -> Folder:
     """Expand a sweep file into its directory, or take up the directory that holds it already.
-
-    Args:
-        file: sweep file.
-        out: directory of the sweep.
-        command: the command line, for the manifest.
-        constants: values that replace those of the file.
-        engine: of all runs; None: as the file says.
-        max_points: how many runs it may have; None: the usual limit.
 
     Raises:
         InputError: the sweep is not valid, or the directory holds something else.
     """
-    from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
 
-    sweep = changed_sweep(file, constants or {}, engine=engine)
-    return folder_of(sweep, expand(sweep, max_points=max_points or MAX_POINTS), out, command)
+    sweep = changed_sweep(file)
+    return folder_of(sweep, expand(sweep), out, command)
 
 
-def changed_sweep(file: Path, constants: Mapping[str, str], *, engine: str | None = None) -> Sweep:
-    """Read a sweep file and apply the changes of a command, see `make_folder`."""
+def changed_sweep(file: Path, constants: Mapping[str, str] = MappingProxyType({}), engine: str | None = None) -> Sweep:
+    """Read a sweep file; replace some of its constants, and the engine of all its runs."""
     from templates.sweep.sweep_file import load_sweep, on_engine, with_constants  # noqa: PLC0415
 
     sweep = with_constants(load_sweep(file), constants)
@@ -81,12 +66,7 @@ def expected_wall_s(scene: Scene) -> float:
 
 
 def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
-    """Run what a sweep is missing; `raise_failures` raises for runs that failed.
-
-    Args:
-        folder: the sweep's directory.
-        jobs: runs at once; None: one per core.
-        command: what to give again after Ctrl-C.
+    """Run what a sweep is missing, `jobs` runs at once; `command` goes on after Ctrl-C.
 
     Raises:
         InputError: runs of the sweep are in a queue.
@@ -184,20 +164,13 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render a submission; write nothing.
-
-    Args:
-        path: the sweep's directory.
-        name: the sweep's name.
-        entries: the runs.
-        arguments: of the command.
+    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`.
 
     Raises:
         InputError: unknown cluster, or a request beyond its limits.
     """
-    from templates.slurm.job import Wishes, plan_request, smarticles_words  # noqa: PLC0415
-
-    from templates.slurm.cluster import load_cluster, shipped_clusters  # noqa: PLC0415
+    from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
+    from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415
 
     reference = arguments.cluster
@@ -207,7 +180,6 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
             msg = f"--cluster: is missing; known: {', '.join(shipped_clusters())}; or a file of your own, FILE.toml"
             raise InputError(msg)
         reference = before[-1].cluster
-    cluster = load_cluster(reference)
     wishes = Wishes(
         partition=arguments.partition,
         account=arguments.account,
@@ -216,15 +188,7 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
         memory_mib=arguments.memory,
         ranks=arguments.ranks,
     )
-    return draft(
-        path,
-        name,
-        entries,
-        cluster=cluster,
-        reference=str(Path(reference).resolve()) if reference.endswith(".toml") else reference,
-        request=plan_request([entry.expected_s for entry in entries], cluster, wishes),
-        command=("smarticles",) if cluster.container else smarticles_words(),
-    )
+    return draft(path, name, entries, reference, wishes)
 
 
 def enqueue(folder: Folder, arguments: argparse.Namespace) -> int:

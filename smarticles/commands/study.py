@@ -72,7 +72,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     file = registry.study_file(arguments.name, quick=arguments.quick)
     constants = {} if arguments.fidelity is None else _fidelity(arguments.name, file, arguments.fidelity)
     try:
-        sweep = changed_sweep(file, constants, engine=arguments.engine)
+        sweep = changed_sweep(file, constants, arguments.engine)
         points = expand(sweep)
     except InputError as error:
         if arguments.engine is None:

@@ -74,7 +74,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     """Expand a sweep; list, write, run or submit its runs."""
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
 
-    sweep = sweeps.changed_sweep(arguments.sweep, {}, engine=arguments.engine)
+    sweep = sweeps.changed_sweep(arguments.sweep, engine=arguments.engine)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
     queue = sweeps.wants_queue(arguments)
     # Rendered before anything is written, so that a request which is rejected leaves nothing behind.

@@ -23,8 +23,17 @@ from pydantic import Field
 from dem.errors import InputError, RunError
 from dem.record.document import Document
 from dem.record.files import write_text
-from templates.slurm.cluster import Cluster
-from templates.slurm.job import RUN_LIST, SCRIPT, Request, job_name, render_script
+from templates.slurm.cluster import load_cluster
+from templates.slurm.job import (
+    RUN_LIST,
+    SCRIPT,
+    Request,
+    Wishes,
+    job_name,
+    plan_request,
+    render_script,
+    smarticles_words,
+)
 from templates.sweep.folder import Entry, Folder, RunStatus
 
 JOBS, JOB = "jobs", "job.json"
@@ -89,15 +98,7 @@ def submissions(folder: Path) -> list[Submission]:
 
 
 def draft(
-    path: Path,
-    name: str,
-    entries: Sequence[Entry],
-    *,
-    cluster: Cluster,
-    reference: str,
-    request: Request,
-    command: Sequence[str],
-    token: str | None = None,
+    path: Path, name: str, entries: Sequence[Entry], reference: str, wishes: Wishes, *, token: str | None = None
 ) -> Draft:
     """Render a submission; write nothing.
 
@@ -105,22 +106,22 @@ def draft(
         path: the sweep's directory; it may be absent.
         name: the sweep's name.
         entries: runs to compute.
-        cluster: where to compute them.
-        reference: the value of --cluster.
-        request: what is asked for.
-        command: the words of the command `smarticles`.
+        reference: a shipped cluster's name, or a file that ends in .toml.
+        wishes: options of the user.
         token: makes the job's name unique; by default a random one.
 
     Raises:
-        InputError: the script cannot be rendered.
+        InputError: unknown cluster, a request beyond its limits, or the script cannot be rendered.
     """
+    cluster = load_cluster(reference)
+    request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
     # Runs that take about as long share a task: then no core waits for a longer neighbour.
     ordered = tuple(sorted(entries, key=lambda entry: -entry.expected_s))
     taken = [int(folder.name) for folder in path.glob(f"{JOBS}/*") if folder.name.isdecimal()]
     submission = Submission(
         number=f"{max(taken, default=0) + 1:03d}",
         job_name=job_name(name, token or uuid.uuid4().hex[:8]),
-        cluster=reference,
+        cluster=str(Path(reference).resolve()) if reference.endswith(".toml") else reference,
         runs_per_task=request.runs_per_task,
         runs=tuple(entry.name for entry in ordered),
     )
@@ -131,7 +132,7 @@ def draft(
         number=submission.number,
         name=submission.job_name,
         count=len(ordered),
-        command=command,
+        command=("smarticles",) if cluster.container else smarticles_words(),
     )
     return Draft(submission=submission, request=request, script=script, entries=ordered)
 

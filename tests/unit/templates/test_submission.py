@@ -13,8 +13,7 @@ from synthetic import write_ended
 
 from dem.errors import InputError, RunError
 from templates.slurm import submission
-from templates.slurm.cluster import load_cluster
-from templates.slurm.job import Wishes, plan_request
+from templates.slurm.job import Wishes
 from templates.slurm.submission import (
     QueueError,
     Task,
@@ -67,18 +66,8 @@ def folder(make_folder: MakeFolder) -> Folder:
 
 
 def submitted(folder: Folder, number: int | None = 12, runs_per_task: int = 2) -> submission.Draft:
-    cluster = load_cluster("example-large")
-    request = plan_request([entry.expected_s for entry in folder.entries], cluster, Wishes(runs_per_task=runs_per_task))
-    made = draft(
-        folder.path,
-        folder.name,
-        folder.entries,
-        cluster=cluster,
-        reference="example-large",
-        request=request,
-        command=("smarticles",),
-        token="tt",
-    )
+    wishes = Wishes(runs_per_task=runs_per_task)
+    made = draft(folder.path, folder.name, folder.entries, "example-large", wishes, token="tt")
     write(folder, made)
     if number is not None:
         file = folder.path / "jobs" / made.submission.number / "job.json"
