@@ -107,10 +107,10 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
     answer = json.loads(smarticles("plan", base, "--max-hours", "1000", "--table", table, "--json").out)
     assert answer["choice"]["fidelity"] == "reference"
     assert answer["spheres_per_smarticle"] > 100
-    refused = smarticles("plan", base, "--max-error", "0.001", "--max-hours", "0.01", "--table", table)
-    assert refused.status == 2
-    assert "contradict each other: reference on yade, the cheapest within the error" in refused.err
-    assert "the hours give way" in refused.err
+    rejected = smarticles("plan", base, "--max-error", "0.001", "--max-hours", "0.01", "--table", table)
+    assert rejected.status == 2
+    assert "contradict each other: reference on yade, the cheapest within the error" in rejected.err
+    assert "the hours give way" in rejected.err
 
 
 def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(

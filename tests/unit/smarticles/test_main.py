@@ -1,4 +1,4 @@
-"""The command line: help, refusals, and what becomes of errors."""
+"""The command line: help, rejections, and what becomes of errors."""
 
 from __future__ import annotations
 

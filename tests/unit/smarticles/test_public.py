@@ -52,7 +52,7 @@ def test_every_name_is_there() -> None:
     assert smarticles.measures.packing_fraction.__module__ == "postprocess.measures.packing"
 
 
-def test_an_unknown_name_is_refused_and_the_known_ones_are_named() -> None:
+def test_an_unknown_name_is_rejected_and_the_known_ones_are_named() -> None:
     with pytest.raises(
         AttributeError, match=r"'nothing'; known: .*load_scene, measure, measures, read, read_sweep, run, sweep"
     ):
@@ -67,7 +67,7 @@ def test_a_run_directory_is_read_part_by_part(write_run: WriteRun, tmp_path: Pat
     assert found.frames is found.frames
 
 
-def test_a_scene_that_is_not_valid_is_refused_with_the_way_out(tmp_path: Path) -> None:
+def test_a_scene_that_is_not_valid_is_rejected_with_the_way_out(tmp_path: Path) -> None:
     (tmp_path / "scene.yaml").write_text("schema_version: 1\nseed: 1\ncount: -5\nphases: [{type: deposit}]\n")
     with pytest.raises(InputError, match=r"scene.yaml: count: -5 is out of range; use "):
         smarticles.run(tmp_path / "scene.yaml", tmp_path / "out")
@@ -130,7 +130,7 @@ def test_groups_have_means_and_standard_errors_over_runs(swept: smarticles.Sweep
     assert shaken["runs [-]"].tolist() == [2, 2]
 
 
-def test_an_unknown_group_is_refused_and_the_nearest_named(swept: smarticles.SweepDirectory) -> None:
+def test_an_unknown_group_is_rejected_and_the_nearest_named(swept: smarticles.SweepDirectory) -> None:
     with pytest.raises(InputError, match="'aspect_ration' is no column of these runs; did you mean 'aspect_ratio'"):
         swept.table(by="aspect_ration")
 
@@ -145,7 +145,7 @@ def test_what_follows_from_a_scene_follows_anew_where_it_varies(tmp_path: Path) 
     assert fidelities("yade")["draft"] != fidelities("links")["draft"]
 
 
-def test_a_scene_that_a_template_would_run_is_refused(tmp_path: Path) -> None:
+def test_a_scene_that_a_template_would_run_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds '\{\{', which a template would take for its own"):
         write_sweep(scene_of(name="{{ 7 * 7 }}"), {"count": [1, 2]}, tmp_path)
 

@@ -66,7 +66,7 @@ def run(tmp_path: Path, write_run: WriteRun) -> Path:
     return directory
 
 
-def test_the_page_of_a_run_tells_everything(run: Path, smarticles: Smarticles) -> None:
+def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> None:
     (run / "log.txt").write_text("2026-11-22 07:00:00,000 WARNING two hooks\n" * 3 + "2026-11-22 07:00:00 INFO fine\n")
     said = smarticles("report", run)
     assert (said.status, said.err) == (0, "")
@@ -120,7 +120,7 @@ def test_a_name_is_no_html(run: Path, smarticles: Smarticles) -> None:
     assert not [a for a in page.of("img") if not (a["src"] or "").startswith("data:")]
 
 
-def test_a_scene_of_another_version_is_told_and_no_reason_to_fail(
+def test_a_scene_of_another_version_is_reported_and_no_reason_to_fail(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "old")
@@ -128,7 +128,7 @@ def test_a_scene_of_another_version_is_told_and_no_reason_to_fail(
     assert "This version cannot read the scene of this run" in Read(run / "report.html").text
 
 
-def test_what_exists_is_kept_and_what_is_no_run_refused(run: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+def test_what_exists_is_kept_and_what_is_no_run_rejected(run: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     (run / "report.html").write_text("mine")
     said = smarticles("report", run)
     assert (said.status, "exists already" in said.err) == (2, True)
@@ -193,7 +193,7 @@ def test_the_page_of_a_study_has_its_verdicts(tmp_path: Path, write_run: WriteRu
     assert Read(tmp_path / "results.html").row("φ_f is above φ_0 at every l/w")
 
 
-def test_results_that_are_damaged_are_refused(tmp_path: Path, smarticles: Smarticles) -> None:
+def test_results_that_are_damaged_are_rejected(tmp_path: Path, smarticles: Smarticles) -> None:
     (tmp_path / "provenance.json").write_text("{")
     said = smarticles("report", tmp_path)
     assert (said.status, "analyse the study again" in said.err) == (2, True)

@@ -38,7 +38,7 @@ def test_measure_names_each_definition_within_100_columns(
         assert ("SE: their standard error" in told) == (not words)
 
 
-def test_measure_does_not_overwrite_unless_told(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_does_not_overwrite_unless_asked(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run, table = write_run(tmp_path / "a"), tmp_path / "table.csv"
     table.write_text("precious")
     said = smarticles("measure", run, "--table", table)
@@ -74,10 +74,10 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     said = smarticles("measure", run, "--frames", "--json")
     assert said.status == 0
 
-    def refuse(word: str) -> None:
+    def reject(word: str) -> None:
         raise AssertionError(word)
 
-    rows = json.loads(said.out, parse_constant=refuse)
+    rows = json.loads(said.out, parse_constant=reject)
     assert [row["frame"] for row in rows] == list(range(16))
     assert rows[0]["phi voxel [-]"] is None
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
@@ -118,7 +118,7 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     assert "standard error over runs" in said.out
 
 
-def test_measure_refuses_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_rejects_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     said = smarticles("measure", run, "--by", "seeed")
     assert (said.status, said.err) == (
@@ -144,7 +144,7 @@ def test_a_frame_that_is_cut_off_has_a_way_out_that_works(
     assert len(rows) == 15
 
 
-def test_measure_tells_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_warns_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     assert smarticles("measure", run).err == ""
     (run / "series.h5").unlink()

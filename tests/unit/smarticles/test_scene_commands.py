@@ -81,7 +81,7 @@ def test_files_and_folders_that_are_no_scene(
 
 
 @pytest.mark.parametrize(("threads", "told"), [("2", False), ("3", True), ("64", True)])
-def test_more_threads_than_cores_are_told(
+def test_more_threads_than_cores_are_warned_of(
     threads: str, told: bool, scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
@@ -94,7 +94,7 @@ def test_more_threads_than_cores_are_told(
 
 
 @pytest.mark.parametrize(("options", "threads"), [([], "3"), (["--threads", "1"], "1")])
-def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
+def test_a_resumed_run_has_the_threads_that_it_began_with_unless_asked(
     scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch, options: list[str], threads: str
 ) -> None:
     out = scene_file.parent / "out"

@@ -1,4 +1,4 @@
-"""sweep, status and resume with a queue: refusals before anything is written, dry runs, states."""
+"""sweep, status and resume with a queue: rejections before anything is written, dry runs, states."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_dry_run_shows_list_and_script_and_writes_nothing(sweep_file: Path, sm
         ([*LARGE, "--memory", "900000"], "1 × 900000 MiB are more than the 250000 MiB"),
     ],
 )
-def test_what_a_cluster_cannot_give_is_refused_before_anything_is_written(
+def test_what_a_cluster_cannot_give_is_rejected_before_anything_is_written(
     words: list[str], message: str, sweep_file: Path, smarticles: Smarticles, queue: list[str]
 ) -> None:
     out = sweep_file.parent / "out"
@@ -132,7 +132,7 @@ def test_status_says_when_the_queue_does_not_answer(
     assert "the queue cannot be asked" in said.err
 
 
-def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+def test_too_many_points_are_rejected_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     sweep_file.write_text(SWEEP.replace("[5, 6]", str(list(range(1, 200))).replace(" ", "")))
     sweep_file.write_text(sweep_file.read_text().replace("}}", "}}", 1) + f"repeats: {{seeds: {list(range(100))}}}\n")
     said = smarticles("sweep", sweep_file, "--out", tmp_path / "out")

@@ -46,7 +46,7 @@ def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, 
     assert not (out / "runs").exists()
 
 
-def test_status_of_one_run_tells_whether_a_process_works_in_it(
+def test_status_of_one_run_shows_whether_a_process_works_in_it(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "a", status="unfinished")
@@ -120,7 +120,7 @@ def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: P
 
 
 def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    """The real command of a run, given a scene that it refuses before YADE is needed."""
+    """The real command of a run, given a scene that it rejects before YADE is needed."""
     out = tmp_path / "out"
     smarticles("sweep", sweep_file, "--out", out)
     finish(out)
@@ -140,7 +140,7 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
 
 
-def test_another_study_in_the_same_directory_is_refused(
+def test_another_study_in_the_same_directory_is_rejected(
     sweep_file: Path, tmp_path: Path, smarticles: Smarticles
 ) -> None:
     out = tmp_path / "out"
@@ -232,7 +232,7 @@ def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, s
         (["--fidelity", "fine"], "--fidelity fine: is not known; known: draft, standard, reference"),
     ],
 )
-def test_what_a_study_does_not_have_is_refused(
+def test_what_a_study_does_not_have_is_rejected(
     words: list[str], message: str, tmp_path: Path, smarticles: Smarticles
 ) -> None:
     said = smarticles("study", "sensitivity", *words, "--out", tmp_path / "out")
@@ -251,7 +251,7 @@ def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path
     assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
 
 
-def test_a_study_of_both_engines_refuses_one(tmp_path: Path, smarticles: Smarticles) -> None:
+def test_a_study_of_both_engines_rejects_one(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("study", "engines", "--engine", "links", "--out", tmp_path / "out")
     assert said.status == 2
     assert said.err.startswith("smarticles: error: --engine links: study engines cannot be run on it (")
@@ -259,7 +259,7 @@ def test_a_study_of_both_engines_refuses_one(tmp_path: Path, smarticles: Smartic
     assert not (tmp_path / "out").exists()
 
 
-def test_a_fidelity_at_which_a_study_cannot_be_run_is_refused_by_its_option(
+def test_a_fidelity_at_which_a_study_cannot_be_run_is_rejected_by_its_option(
     tmp_path: Path, smarticles: Smarticles
 ) -> None:
     said = smarticles("study", "chain", "--quick", "--fidelity", "reference", "--out", tmp_path / "out")
@@ -269,7 +269,7 @@ def test_a_fidelity_at_which_a_study_cannot_be_run_is_refused_by_its_option(
     assert len(said.err.splitlines()) == 1
 
 
-def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
+def test_a_study_whose_template_ignores_the_fidelity_rejects_it(
     sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def file_of(name: str, *, quick: bool = False) -> Path:

@@ -89,7 +89,7 @@ def test_times_are_read_as_slurm_reads_them(text: str, seconds: int) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "1h", "-5", "1:2:3:4", "0", "00:00", "1-", "1-2:3:4:5", "1.5", "١"])
-def test_other_times_are_refused(text: str) -> None:
+def test_other_times_are_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="time"):
         parse_time(text)
 
@@ -131,7 +131,7 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
         ({"partition": "lng"}, "--partition lng: cluster mine has no such partition; did you mean 'long'?"),
     ],
 )
-def test_requests_beyond_the_limits_are_refused(cluster: Cluster, wishes: dict[str, object], message: str) -> None:
+def test_requests_beyond_the_limits_are_rejected(cluster: Cluster, wishes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         planned(cluster, **wishes)  # type: ignore[arg-type]
 

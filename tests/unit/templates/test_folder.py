@@ -1,4 +1,4 @@
-"""The directory of a sweep: manifest, scenes, states, refusals."""
+"""The directory of a sweep: manifest, scenes, states, rejections."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_same_sweep_takes_up_its_directory(make_folder: MakeFolder) -> None:
         ("[1, 2]", "[1, 2, 3]", "runs only in the file: n10_seed3, n20_seed3; give"),
     ],
 )
-def test_another_sweep_is_refused(make_folder: MakeFolder, old: str, new: str, message: str) -> None:
+def test_another_sweep_is_rejected(make_folder: MakeFolder, old: str, new: str, message: str) -> None:
     folder = make_folder()
     before = (folder.path / "sweep.json").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=rf"holds another sweep \('test'\): {message}"):
@@ -88,14 +88,14 @@ def test_another_sweep_is_refused(make_folder: MakeFolder, old: str, new: str, m
     assert (folder.path / "sweep.json").read_text(encoding="utf-8") == before
 
 
-def test_the_same_names_with_other_scenes_are_refused(make_folder: MakeFolder) -> None:
+def test_the_same_names_with_other_scenes_are_rejected(make_folder: MakeFolder) -> None:
     make_folder()
     other = SWEEP.replace("points:", "constants: {k: 1}\npoints:").replace("[10, 20]", "[30, 20]")
     with pytest.raises(InputError, match="runs of another scene: n10_seed1, n10_seed2; give"):
         make_folder(other.replace("n{{ count }}", "n{{ 10 if count == 30 else count }}"))
 
 
-def test_foreign_directories_and_files_are_refused(make_folder: MakeFolder, tmp_path: Path) -> None:
+def test_foreign_directories_and_files_are_rejected(make_folder: MakeFolder, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.tex").write_text("years of work")
     with pytest.raises(InputError, match="out: holds other files; give a directory"):

@@ -119,7 +119,7 @@ def test_as_many_runs_as_slots_and_never_more(folder: Folder, slots: int) -> Non
 
 
 def test_a_failing_run_does_not_stop_the_others(folder: Folder) -> None:
-    behaviours = {"n20_seed1": "fail", "n10_seed1": "crash", "n10_seed2": "refuse", "n20_seed2": "silent"}
+    behaviours = {"n20_seed1": "fail", "n10_seed1": "crash", "n10_seed2": "reject", "n20_seed2": "silent"}
     outcomes = run_folder(folder, Watcher(), slots=2, command=fake(behaviours), **QUICK)
     assert statuses(outcomes) == ["failed"] * 4
     assert [outcome.cause for outcome in outcomes] == [
@@ -229,7 +229,7 @@ def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
     assert not (folder.path / "runs").exists()
 
 
-def test_runs_are_told_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_get_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[tuple[str, str]] = []
 
     def noting(scene: Path, directory: Path, resume: bool) -> Sequence[str]:

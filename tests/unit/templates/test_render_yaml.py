@@ -37,7 +37,7 @@ def test_a_value_within_text_becomes_text() -> None:
     assert data == {"name": "lw0.7-#a: b", "quoted": "0.7"}
 
 
-def test_a_list_within_text_is_refused() -> None:
+def test_a_list_within_text_is_rejected() -> None:
     with pytest.raises(InputError, match=r"^t, line 1.*list or mapping within text: \[1\]"):
         render_yaml("name: lw{{ x }}", {"x": [1]}, "t")
 

@@ -102,13 +102,13 @@ def test_a_template_of_ones_own_changes_one_block(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\rb", "a\x1bb", "a\udcffb"])
-def test_a_path_that_could_end_a_comment_is_refused(name: str) -> None:
+def test_a_path_that_could_end_a_comment_is_rejected(name: str) -> None:
     with pytest.raises(InputError, match="characters that cannot be printed"):
         script_of(load_cluster("local-slurm"), Path("/tmp") / name)
 
 
 @pytest.mark.parametrize("name", ["a:b", "a,b"])
-def test_a_path_that_apptainer_would_split_is_refused(name: str) -> None:
+def test_a_path_that_apptainer_would_split_is_rejected(name: str) -> None:
     with pytest.raises(InputError, match="Apptainer's --bind"):
         script_of(load_cluster("example-apptainer"), Path("/data") / name)
 
