@@ -78,7 +78,7 @@ format: setup ## rewrite the sources in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-lock: ## pin requirements*.txt anew from requirements*.in (minutes)
+lock: ## pin requirements*.txt anew from pyproject.toml (minutes)
 	setup/lock.sh
 
 clean: ## remove .venv and caches; results in out/ stay

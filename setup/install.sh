@@ -53,7 +53,7 @@ install_environment() {
     local requirements=(-r requirements.txt) key
     [ -n "$no_dev" ] || requirements+=(-r requirements-dev.txt)
     key=$(pwd && /usr/bin/python3 --version && echo "${requirements[*]}" &&
-        sha256sum setup/install.sh requirements.txt requirements-dev.txt requirements.in pyproject.toml)
+        sha256sum setup/install.sh requirements.txt requirements-dev.txt pyproject.toml)
     [ "$key" != "$(cat .venv/installed 2>/dev/null)" ] || return 0
 
     echo "setup: installing Python packages into .venv (a minute)"
@@ -69,7 +69,7 @@ install_environment() {
     packages=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
     echo "import mpl_toolkits" >"$packages/mpl_toolkits.pth"
     echo "$key" >.venv/installed
-    echo "setup: done; '.venv/bin/smarticles doctor' tells what works"
+    echo "setup: done; '.venv/bin/smarticles doctor' shows what works"
 }
 
 no_dev='' mpi=''

@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# Regenerate the pins in requirements.txt, requirements-dev.txt and requirements-bench.txt from the .in files.
+# Regenerate the pins in requirements.txt, requirements-dev.txt and requirements-bench.txt from pyproject.toml.
 #
-# Nothing is installed: a pip that reads what the index tells of a package needs the packages themselves of few. An
-# installation downloads and unpacks 2 GB besides, to learn no more.
+# Nothing is installed: pip reads the metadata of most packages from the index, which saves downloads of 2 GB.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 scratch=$(mktemp -d)
@@ -29,21 +28,37 @@ PYTHON
     echo "lock: $name, $(wc -l <"$scratch/$name") packages" >&2
 }
 
-pins run setuptools -r requirements.in
-pins all -r "$scratch/run" -r requirements-dev.in
-pins bench -r "$scratch/all" -r requirements-bench.in
+wanted() { # EXTRA …: the requirements of extras, and of the project itself for "core", one a line
+    "${python[@]}" - "$@" <<'PYTHON'
+import sys
+import tomllib
+
+with open("pyproject.toml", "rb") as file:
+    project = tomllib.load(file)["project"]
+lists = {"core": project["dependencies"], **project["optional-dependencies"]}
+names = [one for extra in sys.argv[1:] for one in lists[extra] if not one.startswith("smarticles[")]
+print("\n".join(names))
+PYTHON
+}
+
+wanted core viz view export >"$scratch/run.in"
+wanted docs dev >"$scratch/dev.in"
+wanted bench >"$scratch/bench.in"
+pins run setuptools -r "$scratch/run.in"
+pins all -r "$scratch/run" -r "$scratch/dev.in"
+pins bench -r "$scratch/all" -r "$scratch/bench.in"
 
 added() { comm -13 <(sort "$scratch/$1") <(sort "$scratch/$2") | sort -f; }
 
 {
-    echo "# Made by 'make lock' from requirements.in; setuptools builds the project itself."
+    echo "# Made by 'make lock' from pyproject.toml; setuptools builds the project itself."
     cat "$scratch/run"
 } >requirements.txt
 {
-    echo "# Made by 'make lock' from requirements-dev.in; used together with requirements.txt."
+    echo "# Made by 'make lock' from pyproject.toml; used together with requirements.txt."
     added run all
 } >requirements-dev.txt
 {
-    echo "# Made by 'make lock' from requirements-bench.in; used together with requirements.txt, by 'make rivals' alone."
+    echo "# Made by 'make lock' from pyproject.toml; used together with requirements.txt, by 'make rivals' alone."
     added all bench
 } >requirements-bench.txt

@@ -1,4 +1,4 @@
-"""Smarticles: what a user imports. Nothing is loaded before it is used.
+"""Smarticles: names for users. Nothing is loaded before it is used.
 
     import smarticles
 
@@ -9,44 +9,64 @@
     many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
     many.table(by="aspect_ratio")
 
-The command line is `smarticles.main`. Types of these names are in `__init__.pyi`.
+The command line is `smarticles.main`.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
 
-_HOMES = {
+if TYPE_CHECKING:
+    import postprocess as measures
+    from dem.errors import InputError, RunError
+    from dem.record.run import Run
+    from dem.scene.reading import load_scene
+    from dem.scene.scene import Scene
+    from smarticles.public import SweepDirectory, measure, read, read_sweep, run, sweep
+
+    __version__: str
+
+__all__ = [
+    "InputError",
+    "Run",
+    "RunError",
+    "Scene",
+    "SweepDirectory",
+    "__version__",
+    "load_scene",
+    "measure",
+    "measures",
+    "read",
+    "read_sweep",
+    "run",
+    "sweep",
+]
+
+_MODULES = {
     "InputError": "dem.errors",
     "Run": "dem.record.run",
     "RunError": "dem.errors",
-    "SweepDirectory": "smarticles.public",
     "Scene": "dem.scene.scene",
     "load_scene": "dem.scene.reading",
-    "measure": "smarticles.public",
-    "read": "smarticles.public",
-    "read_sweep": "smarticles.public",
-    "run": "smarticles.public",
-    "sweep": "smarticles.public",
 }
-"""Public name: module that has it."""
-
-__all__ = [*_HOMES, "__version__", "measures"]  # noqa: PLE0604  (a list of strings, as a test says)
+"""Modules of names that are not in `smarticles.public`."""
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        value = getattr(import_module(_HOMES[name]), name)
-    elif name == "measures":
-        value = import_module("postprocess")
-    elif name == "__version__":
-        from importlib.metadata import version  # noqa: PLC0415  (slow to import)
+if not TYPE_CHECKING:  # so that a type checker knows no other names
 
-        value = version("smarticles")
-    else:
-        msg = f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}"
-        raise AttributeError(msg)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        if name == "measures":
+            value: object = import_module("postprocess")
+        elif name == "__version__":
+            from importlib.metadata import version  # noqa: PLC0415  (slow to import)
+
+            value = version("smarticles")
+        elif name in __all__:
+            value = getattr(import_module(_MODULES.get(name, "smarticles.public")), name)
+        else:
+            msg = f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}"
+            raise AttributeError(msg)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

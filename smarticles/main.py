@@ -6,13 +6,21 @@ continued; 130 stopped by Ctrl-C.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shlex
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
 
 from dem.errors import InputError, RunError
+from smarticles.command_line import Commands, Parser, add_debug
 from smarticles.commands import (
     accuracy,
     compare,
@@ -22,7 +30,6 @@ from smarticles.commands import (
     plan,
     render,
     report,
-    resume,
     run,
     scene_files,
     status,
@@ -30,17 +37,17 @@ from smarticles.commands import (
     sweep,
     view,
 )
-from smarticles.completion import add_completion
-from smarticles.parsing import Commands, Parser, add_debug
-from smarticles.stopping import orderly_stop
 
 COMMANDS = (
-    *(scene_files, run, plan, doctor, measure, compare, render, view, export, report),
-    *(sweep, status, resume, study, accuracy),
+    *(scene_files.add, run.add, plan.add, doctor.add, measure.add, compare.add, render.add, view.add, export.add),
+    *(report.add, sweep.add, status.add, run.add_resume, study.add, accuracy.add),
 )
 """In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
 
 FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
+
+_SHELLS = ("bash", "zsh")
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _DESCRIPTION = """\
 Discrete-element simulation of smarticles: U-shaped particles, poured, shaken, measured.
@@ -64,7 +71,7 @@ to be continued; 130 stopped by Ctrl-C"""
 
 
 def build_parser() -> tuple[Parser, Commands]:
-    """The parser of the whole command, and its subcommands."""
+    """Return the parser of the whole command, and its subcommands."""
     from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415  (slow to import)
 
     try:
@@ -73,29 +80,48 @@ def build_parser() -> tuple[Parser, Commands]:
         release = "not installed"
     parser = Parser(prog="smarticles", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"smarticles {release}")
-    add_completion(parser)
+    parser.add_argument(
+        "--completion",
+        choices=_SHELLS,
+        action=_PrintCompletion,
+        metavar="SHELL",
+        help=f"print the completion script of a shell ({', '.join(_SHELLS)}) and end",
+    )
     add_debug(parser)
     commands = Commands(parser)
-    for module in COMMANDS:
-        module.add(commands)
+    for add in COMMANDS:
+        add(commands)
     return parser, commands
 
 
+class _PrintCompletion(argparse.Action):
+    """Prints the completion script of a shell; arguments that are paths complete to files, or to directories."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        import shtab  # noqa: PLC0415  (the only place that needs it)
+
+        parsers = [parser]
+        for one in parsers:
+            for action in one._actions:
+                if isinstance(action, argparse._SubParsersAction):
+                    parsers += action.choices.values()
+                elif action.type is Path:
+                    kind = shtab.DIRECTORY if "DIR" in str(action.metavar) else shtab.FILE
+                    action.complete = kind  # type: ignore[attr-defined]
+        print(shtab.complete(parser, str(values)))
+        parser.exit(0)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Args:
-        argv: the arguments; by default those of this process.
-
-    Returns:
-        The exit status.
-    """
+    """Run the command with some arguments, by default those of this process, and return the exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
     return guarded(lambda: _dispatch(words), debug="--debug" in words)
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """The one place where what ends an action becomes a message and an exit status.
+    """Return the exit status of an action; every way in which it can end becomes one line and a status here.
 
     Args:
         action: what to do; returns its exit status.
@@ -109,14 +135,16 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
     except SystemExit as error:  # argparse, after --help and --version
         return error.code if isinstance(error.code, int) else 0
     except BrokenPipeError:
-        # Who read our output, such as `head`, has had enough: nothing more must be flushed to it.
+        # The reader of our output, such as `head`, has ended: nothing more may be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
         _complain(f"stopped; {str(error) or 'what was written is whole'}", error, debug)
         return STOPPED
     except Exception as error:  # nothing passes without a message
-        return _report(error, debug)
+        text, status = _explain(error)
+        _complain(f"error: {text}", error, debug)
+        return status
 
 
 def _dispatch(words: list[str]) -> int:
@@ -124,36 +152,58 @@ def _dispatch(words: list[str]) -> int:
     arguments, unknown = parser.parse_known_args(words)
     if arguments.command is None:
         if unknown:
-            parser.refuse_unknown(unknown)
+            parser.reject_unknown(unknown)
         parser.error(f"no command given; known: {', '.join(commands.parsers)}")
     if unknown:
-        commands.parsers[arguments.command].refuse_unknown(unknown)
+        commands.parsers[arguments.command].reject_unknown(unknown)
     arguments.command_line = shlex.join(["smarticles", *words])
     status: int = arguments.handler(arguments)
     return status
 
 
-def _report(error: Exception, debug: bool) -> int:
+def _explain(error: Exception) -> tuple[str, int]:
+    """Return message and exit status of an error."""
     if isinstance(error, InputError):
-        _complain(f"error: {error}", error, debug)
-        return BAD_INPUT
+        return str(error), BAD_INPUT
     if isinstance(error, RunError):
-        text = str(error)
-    elif isinstance(error, ModuleNotFoundError):
-        text = f"the Python package {error.name!r} is not installed; run `make setup`, then `smarticles doctor`"
-    elif isinstance(error, OSError):
+        return str(error), FAILED
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        return f"the Python package {error.name!r} is missing; {doctor.way_to_install(error.name)}", BAD_INPUT
+    if isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
-        text = f"{where}{error.strerror or error}; free space, or check the path and its permissions"
-    else:
-        text = (
-            f"internal error, {type(error).__name__}: {error}; "
-            "please report it with the output of the same command with --debug"
-        )
-    _complain(f"error: {text}", error, debug)
-    return FAILED
+        return f"{where}{error.strerror or error}; free space, or check the path and its permissions", FAILED
+    what = f"internal error, {type(error).__name__}: {error}"
+    return f"{what}; please report it with the output of the same command with --debug", FAILED
 
 
 def _complain(text: str, error: BaseException, debug: bool) -> None:
     print(f"smarticles: {' '.join(text.split())}", file=sys.stderr)
     if debug:
         traceback.print_exception(error)
+
+
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _pass_over(_number: int, _frame: FrameType | None) -> None:
+    """Ignore a signal here only: unlike SIG_IGN, started processes do not inherit this."""
+
+
+@contextmanager
+def orderly_stop() -> Iterator[None]:
+    """Turn signals that end the process into KeyboardInterrupt, so that a run closes its files.
+
+    Signals that the process ignores, by nohup or by a shell's `&`, stay ignored.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    try:
+        for number, handler in before.items():
+            signal.signal(number, _pass_over if handler is signal.SIG_IGN else _stop)
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

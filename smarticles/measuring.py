@@ -1,9 +1,9 @@
-"""What came out of runs and sweeps as one table, with what a sweep varied as columns."""
+"""Measures of runs and sweeps as one table, with what a sweep varied as columns."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
+from dem.record.names import FRAME, OF_SWEEP, collection
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,11 +23,16 @@ _WORTH_PROCESSES = 6
 """Runs from which on starting processes saves time: each loads its libraries anew."""
 
 PHASE = ("phase", "phase type")
-"""Columns that tell the phases of a run apart."""
+"""Columns that identify a phase of a run."""
+
+
+def has_frames(directory: Path) -> bool:
+    """Return whether a run directory holds a frame."""
+    return (directory / collection(FRAME)).is_file()
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Run directories among, or inside, the given ones, with what their sweeps varied.
+    """Return the run directories among, or inside, the given ones, with what their sweeps varied.
 
     Args:
         directories: of runs; a sweep's stands for its runs with frames.
@@ -34,17 +40,15 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
     Raises:
         InputError: a sweep has no run with frames yet.
     """
-    from templates.sweep.folder import MANIFEST, open_folder  # noqa: PLC0415
+    from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     found: dict[Path, Mapping[str, Any]] = {}
     for directory in directories:
-        if not (directory / MANIFEST).is_file():
+        if not (directory / OF_SWEEP).is_file():
             found[directory] = {}
             continue
         folder = open_folder(directory)
-        begun = {
-            folder.run(entry): entry.values for entry in folder.entries if (folder.run(entry) / "frames.pvd").is_file()
-        }
+        begun = {run: entry.values for entry in folder.entries if has_frames(run := folder.run(entry))}
         if not begun:
             msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
             raise InputError(msg)
@@ -53,7 +57,7 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:
-    """Variables and constants of a sweep and the values that each takes, in the order of the sweep."""
+    """Return the variables and constants of a sweep with the values of each, in the order of the sweep."""
     found: dict[str, list[Any]] = {}
     for entry in folder.entries:
         for name, value in entry.values.items():
@@ -63,17 +67,23 @@ def values_in(folder: Folder) -> dict[str, list[Any]]:
     return found
 
 
+def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bool:
+    """Return whether a variable is determined by another one, as the columns of a table are by its first."""
+    seen: dict[str, object] = {}
+    return all(seen.setdefault(str(point.get(other)), point.get(name)) == point.get(name) for point in points)
+
+
 def measured(
     directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
 ) -> pd.DataFrame:
-    """Measures of runs and sweeps, one row per run and phase; what a sweep varied stands beside the run.
+    """Return measures of runs and sweeps, one row per run and phase, with what a sweep varies beside the run.
 
     Args:
         directories: of runs and sweeps.
         frames: one row per frame instead.
         costly: when to take the costly packing fractions, see `postprocess.measure_run`.
-        jobs: runs that are measured at once, each in a process of its own; only for programs that processes may be
-            started from, which a script without a guarded main is not.
+        jobs: runs that are measured at once, each in a process of its own; more than one only in programs from which
+            processes may be started: not in a script without a guarded main.
 
     Returns:
         A table with units in its columns. A variable of a sweep that has the name of another column and not its
@@ -85,37 +95,35 @@ def measured(
     import pandas as pd  # noqa: PLC0415
 
     found = sources(directories)
-    tables = []
-    for (_, values), table in zip(found.items(), _tables(list(found), frames, costly, jobs), strict=True):
-        swept = {_column(name, value, table): value for name, value in values.items()}
-        for place, (name, value) in enumerate(swept.items(), start=1):
-            if name in table.columns:
-                table = table.drop(columns=name)  # noqa: PLW2901  (the same, put at another place)
-            table.insert(place, name, [_cell(value)] * len(table))
-        tables.append(table)
+    take = partial(_table, frames=frames, costly=costly)
+    if jobs == 1 or len(found) < _WORTH_PROCESSES:
+        tables = list(map(take, found, found.values()))
+    else:
+        # Anew, not forked: VTK and matplotlib may have threads here.
+        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+            tables = list(pool.map(take, found, found.values()))
     return pd.concat(tables, ignore_index=True)
 
 
-def _tables(directories: Sequence[Path], frames: bool, costly: Costly, jobs: int) -> Iterator[pd.DataFrame]:
-    """The table of each run, in order."""
-    take = partial(_one, frames=frames, costly=costly)
-    if jobs == 1 or len(directories) < _WORTH_PROCESSES:
-        yield from map(take, directories)
-        return
-    # Anew, not forked: VTK and matplotlib may have threads here.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(take, directories)
-
-
-def _one(directory: Path, *, frames: bool, costly: Costly) -> pd.DataFrame:
+def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly) -> pd.DataFrame:
+    """Return the table of one run, with the variables of its sweep after the first column."""
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    return (measure_run if frames else summarise_run)(Run(directory), costly=costly)
+    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly)
+    for place, (name, value) in enumerate(values.items(), start=1):
+        column = name
+        if name in table.columns and (table[name] == value).all():
+            table = table.drop(columns=name)  # inserted at another place
+        elif name in table.columns:
+            column = f"{name} (swept)"
+        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
+        table.insert(place, column, [cell] * len(table))
+    return table
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Means over runs, one row per group and phase; see `postprocess.statistics.groups.means_by`.
+    """Return means over runs, one row per group and phase; see `postprocess.statistics.groups.means_by`.
 
     Args:
         table: of `measured`, one row per run and phase.
@@ -132,15 +140,3 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
             msg = f"{name!r} is no column of these runs; {nearest(name, known)}"
             raise InputError(msg)
     return means_by(table, [*by, *(name for name in PHASE if name not in by)])
-
-
-def _column(name: str, value: object, table: pd.DataFrame) -> str:
-    """What a variable's column is called: by its name, unless a run says something else under it."""
-    if name in table.columns and not (table[name] == value).all():
-        return f"{name} (swept)"
-    return name
-
-
-def _cell(value: object) -> object:
-    """A variable as one cell; what is no number or text as JSON."""
-    return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)

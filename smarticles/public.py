@@ -1,4 +1,4 @@
-"""What `import smarticles` offers beside names that live elsewhere: run a scene, read a run, compute a sweep."""
+"""The Python API beside names that live elsewhere: run a scene, read a run, compute a sweep."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from pathlib import Path
 from typing import Any, overload
 
 import pandas as pd
+import yaml
 
 from dem.errors import InputError, RunError
 from dem.record.run import Run, open_run
-from dem.scene.reading import dump_scene
+from dem.scene.overrides import apply_override
+from dem.scene.reading import SCHEMA_VERSION, dump_scene
 from dem.scene.scene import Scene
+from dem.scene.yaml_text import load_yaml
+from dem.setting.fidelity import fidelities
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
-from smarticles.scene_sweep import write_sweep
-from smarticles.sweeps import complete, make_folder
-from templates.local.runner import environment, smarticles_command
+from smarticles.sweeps import compute, make_folder, raise_failures
+from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
+from templates.sweep.sweep_file import SEED
 
 
 @dataclass(frozen=True)
 class SweepDirectory(Sequence[Run]):
-    """The runs of a sweep in its order, and tables of all of them.
-
-    Args:
-        folder: the sweep's directory.
-    """
+    """The runs of a sweep in its order, and tables of all of them."""
 
     folder: Folder
 
@@ -42,7 +42,7 @@ class SweepDirectory(Sequence[Run]):
 
     @cached_property
     def values(self) -> pd.DataFrame:
-        """What the sweep varies: one row per run, by the runs' names."""
+        """Variables and constants of the sweep: one row per run, by the runs' names."""
         entries = self.folder.entries
         return pd.DataFrame([dict(entry.values) for entry in entries], index=[entry.name for entry in entries])
 
@@ -56,13 +56,10 @@ class SweepDirectory(Sequence[Run]):
     def __getitem__(self, index: slice) -> list[Run]: ...
 
     def __getitem__(self, index: int | slice) -> Run | list[Run]:
-        entries = self.folder.entries[index]
-        if isinstance(entries, tuple):
-            return [Run(self.folder.run(entry)) for entry in entries]
-        return Run(self.folder.run(entries))
+        return self.folder.runs()[index]
 
     def table(self, *, by: str | Sequence[str] | None = None, frames: bool = False) -> pd.DataFrame:
-        """All measures of the runs that have begun, with what the sweep varies as columns.
+        """Return all measures of the runs that have begun, with what the sweep varies as columns.
 
         Args:
             by: columns, such as variables of the sweep, whose values make a group: then one row per group and phase,
@@ -84,7 +81,7 @@ def run(
 ) -> Run:
     """Run a scene into a run directory, as `smarticles run` does, in a process of its own.
 
-    Of its own, because YADE and what draws never meet in one.
+    Of its own, because YADE and PyVista must not be loaded in one process.
 
     Args:
         scene: a scene, or the file of one.
@@ -123,7 +120,7 @@ def read(directory: Path | str) -> Run:
 
 
 def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
-    """All measures of a run as a table, units in its column names, as `smarticles measure` gives them.
+    """Return all measures of a run as a table, units in its column names, as `smarticles measure` does.
 
     Args:
         run: a run, or its directory.
@@ -136,7 +133,7 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """A sweep's or a study's directory, its runs done or not.
+    """Open a sweep's or a study's directory, its runs done or not.
 
     Raises:
         InputError: it is none.
@@ -177,5 +174,82 @@ def sweep(
         words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
         again = shlex.join(["smarticles", *words])
         folder = make_folder(file, Path(out), again)
-    complete(folder, jobs=jobs, command=again)
+    raise_failures(folder, compute(folder, jobs=jobs, command=again))
     return SweepDirectory(folder)
+
+
+# -- a scene and the keys of it that vary, as the sweep file and template that they stand for --------------------------
+
+
+def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
+    """Write `sweep.yaml` and `scene.yaml.j2`, and return the former.
+
+    Args:
+        scene: a scene, or the file of one.
+        vary: keys of the scene, dots for nesting, and the values of each; all combinations are runs.
+        folder: where to write them.
+
+    Raises:
+        InputError: the scene cannot be read, has no such place or holds marks of a template, or there is nothing to
+            vary.
+    """
+    if not vary:
+        msg = "vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}"
+        raise InputError(msg)
+    data = _plain(scene) if isinstance(scene, Scene) else _read(Path(scene))
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    for mark in ("{{", "{%", "{#"):
+        if mark in text:
+            name = "scene" if isinstance(scene, Scene) else scene
+            msg = f"{name}: holds {mark!r}, which a template would take for its own; write it without"
+            raise InputError(msg)
+    # The last word of a key names its variable, or all of its words where another key ends alike.
+    last = [key.rpartition(".")[2] for key in vary]
+    names = {
+        key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
+        for key, word in zip(vary, last, strict=True)
+    }
+    for key, name in names.items():
+        apply_override(data, f"{key}='{{{{ {name} }}}}'")
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    for name in names.values():
+        text = text.replace(f"'{{{{ {name} }}}}'", f"{{{{ {name} }}}}")
+    (folder / "scene.yaml.j2").write_text(text, encoding="utf-8")
+    grid = {name: list(vary[key]) for key, name in names.items() if name != SEED}
+    content: dict[str, Any] = {
+        "schema_version": 1,
+        "name": str(data.get("name", "sweep")),
+        "template": "scene.yaml.j2",
+        "run_name": "_".join(f"{name}{{{{ {name} }}}}" for name in names.values()),
+        "points": {"grid": grid} if grid else {"list": [{}]},
+        **({"repeats": {"seeds": list(vary[SEED])}} if SEED in names.values() else {}),
+    }
+    file = folder / "sweep.yaml"
+    file.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    return file
+
+
+def _plain(scene: Scene) -> dict[str, Any]:
+    """Return the keys that were set, without those which follow from others and may follow differently in a run."""
+    data = scene.model_dump(mode="json", exclude_unset=True)
+    if "fidelity" in data:
+        named = fidelities(scene.engine)[scene.fidelity.base]
+        differing = {key: value for key, value in data["fidelity"].items() if named.get(key) != value}
+        data["fidelity"] = {**differing, "base": scene.fidelity.base}
+    return {"schema_version": SCHEMA_VERSION, **data}
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        data = load_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        msg = f"{path}: cannot be read ({' '.join(str(error).split())}); give a scene or the path of a scene file"
+        raise InputError(msg) from None
+    if not isinstance(data, dict):
+        msg = f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}"
+        raise InputError(msg)
+    for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
+        # Relative to the scene file; the template lies elsewhere.
+        if isinstance(phase, dict) and isinstance(phase.get("run"), str):
+            phase["run"] = str((path.parent / phase["run"]).resolve())
+    return data

@@ -1,54 +1,42 @@
-"""Directories of sweeps as commands take them: made or taken up, their runs computed here."""
+"""Directories of sweeps as commands take them: made or taken up, computed here, or given to a batch system."""
 
 from __future__ import annotations
 
 import argparse
 import platform
+import shlex
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dem.errors import RunError
+from dem.errors import InputError, RunError
+from smarticles.command_line import Parser, add_ranks, positive_int
 
 if TYPE_CHECKING:
     from dem.scene.scene import Scene
-    from templates.local.display import Outcome
+    from templates.local import Outcome
+    from templates.slurm.submission import Draft
     from templates.sweep.expand import Point
-    from templates.sweep.folder import Folder
+    from templates.sweep.folder import Entry, Folder
     from templates.sweep.sweep_file import Sweep
 
 
-def make_folder(
-    file: Path,
-    out: Path,
-    command: str,
-    constants: Mapping[str, str] | None = None,
-    *,
-    engine: str | None = None,
-    max_points: int | None = None,
-) -> Folder:
+def make_folder(file: Path, out: Path, command: str) -> Folder:
     """Expand a sweep file into its directory, or take up the directory that holds it already.
-
-    Args:
-        file: sweep file.
-        out: directory of the sweep.
-        command: the command line, for the manifest.
-        constants: values that replace those of the file.
-        engine: what all its runs are to be computed by; None: what the file says.
-        max_points: how many runs it may have; None: the usual limit.
 
     Raises:
         InputError: the sweep is not valid, or the directory holds something else.
     """
-    from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
 
-    sweep = changed_sweep(file, constants or {}, engine=engine)
-    return folder_of(sweep, expand(sweep, max_points=max_points or MAX_POINTS), out, command)
+    sweep = changed_sweep(file)
+    return folder_of(sweep, expand(sweep), out, command)
 
 
-def changed_sweep(file: Path, constants: Mapping[str, str], *, engine: str | None = None) -> Sweep:
-    """A sweep file as a command changes it; see `make_folder`."""
+def changed_sweep(file: Path, constants: Mapping[str, str] = MappingProxyType({}), engine: str | None = None) -> Sweep:
+    """Read a sweep file; replace some of its constants, and the engine of all its runs."""
     from templates.sweep.sweep_file import load_sweep, on_engine, with_constants  # noqa: PLC0415
 
     sweep = with_constants(load_sweep(file), constants)
@@ -56,52 +44,40 @@ def changed_sweep(file: Path, constants: Mapping[str, str], *, engine: str | Non
 
 
 def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *, extend: bool = False) -> Folder:
-    """The directory of an expanded sweep; see `templates.sweep.folder.create_folder`."""
+    """Make or take up the directory of an expanded sweep, see `templates.sweep.folder.create_folder`."""
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 
+    # Versions of what expands a sweep; each run records those of what computes it.
+    packages = ("smarticles", "jinja2", "pydantic", "pyyaml")
+    versions = {"python": platform.python_version(), **{name: version(name) for name in packages}}
     return create_folder(
-        out, sweep, points, command=command, versions=versions(), expected_s=expected_wall_s, extend=extend
+        out, sweep, points, command=command, versions=versions, expected_s=expected_wall_s, extend=extend
     )
 
 
-def versions() -> dict[str, str]:
-    """Versions of what expands a sweep; each run records those of what computes it."""
-    packages = ("smarticles", "jinja2", "pydantic", "pyyaml")
-    return {"python": platform.python_version(), **{name: version(name) for name in packages}}
-
-
 def expected_wall_s(scene: Scene) -> float:
-    """Expected wall time of a scene [s], on a machine like the one the costs were measured on."""
+    """Return the expected wall time of a scene [s], on a machine like the one the costs were measured on."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
     return plan(scene).wall_s
 
 
-def complete(folder: Folder, *, jobs: int | None, command: str) -> None:
-    """Run what a sweep is missing.
-
-    Args:
-        folder: the sweep's directory.
-        jobs: runs at once; None: one per core.
-        command: what to give again after Ctrl-C.
-
-    Raises:
-        InputError: runs of the sweep are in a queue.
-        RunError: a run failed.
-        KeyboardInterrupt: Ctrl-C; the message says how to go on.
-    """
-    refuse_failures(folder, compute(folder, jobs=jobs, command=command))
+# -- on this machine ---------------------------------------------------------------------------------------------------
 
 
 def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
-    """The same, but a run that failed is told, not raised."""
+    """Run what a sweep is missing, `jobs` runs at once; `command` goes on after Ctrl-C.
+
+    Raises:
+        InputError: runs of the sweep are in a queue.
+        KeyboardInterrupt: Ctrl-C; the message says how to go on.
+    """
     from rich.console import Console  # noqa: PLC0415
 
-    from templates.local.display import Display  # noqa: PLC0415
-    from templates.local.runner import run_folder  # noqa: PLC0415
-    from templates.slurm.submission import refuse_queued  # noqa: PLC0415
+    from templates.local import Display, run_folder  # noqa: PLC0415
+    from templates.slurm.submission import reject_queued  # noqa: PLC0415
 
-    refuse_queued(folder)
+    reject_queued(folder)
     try:
         return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
@@ -109,15 +85,8 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
         raise KeyboardInterrupt(msg) from None
 
 
-def complete_and_tell(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Run what a sweep is missing, for a command with --jobs; say what comes next."""
-    complete(folder, jobs=arguments.jobs, command=arguments.command_line)
-    print(f"{folder.path}: all {len(folder.entries)} runs are done; next: smarticles measure {folder.path}")
-    return 0
-
-
-def refuse_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Say what is missing, if anything is.
+def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
+    """Raise if runs are missing.
 
     Raises:
         RunError: a run failed.
@@ -130,3 +99,121 @@ def refuse_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
             f"logs are in {folder.path / 'logs'}, start them again: smarticles resume {folder.path}"
         )
         raise RunError(msg)
+
+
+def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
+    """Run what a sweep is missing, for a command with --jobs, and print what comes next."""
+    raise_failures(folder, compute(folder, jobs=arguments.jobs, command=arguments.command_line))
+    print(f"{folder.path}: all {len(folder.entries)} runs are done; next: smarticles measure {folder.path}")
+    return 0
+
+
+# -- on a cluster ------------------------------------------------------------------------------------------------------
+
+CLUSTER_HELP = """
+With --submit slurm the runs become one array job: each task computes several runs at once, one core
+each, and gets a signal before its time limit; its runs then end at a checkpoint and the task
+queues itself again. --submit none with --cluster writes the same scripts, for sbatch by hand. A
+cluster is known by name or described in a TOML file of yours; what it cannot give is rejected before
+anything is written."""
+
+_OPTIONS = ("cluster", "partition", "account", "time", "runs_per_task", "memory", "ranks")
+
+
+def add_cluster_options(parser: Parser) -> None:
+    """Add --cluster and what can be asked of one."""
+    group = parser.add_argument_group("for a cluster")
+    group.add_argument("--cluster", metavar="NAME|FILE.toml", help="the cluster; needed for --submit slurm")
+    group.add_argument("--partition", metavar="NAME", help="default: the cluster's default partition")
+    group.add_argument("--account", metavar="NAME", help="default: that of the cluster's file")
+    group.add_argument(
+        "--time", metavar="D-HH:MM:SS", help="wall time of a task; default: three times what is expected"
+    )
+    group.add_argument(
+        "--runs-per-task",
+        type=positive_int,
+        metavar="K",
+        help="runs side by side in one task, one core each; default: a full node",
+    )
+    group.add_argument("--memory", type=positive_int, metavar="MIB", help="memory per run [MiB]; default: 1024")
+    add_ranks(group, "1, or what a run to be resumed began with")
+
+
+def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool:
+    """Return whether the runs are for a cluster.
+
+    Args:
+        arguments: of the command.
+        one_run: whether they name one run, which may have ranks here too.
+
+    Raises:
+        InputError: an option for a cluster is given although they are not, or there is no Slurm here to submit to.
+    """
+    from templates.slurm.submission import require_sbatch  # noqa: PLC0415
+
+    if arguments.submit == "slurm" or (arguments.submit == "none" and arguments.cluster is not None):
+        if arguments.submit == "slurm" and not getattr(arguments, "dry_run", False):
+            require_sbatch()
+        return True
+    for name in _OPTIONS:
+        if getattr(arguments, name) is not None and not (one_run and name == "ranks"):
+            option = f"--{name.replace('_', '-')}"
+            msg = f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME"
+            raise InputError(msg)
+    return False
+
+
+def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
+    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`.
+
+    Raises:
+        InputError: unknown cluster, or a request beyond its limits.
+    """
+    from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
+    from templates.slurm.job import Wishes  # noqa: PLC0415
+    from templates.slurm.submission import draft, submissions  # noqa: PLC0415
+
+    reference = arguments.cluster
+    if reference is None:
+        before = submissions(path)
+        if not before:
+            msg = f"--cluster: is missing; known: {', '.join(shipped_clusters())}; or a file of your own, FILE.toml"
+            raise InputError(msg)
+        reference = before[-1].cluster
+    wishes = Wishes(
+        partition=arguments.partition,
+        account=arguments.account,
+        time=arguments.time,
+        runs_per_task=arguments.runs_per_task,
+        memory_mib=arguments.memory,
+        ranks=arguments.ranks,
+    )
+    return draft(path, name, entries, reference, wishes)
+
+
+def enqueue(folder: Folder, arguments: argparse.Namespace) -> int:
+    """Write, and submit if asked to, what a sweep is missing and no queue holds.
+
+    Raises:
+        InputError: unknown cluster, a request beyond its limits, or another process works on the sweep.
+        RunError: the queue cannot be asked or rejects the job.
+    """
+    from templates.slurm.submission import submissions, submit, tasks_of_runs, to_submit, write  # noqa: PLC0415
+
+    place = shlex.quote(str(folder.path))
+    with folder.lock():
+        entries = to_submit(folder, tasks_of_runs(submissions(folder.path)))
+        if not entries:
+            done = sum(folder.is_done(entry) for entry in folder.entries)
+            rest = len(folder.entries) - done
+            print(f"{folder.path}: nothing to submit: {done} runs are done, {rest} in the queue")
+            return 0
+        draft = draft_of(folder.path, folder.name, entries, arguments)
+        written = write(folder, draft)
+        what = f"{len(entries)} of {len(folder.entries)} runs, {draft.request.to_text()}"
+        if arguments.submit == "none":
+            print(f"{written}: {what}; submit them: cd {place} && sbatch {draft.submission.script}")
+            return 0
+        submission = submit(folder, draft)
+    print(f"{folder.path}: job {submission.job_id}: {what}; follow it: smarticles status {place}")
+    return 0

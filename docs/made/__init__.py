@@ -1,6 +1,6 @@
-"""What the pages do not say by hand: tables made from the code when the site is built, and equations as MathML.
+"""Extension of Sphinx: tables made from the code when the site is built, and equations as MathML.
 
-A page has a line `<!-- made here: NAME -->`; in its place comes the Markdown that the function of that name returns.
+A page has a line `<!-- made here: NAME -->`; it is replaced by the Markdown that the function of that name returns.
 """
 
 from __future__ import annotations
@@ -10,39 +10,42 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from made.columns import export_fields, force_fields, frame_fields, measure_columns, packing_definitions, series_columns
-from made.commands import command_help, command_list
-from made.findings import results_index
-from made.mathml import show_block, show_inline
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util import logging
+
+from made import tables
 from made.scene_keys import scene_keys
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
+    from sphinx.writers.html5 import HTML5Translator
 
 MADE: Mapping[str, Callable[[], str]] = MappingProxyType(
     {
-        "command help": command_help,
-        "command list": command_list,
-        "export fields": export_fields,
-        "force fields": force_fields,
-        "frame fields": frame_fields,
-        "measure columns": measure_columns,
-        "packing definitions": packing_definitions,
-        "results index": results_index,
+        "command help": tables.command_help,
+        "command list": tables.command_list,
+        "export fields": tables.export_fields,
+        "force fields": tables.force_fields,
+        "frame fields": tables.frame_fields,
+        "measure columns": tables.measure_columns,
+        "packing definitions": tables.packing_definitions,
+        "results index": tables.results_index,
         "scene keys": scene_keys,
-        "series columns": series_columns,
+        "series columns": tables.series_columns,
     }
 )
-"""What a page may ask for, and the function that writes it."""
+"""Name of a table: function that writes it."""
 
 _PLACE = re.compile(r"^<!-- made here: (.+?) -->$", re.MULTILINE)
 
 
 def filled(text: str) -> str:
-    """A page with everything in it that is made.
+    """Return a page with its tables.
 
     Raises:
-        KeyError: it asks for something that nothing makes.
+        KeyError: it asks for an unknown table.
     """
     return _PLACE.sub(lambda place: MADE[place[1]](), text)
 
@@ -52,14 +55,38 @@ def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:
 
 
 def _plain(_app: Sphinx, _what: str, _name: str, _of: object, _options: object, lines: list[str]) -> None:
-    """Docstrings are plain text with |x| in it, which would be a substitution of reStructuredText."""
+    """Escape |x| in docstrings, which would be a substitution of reStructuredText."""
     lines[:] = [line if line.lstrip().startswith((">>>", "...")) else line.replace("|", "\\|") for line in lines]
 
 
+_log = logging.getLogger(__name__)
+
+
+def _mathml(node: nodes.math | nodes.math_block, *, block: bool) -> str:
+    text = node.astext()
+    try:
+        return str(tex2mathml(text, as_block=block))
+    except MathError as error:
+        _log.warning("equation %r: %s", text, error, location=node)
+        return ""
+
+
+def show_inline(translator: HTML5Translator, node: nodes.math) -> None:
+    """Write an equation within a line, by docutils' own translator from LaTeX."""
+    translator.body.append(_mathml(node, block=False))
+    raise nodes.SkipNode
+
+
+def show_block(translator: HTML5Translator, node: nodes.math_block) -> None:
+    """Write an equation on lines of its own."""
+    translator.body.append(f'<div class="math">{_mathml(node, block=True)}</div>\n')
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Make this an extension of Sphinx."""
+    """Register the extension."""
     app.connect("source-read", _fill)
     app.connect("autodoc-process-docstring", _plain)
     app.add_html_math_renderer("mathml", inline_renderers=(show_inline, None), block_renderers=(show_block, None))
-    # What is made depends on the code, which Sphinx does not watch: `make docs` builds every page anew.
+    # The tables depend on the code, which Sphinx does not watch: `make docs` builds every page anew.
     return {"parallel_read_safe": True, "parallel_write_safe": True}

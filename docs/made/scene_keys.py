@@ -18,25 +18,18 @@ _HEAD = ("key", "type", "unit", "range", "default", "meaning")
 
 
 def scene_keys() -> str:
-    """One table for the scene itself, and one for every mapping and kind of phase and motion in it."""
+    """Return one table for the scene itself, and one for every mapping and kind of phase and motion in it."""
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
     schema = json_schema()
-    parts = [_table(schema)]
-    for title, names in _groups(schema):
-        parts.append(f"## {title}\n")
-        parts += [_part(name, schema["$defs"][name]) for name in names]
-    return "\n".join(parts)
-
-
-def _groups(schema: Schema) -> Iterator[tuple[str, list[str]]]:
-    """Definitions in the order in which a reader meets them."""
+    definitions = schema["$defs"]
     phases = _kinds(schema["properties"]["phases"]["items"])
-    motions = _kinds(next(iter(_options(schema["$defs"]["Actuate"]["properties"]["barbs"]))))
-    told = {*phases, *motions}
-    yield "Phases", phases
-    yield "Motions of the barbs", motions
-    yield "Mappings", [name for name in schema["$defs"] if name not in told]
+    motions = _kinds(next(iter(_options(definitions["Actuate"]["properties"]["barbs"]))))
+    others = [name for name in definitions if name not in (*phases, *motions)]
+    parts = [_table(schema)]
+    for title, names in (("Phases", phases), ("Motions of the barbs", motions), ("Mappings", others)):
+        parts += [f"## {title}\n", *(_part(name, definitions[name]) for name in names)]
+    return "\n".join(parts)
 
 
 def _kinds(choice: Schema) -> list[str]:
@@ -54,7 +47,7 @@ def _part(name: str, definition: Schema) -> str:
 
 
 def anchor(name: str) -> str:
-    """Where the page tells of a definition of the schema."""
+    """Return the anchor of a definition of the schema."""
     return f"scene-{name.lower()}"
 
 
@@ -66,17 +59,9 @@ def _table(definition: Schema) -> str:
             continue
         meaning = entry.get("description", "")
         unit = _UNIT.search(meaning)
-        meaning = _UNIT.sub("", meaning, count=1)
-        rows.append(
-            (
-                code(key),
-                _type(entry),
-                "" if unit is None or unit[1] == "1" else cell(unit[1]),
-                _range(entry),
-                "**needed**" if key in required else _default(entry),
-                cell(meaning),
-            )
-        )
+        shown = "" if unit is None or unit[1] == "1" else cell(unit[1])
+        default = "**needed**" if key in required else _default(entry)
+        rows.append((code(key), _type(entry), shown, _range(entry), default, cell(_UNIT.sub("", meaning, count=1))))
     return table(_HEAD, rows) if rows else "It has no keys besides its `type`.\n"
 
 
@@ -88,10 +73,10 @@ def _options(entry: Schema) -> Iterator[Schema]:
 
 
 def _type(entry: Schema) -> str:
-    told = [_one_type(option) for option in _options(entry)]
+    listed = [_one_type(option) for option in _options(entry)]
     if any(option.get("type") == "null" for option in entry.get("anyOf", ())):
-        told.append("null")
-    return " or ".join(told)
+        listed.append("null")
+    return " or ".join(listed)
 
 
 def _one_type(entry: Schema) -> str:
@@ -115,16 +100,10 @@ def _list(entry: Schema) -> str:
 
 def _range(entry: Schema) -> str:
     for option in _options(entry):
-        limits = [f"{sign} {_number(option[word])}" for word, sign in _LIMITS.items() if word in option]
+        limits = {sign: option[word] for word, sign in _LIMITS.items() if word in option}
         if limits:
-            return ", ".join(cell(limit) for limit in limits)
+            return ", ".join(cell(f"{sign} {'2⁶³' if n == 2**63 else f'{n:g}'}") for sign, n in limits.items())
     return ""
-
-
-def _number(value: float) -> str:
-    if value == 2**63:
-        return "2⁶³"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _default(entry: Schema) -> str:

@@ -1,10 +1,29 @@
-"""Tables in Markdown."""
+"""Tables in Markdown: recorded data, fields and measures with their units, commands, results."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 from postprocess.report.markdown import table_lines
+
+RESULTS = Path(__file__).resolve().parents[2] / "results"
+_WIDTH = "100"
+"""Columns of the help, whatever the terminal of the build."""
+
+_SETS = (
+    ("In every scene", "COLUMNS"),
+    ("In scenes that actuate", "MOTOR_COLUMNS"),
+    ("With `recording.energy`", "ENERGY_COLUMNS"),
+    ("With `recording.dissipation_interval_s`", "LEDGER_COLUMNS"),
+    ("In scenes with hooks", "HOOK_COLUMNS"),
+    ("In scenes that take the container away", "RELEASE_COLUMNS"),
+    ("In scenes that strain a chain", "STRAIN_COLUMNS"),
+)
 
 
 def cell(text: str) -> str:
@@ -25,3 +44,121 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         rows: cells, escaped already where they are data.
     """
     return "\n".join(table_lines(head, rows)) + "\n"
+
+
+def _described(columns: Mapping[str, Any], what: str) -> str:
+    rows = [(code(name), cell(one.unit), cell(one.description)) for name, one in columns.items()]
+    return table((what, "unit", "what"), rows)
+
+
+def series_columns() -> str:
+    """Return the datasets of `series.h5`, set by set.
+
+    Raises:
+        LookupError: a dataset is in none of the sets.
+    """
+    from dem.record import columns  # noqa: PLC0415
+
+    sets = {title: getattr(columns, name) for title, name in _SETS}
+    missing = set(columns.EVERY) - {name for one in sets.values() for name in one}
+    if missing:
+        msg = f"docs/made/tables.py: no set has {sorted(missing)}; add it to _SETS"
+        raise LookupError(msg)
+    return "\n".join(f"### {title}\n\n{_described(found, 'dataset')}" for title, found in sets.items())
+
+
+def frame_fields() -> str:
+    """Return the cell data of a frame, one value per link."""
+    from dem.record.columns import FIELDS, MOTOR_FIELDS  # noqa: PLC0415
+
+    sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS}
+    return "\n".join(f"### {title}\n\n{_described(fields, 'field')}" for title, fields in sets.items())
+
+
+def force_fields() -> str:
+    """Return the cell data of a file of forces, one value per contact."""
+    from dem.record.columns import FORCE_FIELDS  # noqa: PLC0415
+
+    return _described(FORCE_FIELDS, "field")
+
+
+def export_fields() -> str:
+    """Return the fields of exported bodies."""
+    from postprocess.bodies.fields import FIELDS  # noqa: PLC0415
+
+    rows = [(code(field.name), cell(field.unit), f"each {field.of}", cell(field.meaning)) for field in FIELDS]
+    return table(("field", "unit", "of", "what"), rows)
+
+
+def measure_columns() -> str:
+    """Return the columns of the measures, one part per module, which says what they are."""
+    from postprocess.measures.registry import FrameMeasure, registered  # noqa: PLC0415
+
+    parts: dict[str, list[tuple[str, str, str]]] = {}
+    for measure in registered():
+        module = measure.take.func.__module__ if isinstance(measure.take, partial) else measure.take.__module__
+        if isinstance(measure, FrameMeasure):
+            of = "the last frame of each phase" if measure.costly else "each frame"
+        else:
+            of = "each phase " + ", ".join(code(name) for name in measure.phases)
+        rows = [(code(quantity.header), cell(measure.name), of) for quantity in measure.quantities]
+        parts.setdefault(module, []).extend(rows)
+    texts = []
+    for module, rows in parts.items():
+        said = (import_module(module).__doc__ or "").strip()
+        head = ("column", "measure", "taken of")
+        texts.append(f"### {module.rpartition('.')[2]}\n\n{said}\n\n{table(head, rows)}")
+    return "\n".join(texts)
+
+
+def packing_definitions() -> str:
+    """Return the definitions of the packing fraction."""
+    from postprocess.measures.packing import DEFINITIONS  # noqa: PLC0415
+
+    return table(("definition", "what it is"), [(code(name), cell(text)) for name, text in DEFINITIONS.items()])
+
+
+def command_list() -> str:
+    """Return every command in a line, linked to its help."""
+    from smarticles.main import build_parser  # noqa: PLC0415
+
+    _, commands = build_parser()
+    rows = []
+    for name, parser in commands.parsers.items():
+        summary = (parser.description or "").partition("\n")[0].rstrip(".")
+        rows.append((f"[{code(name)}](#command-{name})", cell(summary)))
+    return table(("command", "what it does"), rows)
+
+
+def command_help() -> str:
+    """Return the output of `--help`, of `smarticles` and of every command."""
+    os.environ["COLUMNS"] = _WIDTH
+    os.environ["NO_COLOR"] = "1"
+    from smarticles.main import build_parser  # noqa: PLC0415
+
+    parser, commands = build_parser()
+    texts = [("smarticles", "smarticles", parser.format_help())]
+    texts += [(name, f"smarticles {name}", found.format_help()) for name, found in commands.parsers.items()]
+    return "\n".join(f"(command-{name})=\n## {title}\n\n```text\n{text.rstrip()}\n```\n" for name, title, text in texts)
+
+
+def finding(readme: Path) -> tuple[str, str]:
+    """Return title and finding of a README: its heading, and the line quoted under it.
+
+    Raises:
+        LookupError: it does not begin with both.
+    """
+    lines = [line for line in readme.read_text(encoding="utf-8").splitlines() if line.strip()]
+    if not (len(lines) > 1 and lines[0].startswith("# ") and lines[1].startswith("> ")):
+        msg = f"{readme}: must begin with a heading, '# …', and the finding in one line with its numbers, '> …'"
+        raise LookupError(msg)
+    return lines[0].removeprefix("# "), lines[1].removeprefix("> ")
+
+
+def results_index() -> str:
+    """Return every folder of results with its finding."""
+    rows = []
+    for readme in sorted(RESULTS.glob("*/README.md")):
+        _, said = finding(readme)
+        rows.append((code(f"results/{readme.parent.name}"), said.replace("|", "\\|")))
+    return table(("folder", "what was found"), rows)

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from smarticles.command_line import Commands, add_jobs, add_scene, columns, positive_number, scene_settings
 from smarticles.commands.study import compute_and_analyse
-from smarticles.layout import columns
-from smarticles.parsing import Commands, add_engine, add_scene, add_slots, engine_settings, positive_number
 from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
-    from studies.framework.study import Study
-    from studies.ladder import Ladder, Rung
-    from templates.sweep.expand import Point
-    from templates.sweep.sweep_file import Sweep
+    from studies.ladder import Ladder
 
 
 def add(commands: Commands) -> None:
@@ -30,7 +25,7 @@ def add(commands: Commands) -> None:
         run_accuracy,
         summary="what accuracy costs in time: one scene at several settings of each knob",
         text="""
-Makes variants of a scene, each with one knob turned, several seeds each, runs them and tells errors
+Makes variants of a scene, each with one knob turned, several seeds each, runs them and prints errors
 against wall time. Knobs:
 
   time-step    time step over the stable one: 0.9, 0.45, 0.225
@@ -38,7 +33,7 @@ against wall time. Knobs:
   section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows.
                On links one, two and three strands
   restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
-  control      time between two looks of the motor control: 4e-4, 2e-4, 1e-4 s; scenes that actuate
+  control      time between two control updates of the motors: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
   fidelity     draft, standard, reference; on links also what is finer yet, converged
   engine       the named fidelities of both engines, against converged on links; only if named in --knobs
@@ -49,7 +44,7 @@ the same as none: more seeds narrow it, and the same command with more --seeds r
 
 DIR gets the runs, and results/ with table, figure and advice; its work_precision.csv is what
 `smarticles plan --max-error --table` reads. Ctrl-C stops; the same command again goes on.
-`smarticles status DIR` tells how far it is.""",
+`smarticles status DIR` shows how far it is.""",
         examples="""\
   smarticles accuracy scene.yaml --out ladder --dry-run
   smarticles accuracy scene.yaml --out ladder
@@ -58,8 +53,7 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
   smarticles accuracy scene.yaml --out ladder --analyse             what the finished runs say so far
 """,
     )
-    add_scene(accuracy)
-    add_engine(accuracy, "run the whole ladder on this engine instead of what the scene says")
+    add_scene(accuracy, "run the whole ladder on this engine instead of what the scene says")
     accuracy.add_argument("--out", type=Path, metavar="DIR", help="directory of the ladder")
     accuracy.add_argument(
         "--seeds", metavar="1,2,…", help="seeds of each setting, also as 1-20; default: 1,2,3, and 1-20 on links"
@@ -75,66 +69,15 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
         "--dry-run", action="store_true", help="show the ladder and its expected hours, write nothing"
     )
     accuracy.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
-    add_slots(accuracy)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Expanded:
-    """A ladder with its runs.
-
-    Args:
-        ladder: its rungs.
-        sweep: the sweep of it.
-        points: its runs.
-        expected_s: expected wall time of a run by setting [s].
-        seeds: of each setting.
-    """
-
-    ladder: Ladder
-    sweep: Sweep
-    points: Sequence[Point]
-    expected_s: Mapping[str, float]
-    seeds: Sequence[int]
+    add_jobs(accuracy)
 
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
-    """`smarticles accuracy`."""
-    from studies.ladder import BASE  # noqa: PLC0415
-
-    expanded = _expanded(arguments)
-    seeds = expanded.seeds
-    if not arguments.dry_run and arguments.out is None:
-        msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
-        raise InputError(msg)
-    print(_listing(expanded, len(seeds), arguments.jobs), flush=True)
-    if len(seeds) < 2:
-        print(
-            "smarticles: warning: one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3",
-            file=sys.stderr,
-        )
-    if arguments.dry_run:
-        return 0
-    folder = folder_of(expanded.sweep, expanded.points, arguments.out, arguments.command_line, extend=True)
-    ladder = expanded.ladder
-    left_out = f"; left out: {'; '.join(ladder.left_out)}" if ladder.left_out else ""
-    return compute_and_analyse(
-        folder,
-        arguments,
-        partial(_load, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
-        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
-        pictured={"setting": BASE},
-    )
-
-
-def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Study:
-    from studies.accuracy import study  # noqa: PLC0415
-
-    return study(rungs, expected_s)
-
-
-def _expanded(arguments: argparse.Namespace) -> _Expanded:
+    """Show a ladder; run and analyse it."""
     from dem.scene.reading import load_scene  # noqa: PLC0415
+    from studies.accuracy import study  # noqa: PLC0415
     from studies.ladder import (  # noqa: PLC0415
+        BASE,
         affordable,
         build_ladder,
         default_seeds,
@@ -146,22 +89,39 @@ def _expanded(arguments: argparse.Namespace) -> _Expanded:
 
     seeds = None if arguments.seeds is None else parse_seeds(arguments.seeds)
     knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
-    scene = load_scene(arguments.scene, engine_settings(arguments))
+    scene = load_scene(arguments.scene, scene_settings(arguments))
     ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
     expected_s = {setting: expected_wall_s(one) for setting, one in ladder.scenes.items()}
     if arguments.max_run_hours is not None:
         ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
     seeds = seeds or default_seeds(scene)
     sweep = ladder_sweep(scene, ladder, seeds)
-    return _Expanded(ladder=ladder, sweep=sweep, points=expand(sweep), expected_s=expected_s, seeds=seeds)
+    points = expand(sweep)
+    if not arguments.dry_run and arguments.out is None:
+        msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
+        raise InputError(msg)
+    print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
+    if len(seeds) < 2:
+        warning = "one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3"
+        print(f"smarticles: warning: {warning}", file=sys.stderr)
+    if arguments.dry_run:
+        return 0
+    folder = folder_of(sweep, points, arguments.out, arguments.command_line, extend=True)
+    left_out = f"; left out: {'; '.join(ladder.left_out)}" if ladder.left_out else ""
+    return compute_and_analyse(
+        folder,
+        arguments,
+        partial(study, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
+        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
+        pictured={"setting": BASE},
+    )
 
 
-def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
-    """The ladder as a table, and what it is expected to take."""
+def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
+    """Return the ladder as a table, and the wall time that it is expected to take."""
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
-    from templates.local.runner import slots_here  # noqa: PLC0415
 
-    ladder = expanded.ladder
     references = ladder.references()
     rows = []
     for rung in ladder.rungs:
@@ -169,13 +129,16 @@ def _listing(expanded: _Expanded, seeds: int, jobs: int | None) -> str:
         own = "reference" if references[rung.knob] == rung else ""
         section = f"{planned.strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
         shape = [planned.time_step_s, section]
-        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(expanded.expected_s[rung.setting])])
+        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(expected_s[rung.setting])])
     header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]
-    slots = min(jobs or slots_here(), len(expanded.points))
-    hours = seeds * sum(expanded.expected_s[setting] for setting in ladder.settings) / 3600
-    lines = [columns(header, rows), *(f"left out: {line}" for line in ladder.left_out)]
-    lines.append(
-        f"{len(ladder.settings)} settings × {seeds} seeds = {len(expanded.points)} runs, about {hours:.2g} h of one "
-        f"core, {hours / slots:.2g} h or more with {slots} at once"
+    runs = seeds * len(ladder.settings)
+    hours = seeds * sum(expected_s[setting] for setting in ladder.settings) / 3600
+    slots = min(jobs or usable_cores(), runs)
+    return "\n".join(
+        [
+            columns(header, rows),
+            *(f"left out: {line}" for line in ladder.left_out),
+            f"{len(ladder.settings)} settings × {seeds} seeds = {runs} runs, about {hours:.2g} h of one core, "
+            f"{hours / slots:.2g} h or more with {slots} at once",
+        ]
     )
-    return "\n".join(lines)

@@ -1,10 +1,110 @@
-"""doctor: what of the software that a run needs is installed and works."""
+"""doctor: which parts of the software are installed and work.
+
+YADE, PyVista and the other packages are tried in processes of their own, so that not even a crash of theirs ends the
+command.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import platform
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from smarticles.parsing import Commands, add_json
+from smarticles.command_line import Commands, add_json
+
+EXTRAS = {
+    **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
+    **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
+    "trimesh": "export",
+}
+"""Extra of the project that brings a module; modules that are not listed come with the project itself."""
+
+LAMMPS_TRIED = "29 Sep 2021 - Update 2"  # Debian 12's
+_TIMEOUT_S = 120
+_LEAST_GIB = 1.0  # of memory and of disk, for one run
+
+# Each prints what it found, or ends with what is wrong.
+_YADE = """
+import sys
+from dem.engine.yade.library import import_yade
+yade = import_yade()
+from yade import utils, wrapper
+scene = wrapper.Omega()
+scene.reset()
+ball = scene.bodies.append(utils.sphere((0, 0, 0), 1e-3))
+scene.engines = [wrapper.ForceResetter(), wrapper.NewtonIntegrator(damping=0, gravity=(0, 0, -9.81))]
+scene.dt = 1e-3
+scene.run(10, True)
+speed = -scene.bodies[ball].state.vel[2]
+found = f"{yade.config.version}, {yade.__path__[0]}"
+if not 0.08 < speed < 0.12:
+    sys.exit(f"{found}: a sphere falls at {speed:.3g} m/s after 0.01 s, not 0.1 m/s; see environment.md")
+print(f"{found}; a sphere falls")
+"""
+_LINKS = """
+import sys, numba
+from dem.engine.links.compiler import folder
+if numba.njit(lambda a, b: a + b)(1, 2) != 3:
+    sys.exit("Numba computes nonsense")
+kept = f"compiled code in {folder()}" if folder() else "compiled code cannot be kept"
+print(f"Numba {numba.__version__}; {kept}")
+"""
+_LAMMPS = f"""
+import sys
+from dem.engine.lammps.child import Child, lammps_version
+version = lammps_version()
+child = Child(1)
+child.send("print obeyed file obeyed")
+obeyed = (child.scratch / "obeyed").exists()
+child.close()
+if not obeyed:
+    sys.exit(f"{{version}} does not carry out a command")
+tried = {LAMMPS_TRIED!r}
+print(f"{{version}}, under mpirun" + ("" if version == tried else f"; the engine was tried with {{tried}}"))
+"""
+# A sphere before a plain background: an empty picture has no contrast.
+_PYVISTA = """
+import sys, pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
+plotter.add_mesh(pyvista.Sphere())
+contrast = plotter.screenshot(return_img=True).std()
+window = plotter.render_window.GetClassName()
+plotter.close()
+if contrast < 1:
+    sys.exit(f"{window} draws an empty picture")
+vtk = ".".join(map(str, pyvista.vtk_version_info))
+print(f"{pyvista.__version__}, VTK {vtk}; draws off-screen, {window}")
+"""
+_NEEDED = {
+    **{name: name for name in ("numpy", "scipy", "h5py", "meshio", "pydantic", "rich", "pandas")},
+    **{"yaml": "PyYAML", "jinja2": "Jinja2"},
+}
+_OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aiohttp")}, "PIL": "pillow"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What was found about one part.
+
+    Attributes:
+        found: version and place, or the cause of the failure.
+        way_out: what to do if it does not work; empty if it does.
+    """
+
+    name: str
+    ok: bool
+    needed: bool
+    found: str
+    way_out: str = ""
 
 
 def add(commands: Commands) -> None:
@@ -24,8 +124,113 @@ with the way out.""",
     add_json(doctor)
 
 
-def examine(arguments: argparse.Namespace) -> int:
-    """`smarticles doctor`."""
-    from smarticles.installation import doctor  # noqa: PLC0415
+def way_to_install(module: str) -> str:
+    """Return the command that installs a missing module."""
+    extra = EXTRAS.get(module.partition(".")[0])
+    name = f"'smarticles[{extra}]'" if extra else "smarticles"
+    return f"install it: pip install {name}, or `make setup` in the repository"
 
-    return doctor(arguments.json)
+
+def examine(arguments: argparse.Namespace) -> int:
+    """Print what is installed and works; return 0 if everything that a run needs works, otherwise 1."""
+    found = []
+    for check in checks():
+        found.append(check)
+        if not arguments.json:
+            state = "ok" if check.ok else "FAILS" if check.needed else "no"
+            print(f"{check.name:<15} {state:<5} {check.found}", flush=True)
+            if check.way_out:
+                print(f"{'':<15} {'':<5} way out: {check.way_out}", flush=True)
+    failed = [check.name for check in found if check.needed and not check.ok]
+    if arguments.json:
+        print(json.dumps({"ok": not failed, "checks": [asdict(check) for check in found]}, indent=2))
+    else:
+        print(f"a run needs what fails here: {', '.join(failed)}" if failed else "everything that a run needs works")
+    return 1 if failed else 0
+
+
+def checks() -> Iterator[Check]:
+    """Yield all checks, one after the other; they take a few seconds."""
+    yield Check(name="python", ok=True, needed=True, found=f"{platform.python_version()}, {sys.executable}")
+    links = _check("links", *_ask(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}")
+    # One engine is enough; only scenes that name the other one need that.
+    way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
+    yield _check("yade", *_ask(_YADE), way_out, needed=not links.ok)
+    yield links
+    yield _check("lammps", *_ask(_LAMMPS), "only scenes with `engine: lammps` need it; `make setup-mpi` installs it")
+    for module, name in {**_NEEDED, **_OPTIONAL}.items():
+        version = f"import {module}, importlib.metadata; print(importlib.metadata.version({name!r}))"
+        yield _check(name, *_ask(version), way_to_install(module), needed=module in _NEEDED)
+    yield _check("pyvista", *_ask(_PYVISTA), f"only pictures need it; {way_to_install('pyvista')}; see environment.md")
+    yield _check("slurm", *slurm(), "only `sweep --submit slurm` needs it; use `--submit local` on this machine")
+    cores = f"{len(os.sched_getaffinity(0))} usable of {os.cpu_count()}"
+    yield Check(name="cores", ok=True, needed=True, found=cores)
+    yield _check("memory", *memory(), f"free memory until {_LEAST_GIB:g} GiB are available", needed=True)
+    way_out = f"work in a folder that can be written and has {_LEAST_GIB:g} GiB free, or give its path with --out"
+    yield _check("disk", *disk(Path.cwd()), way_out, needed=True)
+
+
+def _check(name: str, ok: bool, found: str, way_out: str, *, needed: bool = False) -> Check:
+    return Check(name=name, ok=ok, needed=needed, found=found, way_out="" if ok else way_out)
+
+
+def slurm() -> tuple[bool, str]:
+    """Return whether Slurm's controller answers, and Slurm's version."""
+    if shutil.which("sbatch") is None or shutil.which("scontrol") is None:
+        return False, "no sbatch"
+    version = "sbatch is installed"
+    try:
+        # Without a slurm.conf even --version fails: Slurm is installed, but not set up.
+        version = _output("sbatch", "--version")
+        _output("scontrol", "ping")
+    except (OSError, subprocess.SubprocessError):
+        return False, f"{version}, its controller does not answer; try `scontrol ping`"
+    return True, f"{version}, its controller answers"
+
+
+def memory() -> tuple[bool, str]:
+    """Return whether enough memory is available for one run, and how much."""
+    lines = (line.split() for line in Path("/proc/meminfo").read_text("ascii").splitlines())
+    gib = {words[0].rstrip(":"): int(words[1]) / 2**20 for words in lines}
+    found = f"{gib['MemAvailable']:.1f} GiB available of {gib['MemTotal']:.1f} GiB"
+    return gib["MemAvailable"] >= _LEAST_GIB, found
+
+
+def disk(folder: Path) -> tuple[bool, str]:
+    """Return whether a run directory can be written in a folder, and the space that is free."""
+    free = shutil.disk_usage(folder).free / 2**30
+    found = f"{free:.1f} GiB free in {folder}"
+    try:
+        # As every file of a run is written: beside, then renamed.
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".doctor-") as scratch:
+            written = Path(scratch, "written")
+            written.write_text("whole", "ascii")
+            written.replace(Path(scratch, "renamed"))
+    except OSError as error:
+        return False, f"{found}, cannot be written: {error.strerror}"
+    return free >= _LEAST_GIB, found
+
+
+def _ask(script: str) -> tuple[bool, str]:
+    """Run a script in a process of its own; return whether it worked, and the last line of its output or errors."""
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", script],
+            check=False,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
+            stdin=subprocess.DEVNULL,
+            timeout=_TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return False, f"no answer within {_TIMEOUT_S} s"
+    if child.returncode < 0:
+        return False, f"killed by {signal.Signals(-child.returncode).name}"
+    output = child.stderr if child.returncode else child.stdout
+    return not child.returncode, (output.strip().splitlines() or [f"exit status {child.returncode}"])[-1]
+
+
+def _output(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, encoding="utf-8", timeout=10).stdout.strip()

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from dem.errors import InputError
-from smarticles.parsing import Commands
+from smarticles.command_line import Commands
 
 _FORMATS = ("vtp", "stl", "obj", "gltf", "glb")
 _LAMMPS = "lammps"
@@ -48,7 +48,7 @@ never replaced.
 
 lammps takes a scene file that begins with take-over, and writes a folder with a commented input deck: its
 poses at rest, contact law, time step, and phases relax, shake and remove-container (at once). What cannot be
-carried over is refused by name.
+carried over is rejected by name.
 
 bodies: smarticles, wall, floor, hooks, strings; crossings with --with crossings: a point and a
 direction where a link passes through another smarticle's plane; forces with --with forces: lines through
@@ -88,7 +88,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _export_scene(arguments: argparse.Namespace) -> int:
     from dem.deck import DECK, write_deck  # noqa: PLC0415
-    from smarticles.scenes import read_scene  # noqa: PLC0415
+    from smarticles.commands.run import read_scene  # noqa: PLC0415
 
     scene: Path = arguments.directory
     for name, value in (
@@ -105,23 +105,20 @@ def _export_scene(arguments: argparse.Namespace) -> int:
     try:
         write_deck(read_scene(scene, ()), folder)
     except InputError as error:
-        told = str(error)
-        msg = told if told.startswith((f"{scene}: ", "--output")) else f"{scene}: {told}"
+        msg = str(error) if str(error).startswith((f"{scene}: ", "--output")) else f"{scene}: {error}"
         raise InputError(msg) from None
     print(f"{folder}: run it there: lmp -in {DECK}")
     return 0
 
 
 def export_run(arguments: argparse.Namespace) -> int:
-    """`smarticles export`."""
+    """Export a run, or a scene for LAMMPS."""
     if arguments.to == _LAMMPS:
         return _export_scene(arguments)
     from postprocess.export import export  # noqa: PLC0415  (imports PyVista)
 
-    watched = sys.stderr.isatty()
-
-    def tell(done: int, number: int) -> None:
-        if watched and number > 1:
+    def show_progress(done: int, number: int) -> None:
+        if sys.stderr.isatty() and number > 1:
             print(f"\rframe {done} of {number}", end="\n" if done == number else "", file=sys.stderr, flush=True)
 
     written = export.export_run(
@@ -133,7 +130,7 @@ def export_run(arguments: argparse.Namespace) -> int:
         wanted=arguments.wanted,
         unwanted=arguments.unwanted,
         color_by=arguments.color_by,
-        tell=tell,
+        tell=show_progress,
     )
     print(written)
     return 0

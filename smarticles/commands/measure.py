@@ -1,10 +1,8 @@
-"""measure: tables of what came out of runs."""
+"""measure: tables of measures of runs."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import sys
 from collections.abc import Container, Sequence
 from pathlib import Path
@@ -12,9 +10,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.layout import Cell, columns
+from smarticles.command_line import Cell, Commands, add_json, add_overwrite, as_json, columns, reject_existing
 from smarticles.measuring import grouped, measured, sources
-from smarticles.parsing import Commands, add_json, add_overwrite
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,10 +19,11 @@ if TYPE_CHECKING:
 _RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
-# What every row says of itself: heading, column of the table, format, factor to the heading's unit.
-_SAID = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
-# Of single frames only: averaged over the last ones they would say nothing.
-_SHOWN_PER_FRAME = (
+_Column = tuple[str, str, str, float]
+"""Heading, column of the table, format, factor to the unit of the heading."""
+_ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
+# Of single frames only: their means over the last ones have no meaning.
+_PER_FRAME = (
     ("F [N]", "pulled string force x [N]", ".3f", 1.0),
     ("length [mm]", "chain length [m]", ".1f", 1e3),
     ("width [mm]", "chain width [m]", ".1f", 1e3),
@@ -71,7 +69,7 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:
-    """`smarticles measure`."""
+    """Print or write measures."""
     import pandas as pd  # noqa: PLC0415
 
     from dem.record.run import Run, open_run  # noqa: PLC0415
@@ -80,11 +78,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
     output: Path | None = arguments.table
     profile: Path | None = arguments.profile
-    for option, path in (("--table", output), ("--profile", profile)):
-        if path is not None and path.exists() and not arguments.overwrite:
-            # Said before measuring, not after.
-            msg = f"{option} {path}: exists; choose another name or give --overwrite"
-            raise InputError(msg)
+    reject_existing("--table", output, overwrite=arguments.overwrite)
+    reject_existing("--profile", profile, overwrite=arguments.overwrite)
     if output is not None and output == profile:
         msg = f"--profile {profile}: is the file of --table too; choose another name"
         raise InputError(msg)
@@ -105,10 +100,10 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         rings = pd.concat([profile_table(Run(directory)) for directory in directories], ignore_index=True)
         write_table(rings, profile, overwrite=arguments.overwrite)
     if arguments.json:
-        print(json.dumps(_records(table), indent=2, ensure_ascii=False))
+        print(as_json(table.to_dict("records")))
         return 0
     shown = _shown(table, per_frame=arguments.frames)
-    print(_grouped_table(table, by, shown) if by else _table(table, shown))
+    print(_text(table, by, shown))
     print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by))
     for note in () if by else _notes(table):
         print(f"note: {note}")
@@ -120,7 +115,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
 
 def _groups(arguments: argparse.Namespace) -> list[str]:
-    """Columns that --by names.
+    """Return the columns that --by names.
 
     Raises:
         InputError: it names none, or frames are wanted one by one.
@@ -137,29 +132,48 @@ def _groups(arguments: argparse.Namespace) -> list[str]:
     return names
 
 
-_Shown = tuple[str, str, str, float]
-
-
-def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Shown]:
-    """The columns worth showing: of those that a person wants to see, the ones with a value in any row."""
+def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
+    """Return the columns of short tables that have a value in any row."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
-    wanted = list(_SAID)
+    wanted = list(_ALWAYS)
     for quantity, shown in shown_quantities():
         wanted.append((shown.heading, quantity.header, shown.form, shown.factor))
         if shown.with_error:
             wanted.append(("± SE", marked(quantity.header, "SE"), shown.form, shown.factor))
-    wanted += _SHOWN_PER_FRAME if per_frame else ()
+    wanted += _PER_FRAME if per_frame else ()
     return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
 
 
+def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> str:
+    """Return the columns to be shown: of each group, or one block per run under its name."""
+    named = [*by, _RUNS] if by else []
+    rows = [
+        [
+            *(row[name] for name in named),
+            *(
+                Cell.of(row[column], form, factor) if isinstance(row[column], float | int) else str(row[column])
+                for _, column, form, factor in shown
+            ),
+        ]
+        for row in table.to_dict("records")
+    ]
+    header = [*by, "runs"] if by else []
+    lines = columns([*header, *(heading for heading, *_ in shown)], rows).splitlines()
+    if by:
+        return "\n".join(lines)
+    blocks, previous = [lines[0]], None
+    for run, line in zip(table["run"], lines[1:], strict=True):
+        blocks += [line] if run == previous else [f"{run}:", line]
+        previous = run
+    return "\n".join(blocks)
+
+
 def _notes(table: pd.DataFrame) -> list[str]:
-    """What a table shows that a person could take for a result."""
-    if "hook work [J]" not in table.columns:
-        return []
+    """Return warnings about values that could be taken for a result."""
     notes = []
-    for row in table.to_dict("records"):
+    for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
         if row["hook work [J]"] == 0 and row["hook peak force over n W_s [-]"] == 0:
             notes.append(
@@ -172,41 +186,8 @@ def _notes(table: pd.DataFrame) -> list[str]:
     return notes
 
 
-def _table(table: pd.DataFrame, shown: Sequence[_Shown]) -> str:
-    """The columns to be shown, one block per run under its name."""
-    rows = [
-        [_cell(value, form, factor) for value, (_, _, form, factor) in zip(row, shown, strict=True)]
-        for row in table[[entry[1] for entry in shown]].values.tolist()
-    ]
-    header, *lines = columns([entry[0] for entry in shown], rows).splitlines()
-    told = [header]
-    previous = None
-    for run, line in zip(table["run"], lines, strict=True):
-        if run != previous:
-            told.append(f"{run}:")
-        told.append(line)
-        previous = run
-    return "\n".join(told)
-
-
-def _grouped_table(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Shown]) -> str:
-    """The columns to be shown of each group."""
-    named = [*by, _RUNS]
-    rows = [
-        [*row[: len(named)], *(_cell(value, e[2], e[3]) for value, e in zip(row[len(named) :], shown, strict=True))]
-        for row in table[[*named, *(entry[1] for entry in shown)]].values.tolist()
-    ]
-    return columns([*by, "runs", *(entry[0] for entry in shown)], rows)
-
-
-def _cell(value: object, form: str, factor: float) -> Cell | str:
-    if not isinstance(value, float | int):
-        return str(value)
-    return Cell(f"{factor * value:{form}}" if math.isfinite(value) else "-")
-
-
 def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
-    """What the columns that are shown mean, and over what they are averaged."""
+    """Return the meaning of the columns that are shown, and the frames or runs that they are means over."""
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
     from postprocess.measures.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415
@@ -238,14 +219,3 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
         lines.append(f"widening: {QUANTITIES[WIDENING]}")
     return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
-
-
-def _records(table: pd.DataFrame) -> list[dict[str, object]]:
-    """Rows as plain data; JSON has no NaN."""
-    return [
-        {
-            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
-            for name, value in row.items()
-        }
-        for row in table.to_dict("records")
-    ]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_engine, add_json, add_scene, engine_settings, positive_number
-from smarticles.scenes import read_scene
+from smarticles.command_line import Commands, add_json, add_scene, as_json, positive_number, scene_settings
+from smarticles.commands.run import read_scene
 
 if TYPE_CHECKING:
     from dem.plan.choice import Choice
@@ -38,8 +37,7 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
   smarticles plan scene.yaml --max-hours 4
 """,
     )
-    add_scene(plan)
-    add_engine(plan, "plan it on this engine instead of what the scene says")
+    add_scene(plan, "plan it on this engine instead of what the scene says")
     plan.add_argument(
         "--max-error",
         type=positive_number,
@@ -59,15 +57,15 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
 
 
 def plan_scene(arguments: argparse.Namespace) -> int:
-    """`smarticles plan`."""
+    """Print the plan of a scene."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
-    scene = read_scene(arguments.scene, engine_settings(arguments))
+    scene = read_scene(arguments.scene, scene_settings(arguments))
     choice = _chosen(scene, arguments)
     planned = plan(scene) if choice is None else choice.planned
     if arguments.json:
         content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
-        print(json.dumps(content, indent=2, ensure_ascii=False))
+        print(as_json(content))
         return 0
     if choice is not None:
         print(f"{choice.to_text()}\n")
@@ -76,13 +74,8 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
-    """The fidelity that --max-error and --max-hours ask for; None without them."""
-    from dem.plan.choice import (  # noqa: PLC0415
-        PACKING,
-        QUANTITIES,
-        choose,
-        read_table,
-    )
+    """Return the fidelity that --max-error and --max-hours ask for; None without them."""
+    from dem.plan.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
 
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_overwrite, positive_number
+from smarticles.command_line import Commands, add_overwrite, positive_number
 
 _PICTURE_SUFFIX = ".png"
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
@@ -28,7 +28,7 @@ def add(commands: Commands) -> None:
         text="""
 Draws the true boxes of all smarticles in a cylinder that is cut open in front, with hooks, strings and a
 bar for the scale. Needs no display. The end of the output's name decides: .png is a picture; .gif, .webp
-and .mp4 are films, which play at one speed and tell it.""",
+and .mp4 are films, which play at one speed and show it.""",
         examples="""\
   smarticles render runs/a                                   last frame, runs/a/render.png
   smarticles render runs/a --time 1.5 --color-by speed --output shaken.png
@@ -89,61 +89,46 @@ and .mp4 are films, which play at one speed and tell it.""",
 
 
 def render_run(arguments: argparse.Namespace) -> int:
-    """`smarticles render`."""
+    """Draw a picture or a film."""
     output: Path | None = arguments.output
     film = output is not None and output.suffix in _FILM_SUFFIXES
     if output is not None and not film and output.suffix != _PICTURE_SUFFIX:
         kinds = f"{_PICTURE_SUFFIX} for a picture, {', '.join(_FILM_SUFFIXES)} for a film"
         msg = f"--output {output}: {output.suffix!r} is no kind of file that is drawn here; end the name in {kinds}"
         raise InputError(msg)
-    _refuse_what_has_no_meaning(arguments, film=film)
+    for name, option in (_OF_PICTURES if film else _OF_FILMS).items():
+        value = getattr(arguments, name)
+        if value is not None:
+            way_out = "a picture shows one time; use --time, or write a film: --output film.gif"
+            if film:
+                why = "a film shows all times" if name == "time" else "is drawn alone, in a picture"
+                way_out = f"{why}; leave it out, or write .png"
+            msg = f"{option} {value:g}: {way_out}"
+            raise InputError(msg)
     from postprocess.pictures import render  # noqa: PLC0415  (imports PyVista)
 
-    look: dict[str, Any] = {
+    options: dict[str, Any] = {
         "color_by": arguments.color_by,
         "view": arguments.view,
         "limits": arguments.clim,
         "compare": arguments.compare,
         "forces": arguments.forces,
         "overwrite": arguments.overwrite,
+        **({"size": arguments.size} if arguments.size else {}),
+        **({"frames_per_second": arguments.fps} if arguments.fps else {}),
     }
-    if arguments.size is not None:
-        look["size"] = arguments.size
     if film:
-        if arguments.fps is not None:
-            look["frames_per_second"] = arguments.fps
-        written = render.render_film(
-            arguments.directory,
-            output,
-            start=arguments.start,
-            end=arguments.end,
-            every=arguments.every,
-            track=_track if sys.stderr.isatty() else None,
-            **look,
-        )
+        track = _track if sys.stderr.isatty() else None
+        span = {"start": arguments.start, "end": arguments.end, "every": arguments.every}
+        print(render.render_film(arguments.directory, output, track=track, **span, **options))
     else:
-        written = render.render_run(
-            arguments.directory, output=output, time=arguments.time, smarticle=arguments.smarticle, **look
-        )
-    print(written)
+        one = {"time": arguments.time, "smarticle": arguments.smarticle}
+        print(render.render_run(arguments.directory, output=output, **one, **options))
     return 0
 
 
-def _refuse_what_has_no_meaning(arguments: argparse.Namespace, *, film: bool) -> None:
-    for name, option in (_OF_PICTURES if film else _OF_FILMS).items():
-        value = getattr(arguments, name)
-        if value is None:
-            continue
-        if film:
-            why = "a film shows all times" if name == "time" else "is drawn alone, in a picture"
-            msg = f"{option} {value:g}: {why}; leave it out, or write .png"
-        else:
-            msg = f"{option} {value:g}: a picture shows one time; use --time, or write a film: --output film.gif"
-        raise InputError(msg)
-
-
 def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
-    """Show a bar on the terminal, gone when the film is done."""
+    """Show a bar on the terminal until the film is done."""
     from rich.console import Console  # noqa: PLC0415  (costs a tenth of a second)
     from rich.progress import track  # noqa: PLC0415
 
@@ -151,7 +136,7 @@ def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
 
 
 def _limits(text: str) -> tuple[float, float] | str:
-    """Two numbers in order, or run."""
+    """Read two numbers in order, or run."""
     if text == "run":
         return text
     low, _, high = text.partition(":")
@@ -166,7 +151,7 @@ def _limits(text: str) -> tuple[float, float] | str:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """One side of a square, or two."""
+    """Read one side of a square, or two."""
     width, _, height = text.partition("x")
     try:
         size = int(width), int(height or width)

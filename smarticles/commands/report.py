@@ -1,4 +1,4 @@
-"""report: one page that tells everything of a run, a sweep or a study."""
+"""report: one page of everything about a run, a sweep or a study."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 
 from dem.errors import InputError
-from smarticles.parsing import Commands, add_overwrite, add_slots
+from dem.record.names import MANIFEST, OF_SWEEP
+from smarticles.command_line import Commands, add_jobs, add_overwrite
 
 
 def add(commands: Commands) -> None:
@@ -31,15 +32,16 @@ repeat it. The file holds all that it shows: it can be sent, kept, and opened wi
     report.add_argument(
         "--accuracy", type=Path, metavar="FILE.csv", help="measured errors of fidelities; default: those that ship"
     )
-    add_slots(report)
+    add_jobs(report)
     add_overwrite(report)
 
 
 def write_report(arguments: argparse.Namespace) -> int:
-    """`smarticles report`."""
+    """Write the page."""
     from postprocess.report.figures import refuse_to_overwrite, whole_file  # noqa: PLC0415
 
-    output: Path = arguments.output or arguments.directory / "report.html"
+    directory: Path = arguments.directory
+    output: Path = arguments.output or directory / "report.html"
     if output.suffix != ".html":
         msg = f"--output {output}: a report is HTML; let its name end in .html"
         raise InputError(msg)
@@ -48,28 +50,36 @@ def write_report(arguments: argparse.Namespace) -> int:
     if arguments.output is not None and not output.parent.is_dir():
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg)
-    _refuse_what_is_no_table(arguments.accuracy)
-    from smarticles.reporting.kinds import page_of  # noqa: PLC0415  (pandas, matplotlib, PyVista)
-    from smarticles.reporting.page import to_html  # noqa: PLC0415
+    if arguments.accuracy is not None:
+        from dem.plan.choice import QUANTITIES, read_table  # noqa: PLC0415
 
-    text = to_html(page_of(arguments.directory, table=arguments.accuracy, jobs=arguments.jobs))
+        try:
+            read_table(arguments.accuracy, of=tuple(QUANTITIES))
+        except InputError as error:
+            raise InputError(str(error).replace("--table", "--accuracy")) from None
+    text = _page(directory, arguments.accuracy, arguments.jobs)
     with whole_file(output, overwrite=arguments.overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(f"{output}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser")
     return 0
 
 
-def _refuse_what_is_no_table(table: Path | None) -> None:
-    """A table that was asked for is on the page; of the one that ships the page says why it is not there.
+def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
+    """Return the page of a run, a sweep, a study, or the results of a study.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the directory is none of these, or a file of it is damaged.
     """
-    if table is None:
-        return
-    from dem.plan.choice import QUANTITIES, read_table  # noqa: PLC0415
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
+    from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
+    from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
+    from templates.sweep.folder import open_folder  # noqa: PLC0415
 
-    try:
-        read_table(table, of=tuple(QUANTITIES))
-    except InputError as error:
-        raise InputError(str(error).replace("--table", "--accuracy")) from None
+    if (directory / OF_SWEEP).is_file():
+        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores())
+    if (directory / MANIFEST).is_file():
+        return run_page(directory, accuracy)
+    if (directory / PROVENANCE).is_file():
+        return results_page(directory)
+    msg = f"{directory}: is no run, sweep or study, nor the results of one; give what `smarticles run` or `sweep` made"
+    raise InputError(msg)

@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 from dem.errors import InputError
-from smarticles.parsing import Commands
+from smarticles.command_line import Commands
 from smarticles.starters import KINDS, about, starter
 
 

@@ -1,25 +1,23 @@
-"""status: what is done, running, failed, missing."""
+"""status: which runs are done, running, failed, missing."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
-from smarticles.layout import columns
-from smarticles.parsing import Commands, add_json, positive_number
+from dem.record.names import MANIFEST, OF_SWEEP
+from smarticles.command_line import Commands, add_json, as_json, columns, positive_number
 
 if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
 
-_GOING_ON = ("running", "queued")
 _EVERY_S = 2.0
-_ENDED_EARLY = ("failed", "interrupted", "stopped")
 
 
 def add(commands: Commands) -> None:
@@ -29,7 +27,7 @@ def add(commands: Commands) -> None:
         show_status,
         summary="what is done, running, failed, missing",
         text="""
-From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was told to
+From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was asked to
 stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it. `simulated s` is how far a
 run came, `checkpoint s` from where it would go on.""",
         examples="""\
@@ -44,134 +42,128 @@ run came, `checkpoint s` from where it would go on.""",
     status.add_argument(
         "--watch",
         action="store_true",
-        help="look again and again until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
+        help="check again and again until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
     )
     status.add_argument(
-        "--every", type=positive_number, metavar="S", help="with --watch: seconds between looks; default: 2"
+        "--every", type=positive_number, metavar="S", help="with --watch: seconds between checks; default: 2"
     )
     add_json(status)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Look:
-    """What was seen of a directory at one moment."""
+def show_status(arguments: argparse.Namespace) -> int:
+    """Print the state of a directory, once or again and again."""
+    directory: Path = arguments.directory
+    if arguments.json and arguments.watch:
+        msg = "--watch: is for a person; leave it out with --json"
+        raise InputError(msg)
+    if arguments.every is not None and not arguments.watch:
+        msg = f"--every {arguments.every:g}: is how often --watch checks; add --watch"
+        raise InputError(msg)
+    if arguments.watch:
+        _watch(directory, arguments.every or _EVERY_S)
+    elif arguments.json:
+        state = _state(directory)
+        runs = [run.to_dict() for run in state.runs]
+        content = {"name": state.name, "counts": state.counts, "queue": state.queue, "runs": runs}
+        print(as_json({"directory": str(directory), **content}))
+    else:
+        print(_state(directory))
+    return 0
+
+
+@dataclass(frozen=True)
+class _State:
+    """A directory at one moment."""
 
     name: str
-    runs: list[RunStatus]
-    queue: dict[str, object] | None
+    runs: Sequence[RunStatus]
+    queue: dict[str, Any] | None = None
 
     @property
     def counts(self) -> dict[str, int]:
-        from templates.sweep.folder import count_states  # noqa: PLC0415
-
-        return count_states(self.runs)
+        return dict(Counter(run.state for run in self.runs))
 
     @property
     def goes_on(self) -> bool:
-        return any(run.state in _GOING_ON for run in self.runs)
+        return any(run.state in ("running", "queued") for run in self.runs)
 
-    def to_text(self) -> str:
-        lines = [_status_table(self.runs)]
+    def __str__(self) -> str:
+        lines = [_table(self.runs)]
         if self.queue is not None and self.queue["error"]:
             lines.append(f"{self.queue['error']}; the states are those of the run directories alone")
         counted = ", ".join(f"{n} {state}" for state, n in self.counts.items())
         return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counted}"])
 
-    def to_dict(self) -> dict[str, Any]:
-        return {
-            "name": self.name,
-            "counts": self.counts,
-            "queue": self.queue,
-            "runs": [run.to_dict() for run in self.runs],
-        }
 
+def _state(directory: Path) -> _State:
+    from templates.slurm.submission import QueueError, merged, submissions, tasks_of_runs  # noqa: PLC0415
+    from templates.sweep.folder import open_folder, run_status  # noqa: PLC0415
 
-def show_status(arguments: argparse.Namespace) -> int:
-    """`smarticles status`."""
-    directory: Path = arguments.directory
-    if arguments.json:
-        if arguments.watch:
-            msg = "--watch: is for a person; leave it out with --json"
-            raise InputError(msg)
-        print(json.dumps({"directory": str(directory), **_look(directory).to_dict()}, indent=2, ensure_ascii=False))
-        return 0
-    if arguments.watch:
-        return _watch(directory, arguments.every or _EVERY_S)
-    if arguments.every is not None:
-        msg = f"--every {arguments.every:g}: is how often --watch looks; add --watch"
-        raise InputError(msg)
-    print(_look(directory).to_text())
-    return 0
-
-
-def _look(directory: Path) -> _Look:
-    from templates.sweep.folder import MANIFEST, open_folder, run_status  # noqa: PLC0415
-
-    if (directory / "run.json").is_file() and not (directory / MANIFEST).exists():
-        return _Look(name=directory.name, runs=[run_status(directory)], queue=None)
+    if (directory / MANIFEST).is_file() and not (directory / OF_SWEEP).exists():
+        return _State(directory.name, [run_status(directory)])
     folder = open_folder(directory)
-    runs, queue = _with_queue(folder.status(), directory)
-    return _Look(name=folder.name, runs=runs, queue=queue)
+    runs, submitted = folder.status(), submissions(directory)
+    if not submitted:
+        return _State(folder.name, runs)
+    queue: dict[str, Any] = {"jobs": [one.job_id for one in submitted if one.job_id is not None], "error": None}
+    try:
+        tasks = tasks_of_runs(submitted)
+    except QueueError as error:
+        return _State(folder.name, runs, {**queue, "error": str(error), "tasks": {}})
+    states = Counter({task.label: task.slurm_state for task in tasks.values()}.values())
+    runs = [merged(run, tasks.get(run.name)) for run in runs]
+    return _State(folder.name, runs, {**queue, "tasks": dict(sorted(states.items()))})
 
 
-def _watch(directory: Path, every: float) -> int:
-    """Look again and again until nothing goes on; a terminal shows the newest look, a pipe those that differ."""
+def _watch(directory: Path, every: float) -> None:
+    """Check until nothing goes on; a terminal shows the newest state, a pipe those that differ."""
     from rich.console import Console  # noqa: PLC0415
     from rich.live import Live  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
     console = Console(soft_wrap=True)
-    look = _look(directory)
+    # Text, not markup: names of runs are data. What does not fit is cut while it is live, and whole at the end.
+    live = Live(console=console, auto_refresh=False, vertical_overflow="ellipsis") if console.is_terminal else None
+    printed = ""
     try:
-        if not console.is_terminal:
-            told = ""
-            while True:
-                if (text := look.to_text()) != told:
-                    print(text, flush=True)
-                told = text
-                if not look.goes_on:
-                    return 0
-                time.sleep(every)
-                look = _look(directory)
-        # Text, not markup: names of runs are data. What does not fit is cut while it is live, and whole at the end.
-        with Live(Text(look.to_text()), console=console, auto_refresh=False, vertical_overflow="ellipsis") as live:
-            while look.goes_on:
-                time.sleep(every)
-                look = _look(directory)
-                live.update(Text(look.to_text()), refresh=True)
-            live.vertical_overflow = "visible"
+        if live:
+            live.start()
+        while True:
+            state = _state(directory)
+            text = str(state)
+            if live:
+                live.update(Text(text), refresh=True)
+            elif text != printed:
+                print(text, flush=True)
+            printed = text
+            if not state.goes_on:
+                return
+            time.sleep(every)
     except KeyboardInterrupt:
-        # The way in which a watch ends; the runs are other processes.
-        return 0
-    return 0
+        return  # the way in which a watch ends; the runs are other processes
+    finally:
+        if live:
+            live.vertical_overflow = "visible"
+            live.stop()
 
 
-def _with_queue(runs: list[RunStatus], directory: Path) -> tuple[list[RunStatus], dict[str, object] | None]:
-    """States with what the queue says, and how that went; None where nothing was submitted."""
-    from templates.slurm.queue import QueueError  # noqa: PLC0415
-    from templates.slurm.submission import merged, plain, submissions, tasks_of_runs  # noqa: PLC0415
-
-    found = submissions(directory)
-    if not found:
-        return runs, None
-    jobs = [one.job_id for one in found if one.job_id is not None]
-    try:
-        tasks = tasks_of_runs(found)
-    except QueueError as error:
-        return runs, {"jobs": jobs, "error": str(error), "tasks": {}}
-    return [merged(run, tasks.get(run.name)) for run in runs], {"jobs": jobs, "error": None, "tasks": plain(tasks)}
-
-
-def _status_table(runs: Sequence[RunStatus]) -> str:
-    header = ["run", "state", "phase", "simulated s", "wall s", "cause"]
-    rows = [[run.name, run.state, run.phase or "", run.time_s, run.wall_s, run.cause or ""] for run in runs]
-    if any(run.state in _ENDED_EARLY for run in runs):
-        # What was computed after it is computed again.
-        header.insert(4, "checkpoint s")
-        for row, run in zip(rows, runs, strict=True):
-            row.insert(4, run.checkpoint_s if run.state in _ENDED_EARLY else None)
-    if any(run.job for run in runs):
-        header.insert(2, "job")
-        for row, run in zip(rows, runs, strict=True):
-            row.insert(2, run.job or "")
+def _table(runs: Sequence[RunStatus]) -> str:
+    early = any(run.state in ("failed", "interrupted", "stopped") for run in runs)
+    queued = any(run.job for run in runs)
+    header = ["run", "state", *(["job"] if queued else []), "phase", "simulated s"]
+    header += [*(["checkpoint s"] if early else []), "wall s", "cause"]
+    rows = [
+        [
+            run.name,
+            run.state,
+            *([run.job or ""] if queued else []),
+            run.phase or "",
+            run.time_s,
+            # What was computed after it is computed again.
+            *([run.checkpoint_s if run.state in ("failed", "interrupted", "stopped") else None] if early else []),
+            run.wall_s,
+            run.cause or "",
+        ]
+        for run in runs
+    ]
     return columns(header, rows)

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.layout import columns, told_results
-from smarticles.parsing import Commands, add_engine, add_slots
-from smarticles.sweeps import changed_sweep, compute, make_folder, refuse_failures
+from smarticles.command_line import Commands, add_engine, add_jobs, columns
+from smarticles.measuring import follows
+from smarticles.sweeps import changed_sweep, compute, folder_of, raise_failures
 from studies import registry
 
 if TYPE_CHECKING:
     from studies.framework.runs import MeasuredRun
-    from studies.framework.study import Report, Study
+    from studies.framework.study import Study
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
-
 
 _ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in registry.STUDIES.items())
 
@@ -34,7 +33,7 @@ def add(commands: Commands) -> None:
         + """
 
 DIR gets the runs, and results/ with tables, figures and a picture of one run. Ctrl-C stops; the
-same command again goes on where it stopped. `smarticles status DIR` tells how far it is, and
+same command again goes on where it stopped. `smarticles status DIR` shows how far it is, and
 --analyse shows what the finished runs say, also while the others are being computed.""",
         examples="""\
   smarticles study gravish --quick --out demo
@@ -61,24 +60,33 @@ same command again goes on where it stopped. `smarticles status DIR` tells how f
         help="results of an earlier analysis: runs of the same scenes in its tables are not computed again",
     )
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
-    add_slots(study)
+    add_jobs(study)
 
 
 def run_study(arguments: argparse.Namespace) -> int:
-    """`smarticles study`."""
+    """Run a shipped study, then analyse it."""
+    from templates.sweep.expand import expand  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
+
     shipped = registry.shipped(arguments.name)
     file = registry.study_file(arguments.name, quick=arguments.quick)
-    changed = _changed(arguments.name, file, arguments.fidelity)
-    if arguments.engine is not None:
-        _refuse_engine(arguments.name, file, arguments.engine)
-    folder = make_folder(file, arguments.out, arguments.command_line, changed, engine=arguments.engine)
-    note = _note(arguments.name, file, changed, arguments.engine)
+    constants = {} if arguments.fidelity is None else _fidelity(arguments.name, file, arguments.fidelity)
+    try:
+        sweep = changed_sweep(file, constants, arguments.engine)
+        points = expand(sweep)
+    except InputError as error:
+        if arguments.engine is None:
+            raise
+        msg = f"--engine {arguments.engine}: study {arguments.name} cannot be run on it ({error}); leave --engine out"
+        raise InputError(msg) from None
+    folder = folder_of(sweep, points, arguments.out, arguments.command_line)
+    lines = differences(points, expand(load_sweep(registry.study_file(arguments.name))))
+    note = f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
     print(note, flush=True)
-    load = shipped.load
-    earlier = _earlier(arguments.earlier, folder, load)
+    earlier = {} if arguments.earlier is None else _earlier(arguments.earlier, folder, shipped.load())
     if earlier:
         note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"
-    return compute_and_analyse(folder, arguments, load, note=note, pictured=shipped.pictured, earlier=earlier)
+    return compute_and_analyse(folder, arguments, shipped.load, note=note, pictured=shipped.pictured, earlier=earlier)
 
 
 def compute_and_analyse(
@@ -88,9 +96,9 @@ def compute_and_analyse(
     *,
     note: str,
     pictured: Mapping[str, object],
-    earlier: Mapping[str, MeasuredRun] | None = None,
+    earlier: Mapping[str, MeasuredRun] = MappingProxyType({}),
 ) -> int:
-    """Run what a sweep is missing unless --analyse says not to, then say what the finished runs say.
+    """Run what a sweep is missing unless --analyse forbids it, then analyse the finished runs.
 
     Args:
         folder: the sweep's directory.
@@ -104,7 +112,6 @@ def compute_and_analyse(
         InputError: no run is finished and none is to be started.
         RunError: a run failed.
     """
-    earlier = earlier or {}
     needed = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
@@ -116,138 +123,13 @@ def compute_and_analyse(
         # All runs: those that are not done are listed as missing in every table.
         runs = [folder.run(entry) for entry in folder.entries]
         report = load().analyse(runs, results, note=note, command=arguments.command_line, earlier=earlier)
-        print(told_report(report))
-        sys.stdout.flush()
+        figures = [f"figure: {path}" for path in report.files.values() if path.suffix == ".png"]
+        origin = f"tables, and the origin of every number: {report.output}"
+        print(columns(report.header, report.rows), "", *report.told, "", *figures, origin, sep="\n", flush=True)
         _draw(folder, finished, pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
-    refuse_failures(folder, outcomes)
+    raise_failures(folder, outcomes)
     return 0
-
-
-def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study]) -> Mapping[str, MeasuredRun]:
-    """The runs of a sweep that an earlier analysis measured.
-
-    Raises:
-        InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
-    """
-    if results is None:
-        return {}
-    study = load()
-    if not study.from_tables:
-        msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
-        raise InputError(msg)
-    from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
-
-    wanted = {
-        entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
-    }
-    return earlier_runs(results, wanted)
-
-
-def told_report(report: Report) -> str:
-    """What a study says at the terminal."""
-    return told_results(columns(report.header, report.rows), report.told, report.files, report.output)
-
-
-def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:
-    """Constants of the study that the command line changes.
-
-    Raises:
-        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
-    """
-    from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
-    from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
-
-    if fidelity is None:
-        return {}
-    if fidelity not in FIDELITIES:
-        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
-        raise InputError(msg)
-    sweep, changed = load_sweep(file), {"fidelity": fidelity}
-    shipped = sweep.content.constants.get("fidelity")
-    if shipped == fidelity:
-        return changed
-    try:
-        changes_all = shipped is not None and not _scenes(expand(with_constants(sweep, changed))) & _scenes(
-            expand(sweep)
-        )
-    except InputError as error:
-        msg = f"--fidelity {fidelity}: study {name} cannot be run at it ({error}); leave --fidelity out"
-        raise InputError(msg) from None
-    if not changes_all:
-        msg = f"--fidelity {fidelity}: study {name} sets the fidelity of its runs itself; leave --fidelity out"
-        raise InputError(msg)
-    return changed
-
-
-def _refuse_engine(name: str, file: Path, engine: str) -> None:
-    """Refuse an engine that a study's scenes are not valid on.
-
-    Raises:
-        InputError: there is one.
-    """
-    from templates.sweep.expand import expand  # noqa: PLC0415
-
-    try:
-        expand(changed_sweep(file, {}, engine=engine))
-    except InputError as error:
-        msg = f"--engine {engine}: study {name} cannot be run on it ({error}); leave --engine out"
-        raise InputError(msg) from None
-
-
-def _scenes(points: Sequence[Point]) -> set[str]:
-    return {point.scene_sha256 for point in points}
-
-
-def _note(name: str, file: Path, changed: Mapping[str, str], engine: str | None) -> str:
-    """How what is run differs from the full study as it ships, one line."""
-    from templates.sweep.expand import expand  # noqa: PLC0415
-    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
-
-    here = expand(changed_sweep(file, changed, engine=engine))
-    lines = differences(here, expand(load_sweep(registry.study_file(name))))
-    return f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
-
-
-def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
-    """Say how a quick variant differs from the full study, found from the points themselves.
-
-    Returns:
-        Lines such as `9 runs instead of 24`, `l_over_w: only 0.4, 0.7 of 0.4, 0.5, 0.7` (what is
-        left out), `shake_s: 1.5 instead of 5.0` (what differs in the runs that both have), and `draws: 3` or
-        `draws: not there` of a variable that only one of them knows.
-    """
-    lines = [] if len(quick) == len(full) else [f"{len(quick)} runs instead of {len(full)}"]
-    twins = {point.name: point for point in full}
-    both = [(point, twins[point.name]) for point in quick if point.name in twins]
-    told: list[str] = []
-    for name in dict.fromkeys([*full[0].values, *quick[0].values]):
-        if not (name in full[0].values and name in quick[0].values):
-            lines.append(f"{name}: {_distinct(quick, name) or 'not there'}")
-            continue
-        some, every = _distinct(quick, name), _distinct(full, name)
-        changed = [pair for pair in both if pair[0].values[name] != pair[1].values[name]]
-        if changed:
-            here, there = (_distinct([pair[k] for pair in changed], name) for k in (0, 1))
-            lines.append(f"{name}: {here} instead of {there}")
-        elif some != every and not any(_follows(name, other, full) for other in told):
-            told.append(name)
-            lines.append(f"{name}: only {some} of {every}")
-    return lines
-
-
-def _distinct(points: Sequence[Point], name: str) -> str:
-    values = list(dict.fromkeys(point.values[name] for point in points if name in point.values))
-    if all(isinstance(value, int | float) for value in values):
-        values.sort()
-    return ", ".join(map(str, values))
-
-
-def _follows(name: str, other: str, points: Sequence[Point]) -> bool:
-    """Whether a variable is settled by another one, as the columns of a table are by its first."""
-    seen: dict[str, object] = {}
-    return all(seen.setdefault(str(point.values[other]), point.values[name]) == point.values[name] for point in points)
 
 
 def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:
@@ -260,3 +142,84 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
             render_run(folder.run(entry), output=output, overwrite=True)
             print(f"picture of {entry.name}: {output}")
             return
+
+
+def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
+    """Return the runs of a sweep that an earlier analysis measured.
+
+    Raises:
+        InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
+    """
+    from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
+
+    if not study.from_tables:
+        msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
+        raise InputError(msg)
+    wanted = {
+        entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
+    }
+    return earlier_runs(results, wanted)
+
+
+def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
+    """Return the constant of a study that --fidelity changes.
+
+    Raises:
+        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
+    """
+    from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
+    from templates.sweep.expand import expand  # noqa: PLC0415
+    from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
+
+    if fidelity not in FIDELITIES:
+        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
+        raise InputError(msg)
+    sweep, changed = load_sweep(file), {"fidelity": fidelity}
+    shipped = sweep.content.constants.get("fidelity")
+    if shipped == fidelity:
+        return changed
+    try:
+        scenes = [{point.scene_sha256 for point in expand(s)} for s in (sweep, with_constants(sweep, changed))]
+    except InputError as error:
+        if shipped is not None:
+            msg = f"--fidelity {fidelity}: study {name} cannot be run at it ({error}); leave --fidelity out"
+            raise InputError(msg) from None
+        scenes = []
+    if not scenes or scenes[0] & scenes[1]:
+        msg = f"--fidelity {fidelity}: study {name} sets the fidelity of its runs itself; leave --fidelity out"
+        raise InputError(msg)
+    return changed
+
+
+def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
+    """Return how a quick variant differs from the full study, found from the points themselves.
+
+    Returns:
+        Lines such as `9 runs instead of 24`, `l_over_w: only 0.4, 0.7 of 0.4, 0.5, 0.7` (what is
+        left out), `shake_s: 1.5 instead of 5.0` (what differs in the runs that both have), and `draws: 3` or
+        `draws: not there` of a variable that only one of them has.
+    """
+    lines = [] if len(quick) == len(full) else [f"{len(quick)} runs instead of {len(full)}"]
+    twins = {point.name: point for point in full}
+    both = [(point, twins[point.name]) for point in quick if point.name in twins]
+    listed: list[str] = []
+    for name in dict.fromkeys([*full[0].values, *quick[0].values]):
+        if not (name in full[0].values and name in quick[0].values):
+            lines.append(f"{name}: {_distinct(quick, name) or 'not there'}")
+            continue
+        some, every = _distinct(quick, name), _distinct(full, name)
+        changed = [pair for pair in both if pair[0].values[name] != pair[1].values[name]]
+        if changed:
+            here, there = (_distinct([pair[k] for pair in changed], name) for k in (0, 1))
+            lines.append(f"{name}: {here} instead of {there}")
+        elif some != every and not any(follows(name, other, [point.values for point in full]) for other in listed):
+            listed.append(name)
+            lines.append(f"{name}: only {some} of {every}")
+    return lines
+
+
+def _distinct(points: Sequence[Point], name: str) -> str:
+    values = list(dict.fromkeys(point.values[name] for point in points if name in point.values))
+    if all(isinstance(value, int | float) for value in values):
+        values.sort()
+    return ", ".join(map(str, values))

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles import queueing
-from smarticles.layout import columns
-from smarticles.parsing import Commands, add_engine, add_slots, positive_int
-from smarticles.sweeps import changed_sweep, complete_and_tell, expected_wall_s, make_folder
+from dem.record.names import OF_SWEEP
+from smarticles import sweeps
+from smarticles.command_line import Commands, add_engine, add_jobs, columns, positive_int
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -45,7 +44,7 @@ def add(commands: Commands) -> None:
         "sweep",
         run_sweep,
         summary="make run directories from a template, and start the runs if asked to",
-        text=_FILE_HELP + "\n" + queueing.HELP,
+        text=_FILE_HELP + "\n" + sweeps.CLUSTER_HELP,
         examples="""\
   smarticles sweep friction.yaml --dry-run
   smarticles sweep friction.yaml --out friction               write the scenes, start nothing
@@ -64,44 +63,36 @@ def add(commands: Commands) -> None:
     )
     sweep.add_argument("--dry-run", action="store_true", help="list the runs and show the job script, write nothing")
     sweep.add_argument(
-        "--max-points", type=positive_int, metavar="N", help="refuse a sweep of more runs; default: 10000"
+        "--max-points", type=positive_int, metavar="N", help="reject a sweep of more runs; default: 10000"
     )
     add_engine(sweep, "all runs on this engine: its constant `engine` is set to it")
-    add_slots(sweep)
-    queueing.add_options(sweep)
+    add_jobs(sweep)
+    sweeps.add_cluster_options(sweep)
 
 
 def run_sweep(arguments: argparse.Namespace) -> int:
-    """`smarticles sweep`."""
-    from templates.slurm.queue import require_sbatch  # noqa: PLC0415
+    """Expand a sweep; list, write, run or submit its runs."""
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
 
-    sweep = changed_sweep(arguments.sweep, {}, engine=arguments.engine)
+    sweep = sweeps.changed_sweep(arguments.sweep, engine=arguments.engine)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
-    queue = queueing.wants_queue(arguments)
+    queue = sweeps.wants_queue(arguments)
+    # Rendered before anything is written, so that a request which is rejected leaves nothing behind.
+    draft = _draft(sweep.content.name, points, arguments) if queue else None
     if arguments.dry_run:
         print(_listing(points))
-        if queue:
-            print(queueing.show(_draft(sweep.content.name, points, arguments)))
+        if draft is not None:
+            place = f"jobs/{draft.submission.number}"
+            print(f"{draft.request.to_text()}\n\n--- {place}/runs.txt\n{draft.run_list}")
+            print(f"--- {place}/array.sh\n{draft.script}")
         return 0
+    folder = sweeps.folder_of(sweep, points, _place(arguments), arguments.command_line)
     if queue:
-        if arguments.submit == "slurm":
-            require_sbatch()
-        # Renders all and throws it away: what is refused is refused before anything is written.
-        _draft(sweep.content.name, points, arguments)
-    folder = make_folder(
-        arguments.sweep,
-        _place(arguments),
-        arguments.command_line,
-        engine=arguments.engine,
-        max_points=arguments.max_points,
-    )
-    if queue:
-        return queueing.enqueue(folder, arguments)
+        return sweeps.enqueue(folder, arguments)
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
         return 0
-    return complete_and_tell(folder, arguments)
+    return sweeps.complete_here(folder, arguments)
 
 
 def _place(arguments: argparse.Namespace) -> Path:
@@ -113,9 +104,9 @@ def _place(arguments: argparse.Namespace) -> Path:
 
 
 def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
-    """What would be submitted: all runs of a new sweep, what is missing of one that is there."""
+    """Render the submission of all runs of a new sweep, or of what is missing of one that is there."""
     from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
-    from templates.sweep.folder import MANIFEST, Entry, open_folder  # noqa: PLC0415
+    from templates.sweep.folder import entry_of, open_folder  # noqa: PLC0415
 
     out = _place(arguments)
     if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
@@ -124,31 +115,21 @@ def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) ->
             "--engine lammps"
         )
         raise InputError(msg)
-    entries = [
-        Entry(
-            name=point.name,
-            scene_sha256=point.scene_sha256,
-            expected_s=expected_wall_s(point.scene),
-            values=point.values,
-        )
-        for point in points
-    ]
-    if (out / MANIFEST).exists():
-        missing = to_submit(open_folder(out), tasks_of_runs(submissions(out)))
-        # Nothing to submit: the limits are looked at for all runs.
-        entries = missing or entries
-    return queueing.draft_of(out, name, entries, arguments)
+    entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
+    if (out / OF_SWEEP).exists():
+        # Where nothing is missing, the limits are checked for all runs.
+        entries = to_submit(open_folder(out), tasks_of_runs(submissions(out))) or entries
+    return sweeps.draft_of(out, name, entries, arguments)
 
 
 def _listing(points: Sequence[Point]) -> str:
-    from templates.local.display import duration  # noqa: PLC0415
+    from templates.local import duration  # noqa: PLC0415
 
-    expected = [expected_wall_s(point.scene) for point in points]
+    expected = [sweeps.expected_wall_s(point.scene) for point in points]
     names = list(points[0].values)
-    header = ["run", *names, "expected wall s"]
     rows = [
         [point.name, *(point.values[name] for name in names), round(wall)]
         for point, wall in zip(points, expected, strict=True)
     ]
     total = f"{len(points)} runs, about {duration(sum(expected))} of one core"
-    return f"{columns(header, rows)}\n{total}"
+    return f"{columns(['run', *names, 'expected wall s'], rows)}\n{total}"

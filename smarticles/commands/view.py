@@ -8,8 +8,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from dem.errors import InputError
-from smarticles.parsing import Commands
+from smarticles.command_line import Commands
 
 
 def add(commands: Commands) -> None:
@@ -19,7 +18,7 @@ def add(commands: Commands) -> None:
         view_run,
         summary="look around in a run, in a page of the browser",
         text="""
-Serves a page on this machine alone, for whoever has the address that is printed: it holds a token. Turn
+Serves a page on this machine alone, at an address that is printed: it holds a token. Turn
 with the mouse, move in time, colour by any field of `smarticles export --help`, click on a smarticle
 for its fields. A run that goes on is followed. Ends with its window, or by Ctrl-C. Needs no network.""",
         examples="""\
@@ -41,12 +40,8 @@ def _port(text: str) -> int:
 
 
 def view_run(arguments: argparse.Namespace) -> int:
-    """`smarticles view`."""
-    try:
-        from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
-    except ModuleNotFoundError as error:
-        msg = f"view: the Python package {error.name!r} is not installed; run 'make setup', or install the project anew"
-        raise InputError(msg) from None
+    """Serve the page until its window closes."""
+    from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
 
     def opened(address: str) -> None:
         print(address, flush=True)

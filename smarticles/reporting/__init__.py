@@ -1,4 +1,4 @@
-"""One page that tells everything of a run, a sweep or a study; `smarticles report` writes it.
+"""One HTML page of a run, a sweep or a study, which `smarticles report` writes.
 
-`page` knows HTML and nothing of smarticles; `charts` draws; `run`, `sweep` and `results` say what stands on a page.
+`page` makes HTML and knows nothing of smarticles; `charts` draws; `run` and `sweep` decide what stands on a page.
 """

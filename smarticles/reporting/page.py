@@ -1,176 +1,133 @@
-"""A page as data, and its HTML: one file that asks for nothing from outside and runs no script."""
+"""HTML of a report: one file that asks for nothing from outside and runs no script."""
 
 from __future__ import annotations
 
+import base64
+import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import groupby
+from collections.abc import Iterable, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import jinja2
+from markupsafe import Markup
 
-TEMPLATE = "page.html.j2"
-PICTURES = ("figure", "turntable")
-"""Kinds of blocks that are pictures."""
+from dem.errors import InputError
+
 MOST_ROWS = 200
 """Of a table on a page."""
 
+Section = tuple[str, Sequence[Markup]]
+"""Title and blocks; a section without blocks is left out."""
 
-@dataclass(frozen=True, kw_only=True)
-class Words:
-    """Paragraphs.
+_MIMES = {".png": "image/png", ".svg": "image/svg+xml", ".webp": "image/webp"}
+_NUMBER = re.compile(r"[+−-]?[\d.]+(e[+-]?\d+)?( ± [\d.e+-]+)?( %)?|[-–]?")
 
-    Attributes:
-        lines: one each.
-        tone: "plain", "note" for an aside, "warning" for what must not be overlooked.
+# Every text of a run is data, and escaped.
+_environment = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent),
+    autoescape=True,
+    undefined=jinja2.StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+_environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+_blocks: Any = _environment.get_template("blocks.html.j2").module
+
+
+def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iterable[Section], source: Path) -> str:
+    """Return a whole page.
+
+    Args:
+        title: its heading.
+        about: what it is of: "run", "sweep", "study", "results of a study".
+        lead: the most important facts, label and value.
+        sections: in order.
+        source: the directory that it is made from.
     """
-
-    lines: Sequence[str]
-    tone: str = "plain"
-    kind: str = field(default="words", init=False)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """A table whose cells are texts already.
-
-    Attributes:
-        caption: what it is.
-        header: names of the columns, with units.
-        rows: cells.
-        folded: whether only its caption is shown until it is asked for.
-    """
-
-    caption: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    folded: bool = False
-    kind: str = field(default="table", init=False)
-
-    @cached_property
-    def numeric(self) -> list[bool]:
-        """By column, whether its cells are numbers, to be set to the right."""
-        return [bool(self.rows) and all(_is_number(row[k]) for row in self.rows) for k in range(len(self.header))]
+    try:
+        made = f"smarticles {version('smarticles')}"
+    except PackageNotFoundError:
+        made = "smarticles"
+    return _environment.get_template("page.html.j2").render(
+        title=title,
+        about=about,
+        lead=lead,
+        sections=[(name, blocks) for name, blocks in sections if blocks],
+        footer=f"Made by {made} from {source.resolve().name}.",
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Figure:
-    """A picture.
+def words(*lines: str, tone: str = "plain") -> Markup:
+    """Return paragraphs; `tone` is "plain", "note" or "warning"."""
+    return Markup(_blocks.words(lines, tone))
 
-    Attributes:
+
+def table(caption: str, header: Sequence[Any], rows: Iterable[Sequence[Any]], *, folded: bool = False) -> Markup:
+    """Return a table; a folded one shows its caption until it is opened."""
+    cells = [[word(value) for value in row] for row in rows]
+    numeric = [numbers([row[k] for row in cells]) for k in range(len(header))]
+    left_out = max(len(cells) - MOST_ROWS, 0)
+    return Markup(_blocks.table(caption, header, cells[:MOST_ROWS], numeric, left_out, folded))
+
+
+def listing(caption: str, text: str, *, folded: bool = False) -> Markup:
+    """Return a text as it stands, such as a scene."""
+    return Markup(_blocks.listing(caption, text, folded))
+
+
+def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
+    """Return a picture.
+
+    Args:
         caption: below it.
-        alt: what it shows, for who cannot see it.
-        light: data address of the picture.
-        dark: the same for a dark page; None: the one is shown on a light card.
-        wide: whether it stands alone, and not beside its neighbours.
+        alt: what it shows.
+        picture: its data address.
+        kind: "chart", of which the colours are turned round on a dark page; "card", on a light ground; "card wide".
     """
-
-    caption: str
-    alt: str
-    light: str
-    dark: str | None = None
-    wide: bool = False
-    kind: str = field(default="figure", init=False)
+    return Markup(_blocks.figure(caption, alt, picture, kind))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Turntable:
-    """One thing from all around, that is turned by hand: by the mouse over it, a finger on it, or the arrow keys.
+def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
+    """Return pictures of one thing from all around, turned by pointer, finger or arrow keys.
 
     It is a group of radio buttons, one per picture, so that the page needs no script.
 
-    Attributes:
+    Args:
         caption: below it.
-        alt: what it shows, for who cannot see it.
+        alt: what it shows.
         views: data addresses of pictures of one size, at equal angles, the first one from the front.
-        name: of the group, unique on the page.
     """
-
-    caption: str
-    alt: str
-    views: Sequence[str]
-    name: str
-    kind: str = field(default="turntable", init=False)
-
-    @property
-    def angles(self) -> list[int]:
-        """Angle of each view from the front [degree]."""
-        return [round(360 * number / len(self.views)) for number in range(len(self.views))]
+    angles = [round(360 * number / len(views)) for number in range(len(views))]
+    return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Listing:
-    """A text as it stands, such as a scene.
+def word(value: Any) -> str:
+    """Return a value as a cell: four digits of a number, a dash for none."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
-    Attributes:
-        caption: what it is.
-        text: the text.
-        folded: whether only its caption is shown until it is asked for.
+
+def numbers(cells: Sequence[str]) -> bool:
+    """Return whether a column holds numbers, with errors or percent signs, and dashes."""
+    return bool(cells) and all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
+
+
+def embedded(path: Path) -> str:
+    """Return a picture file as an address that holds it.
+
+    Raises:
+        InputError: it is no picture, or cannot be read.
     """
-
-    caption: str
-    text: str
-    folded: bool = False
-    kind: str = field(default="listing", init=False)
-
-
-Block = Words | Table | Figure | Turntable | Listing
+    try:
+        return address(path.read_bytes(), _MIMES[path.suffix])
+    except (KeyError, OSError) as error:
+        msg = f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}"
+        raise InputError(msg) from None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A part of a page under a heading of its own."""
-
-    title: str
-    blocks: Sequence[Block]
-
-    @property
-    def anchor(self) -> str:
-        """Where links within the page lead."""
-        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
-
-    @property
-    def parts(self) -> list[list[Block]]:
-        """The blocks, pictures that follow each other together: they stand side by side where there is room."""
-        return [list(part) for _, part in groupby(self.blocks, key=lambda block: block.kind in PICTURES)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Page:
-    """Everything that a page tells.
-
-    Attributes:
-        title: its heading.
-        about: what it is of: "run", "sweep", "study", "results".
-        lead: the most important facts, label and value.
-        sections: in order; those without blocks are left out.
-        footer: who made it, and of what.
-    """
-
-    title: str
-    about: str
-    lead: Sequence[tuple[str, str]]
-    sections: Sequence[Section]
-    footer: str
-
-
-def to_html(page: Page) -> str:
-    """The page as HTML; every text in it is data and escaped."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    sections = [section for section in page.sections if section.blocks]
-    return environment.get_template(TEMPLATE).render(
-        page=page, sections=sections, most_rows=MOST_ROWS, pictures=PICTURES
-    )
-
-
-def _is_number(cell: str) -> bool:
-    text = cell.strip()
-    return text in ("", "-", "–") or bool(re.match(r"[+−-]?[\d.]+(e[+-]?\d+)?( ± [\d.e+-]+)?( %)?\Z", text))
+def address(content: bytes, mime: str) -> str:
+    """Return an address that holds its content."""
+    return f"data:{mime};base64,{base64.b64encode(content).decode()}"

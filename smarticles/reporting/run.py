@@ -1,4 +1,4 @@
-"""What stands on the page of a run."""
+"""Page of a run, and the parts that it shares with the page of a sweep."""
 
 from __future__ import annotations
 
@@ -7,192 +7,196 @@ import re
 import shlex
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
 
 from dem.errors import InputError, RunError
+from dem.plan.choice import QUANTITIES, Error, read_table
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
-from dem.record.names import FRAME, LOG, SCENE, SERIES, collection
+from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
-from dem.record.series import Series
 from dem.scene.reading import load_scene
-from smarticles.measuring import measured
-from smarticles.reporting.accuracy import accuracy_blocks
-from smarticles.reporting.charts import Curve, address, against_time, embedded
-from smarticles.reporting.page import Block, Figure, Listing, Page, Section, Table, Turntable, Words
-from smarticles.reporting.tables import short_table, whole_table, word
+from dem.setting.fidelity import fidelities
+from postprocess.measures.registry import shown_quantities
+from postprocess.statistics.points import marked, told_number
+from smarticles.measuring import has_frames, measured
+from smarticles.reporting.charts import against_time
+from smarticles.reporting.page import address, embedded, figure, listing, page, table, turntable, word, words
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from dem.scene.scene import Scene
 
-# What is drawn against time, if a run has it: column, factor and unit that it is shown in, and part of a vector.
+# Drawn against time, where a run has it: column, factor and unit that it is shown in, and component of a vector.
 _CURVES = (
-    ("packing_fraction", 1.0, "", None),
+    ("packing_fraction", 1.0, "-", None),
     ("com_height_m", 1e3, "mm", None),
     ("kinetic_energy_J", 1e6, "µJ", None),
     ("hook_upper_force_N", 1.0, "N", 2),
     ("string_pulled_force_N", 1.0, "N", 0),
     ("motor_work_J", 1e6, "µJ", None),
-    ("outside_count", 1.0, "", None),
+    ("outside_count", 1.0, "-", None),
 )
-_AXES = ("x", "y", "z")
 _MOST_WARNINGS = 30
 
 
-def run_page(directory: Path, table: Path | None, made: str) -> Page:
-    """The page of a run, done or not.
+def run_page(directory: Path, accuracy: Path | None) -> str:
+    """Return the page of a run, done or not.
 
     Args:
         directory: a run directory.
-        table: measured errors, see `accuracy_blocks`.
-        made: by what the page was made, for its footer.
+        accuracy: measured errors, see `accuracy_blocks`.
 
     Raises:
         InputError: it is no run directory, or a file of it is damaged.
     """
     directory = directory.resolve()
-    run = open_run(directory)
-    scene, why_not = _scene(directory)
-    return Page(
-        title=run.manifest.name,
-        about="run",
-        lead=_lead(run),
-        sections=(
-            Section(title="Result", blocks=[*_ending(run), *_measures(directory)]),
-            Section(title="Final state", blocks=[*still_blocks(directory), *turntable_blocks(directory)]),
-            Section(title="Against time", blocks=_curves(run)),
-            Section(title="Scene", blocks=scene_blocks(directory, scene, why_not)),
-            Section(title="Effects", blocks=effect_blocks(scene)),
-            Section(title="Settings and their accuracy", blocks=accuracy_blocks(scene, table)),
-            Section(title="Warnings", blocks=warning_blocks({"": directory})),
-            Section(title="How to repeat it", blocks=_repeat(run, directory)),
-        ),
-        footer=f"Made by {made} from {directory.name}.",
-    )
-
-
-def _scene(directory: Path) -> tuple[Scene | None, str]:
-    """The scene of a run as this version reads it; None, and why not."""
+    run, scene = open_run(directory), None
+    why_not = ""
     try:
-        return load_scene(directory / SCENE), ""
+        scene = load_scene(directory / SCENE)
     except InputError as error:
-        return None, f"This version cannot read the scene of this run: {error}"
-
-
-def _lead(run: Run) -> list[tuple[str, str]]:
+        why_not = f"This version cannot read the scene of this run: {error}"
+    made, status = run.manifest, run.status
     lead = [
-        ("status", run.status.state),
-        ("smarticles", str(run.manifest.count)),
-        ("l/w", f"{run.manifest.aspect_ratio:g}"),
-        ("engine", run.manifest.engine),
-        ("fidelity", run.manifest.fidelity),
-        ("seed", str(run.manifest.seed)),
+        ("status", status.state),
+        ("smarticles", str(made.count)),
+        ("l/w", f"{made.aspect_ratio:g}"),
+        ("engine", made.engine),
+        ("fidelity", made.fidelity),
+        ("seed", str(made.seed)),
+        *([("simulated", f"{status.time_s:.3g} s")] if status.time_s is not None else []),
+        *([("computed in", f"{status.wall_s:.3g} s")] if status.wall_s is not None else []),
     ]
-    if run.status.time_s is not None:
-        lead.append(("simulated", f"{run.status.time_s:.3g} s"))
-    if run.status.wall_s is not None:
-        lead.append(("computed in", f"{run.status.wall_s:.3g} s"))
-    return lead
+    sections = (
+        ("Result", [*_ending(run), *_measures(directory)]),
+        ("Final state", picture_blocks(directory)),
+        ("Against time", _curves(run)),
+        ("Scene", scene_blocks(directory, scene, why_not)),
+        ("Effects", effect_blocks([] if scene is None else [scene])),
+        ("Settings and their accuracy", accuracy_blocks(scene, accuracy)),
+        ("Warnings", warning_blocks({"": directory})),
+        ("How to repeat it", _repeat(run)),
+    )
+    return page(made.name, "run", lead, sections, directory)
 
 
-def _ending(run: Run) -> list[Block]:
+def _ending(run: Run) -> list[Markup]:
     if run.status.state == "done":
         return []
-    told = {"failed": "This run failed", "interrupted": "This run was interrupted"}
+    ending = {"failed": "failed", "interrupted": "was interrupted"}.get(run.status.state, "has not finished")
     cause = f": {run.status.cause}" if run.status.cause else ""
-    return [Words(lines=[f"{told.get(run.status.state, 'This run has not finished')}{cause}."], tone="warning")]
+    return [words(f"This run {ending}{cause}.", tone="warning")]
 
 
-def _measures(directory: Path) -> list[Block]:
-    if not (directory / collection(FRAME)).is_file():
-        return [Words(lines=["No frame has been recorded, so nothing is measured."], tone="note")]
-    table = measured([directory])
+def _measures(directory: Path) -> list[Markup]:
+    if not has_frames(directory):
+        return [words("No frame has been recorded, so nothing is measured.", tone="note")]
+    found = measured([directory])
     caption = "Means over the last 20 frames of each phase ± their standard error; voxel and voronoi at its last frame"
-    return [
-        short_table(table, ["phase type"], caption),
-        whole_table(table.drop(columns=["run", "scene_sha256"]), "All measures of each phase"),
+    whole = found.drop(columns=["run", "scene_sha256"])
+    return [short_table(found, ["phase type"], caption), frame_table(whole, "All measures of each phase")]
+
+
+def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
+    """Return the quantities that short tables have, each as `mean ± SE`.
+
+    Args:
+        found: of `measured` or `grouped`.
+        named: columns that identify a row.
+        caption: of the table.
+    """
+    present = found.columns[found.notna().any()]
+    wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
+    rows = [
+        [
+            *(row[name] for name in named),
+            *(
+                told_number(s.factor * row[name], s.form, s.factor * row.get(marked(name, "SE"), float("nan")))
+                for name, s in wanted
+            ),
+        ]
+        for row in found.to_dict("records")
     ]
+    return table(caption, [*named, *(shown.heading for _, shown in wanted)], rows)
 
 
-def still_blocks(directory: Path, *, caption: str = "") -> list[Block]:
-    """A picture of the last frame of a run, or why there is none."""
+def frame_table(found: pd.DataFrame, caption: str) -> Markup:
+    """Return all columns, folded."""
+    return table(caption, list(found.columns), found.itertuples(index=False, name=None), folded=True)
+
+
+def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> list[Markup]:
+    """Return a picture of the last frame of a run, and one to turn; or why there is none.
+
+    Args:
+        directory: a run directory.
+        name: of the run, for the captions; empty: what the picture shows.
+        turn: whether to add pictures from all around.
+    """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
+    from postprocess.pictures.render import turntable as from_all_around  # noqa: PLC0415
 
-    if not (directory / collection(FRAME)).is_file():
+    if not has_frames(directory):
         return []
     run = open_run(directory)
+    views = []
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         try:
-            picture = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
+            still = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
+            for image in from_all_around(directory) if turn else ():
+                content = io.BytesIO()
+                image.save(content, "WEBP", quality=80, method=4)
+                views.append(address(content.getvalue(), "image/webp"))
         except (InputError, RunError) as error:
-            return [Words(lines=[f"No picture: {error}"], tone="note")]
-    kind = run.phases[-1].type if run.status.state == "done" else "its last frame"
-    alt = f"The {run.manifest.count} smarticles of {run.manifest.name} at the end of {kind}, drawn as their true boxes"
-    return [Figure(caption=caption or f"{alt}. Another view or time: smarticles render.", alt=alt, light=picture)]
-
-
-def turntable_blocks(directory: Path, *, caption: str = "") -> list[Block]:
-    """The last frame of a run from all around; nothing where there is no picture, see `still_blocks`."""
-    from postprocess.pictures.render import turntable  # noqa: PLC0415  (imports PyVista)
-
-    if not (directory / collection(FRAME)).is_file():
-        return []
-    try:
-        views = []
-        for image in turntable(directory):
-            content = io.BytesIO()
-            image.save(content, "WEBP", quality=80, method=4)
-            views.append(address(content.getvalue(), "image/webp"))
-    except (InputError, RunError):
-        return []  # the still says why
-    run = open_run(directory)
-    alt = f"The last frame of {run.manifest.name} from all around"
-    told = "Move the pointer across it, tap on it, or use the arrow keys: it turns."
-    return [Turntable(caption=f"{caption or alt}. {told}", alt=alt, views=views, name="turntable")]
-
-
-def _curves(run: Run) -> list[Block]:
-    if not (run.path / SERIES).is_file():
-        return []
-    series = run.series
-    spans = list(_spans(run, series))
-    blocks: list[Block] = []
-    for name, factor, unit, part in _CURVES:
-        if name not in series.data:
-            continue
-        values = series[name] if part is None else series[name][:, part]
-        label = EVERY[name].label if name in EVERY else name
-        label += "" if part is None else f" {_AXES[part]}"
-        curve = Curve(
-            label=f"{label} [{unit or '-'}]", times=series.time, values=factor * values.astype(float), phases=spans
-        )
-        if not (abs(curve.values) > 0).any():
-            continue
-        light, dark = against_time(curve)
-        last = curve.values[-1]
-        alt = f"{label} against time, from {curve.values[0]:.3g} to {last:.3g} {unit}".rstrip()
-        caption = f"{series.descriptions.get(name, label)}. Bands are phases."
-        blocks.append(Figure(caption=caption[0].upper() + caption[1:], alt=alt, light=light, dark=dark))
+            return [words(f"No picture: {error}", tone="note")]
+    moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
+    made = run.manifest
+    shows = f"The {made.count} smarticles of {made.name} at the end of {moment}, drawn as their true boxes"
+    caption = f"Run {name}" if name else f"{shows}. Another view or time: smarticles render."
+    blocks = [figure(caption, shows, still, "card")]
+    if views:
+        around = f"The last frame of {made.name} from all around"
+        how = "Move the pointer across it, tap on it, or use the arrow keys: it turns."
+        blocks.append(turntable(f"{f'Run {name} from all around' if name else around}. {how}", around, views))
     return blocks
 
 
-def _spans(run: Run, series: Series) -> Iterator[tuple[float, float, str]]:
-    """Start, end [s] and type of the phases that the series reaches."""
+def _curves(run: Run) -> list[Markup]:
+    if not run.has_series:
+        return []
+    series = run.series
+    spans = []
     for phase in run.phases:
         inside = series.time[series["phase"] == phase.index]
         if len(inside):
             start = float(inside[0]) if phase.start_s is None else phase.start_s
-            yield start, float(inside[-1]) if phase.end_s is None else phase.end_s, phase.type
+            spans.append((start, float(inside[-1]) if phase.end_s is None else phase.end_s, phase.type))
+    blocks = []
+    for name, factor, unit, component in _CURVES:
+        if name not in series.data:
+            continue
+        values = factor * (series[name] if component is None else series[name][:, component]).astype(float)
+        if not (abs(values) > 0).any():
+            continue
+        label = EVERY[name].label + ("" if component is None else f" {'xyz'[component]}")
+        alt = f"{label} against time, from {values[0]:.3g} to {values[-1]:.3g} {unit}".removesuffix(" -")
+        caption = f"{series.descriptions.get(name, label)}. Bands are phases."
+        picture = against_time(series.time, values, f"{label} [{unit}]", spans)
+        blocks.append(figure(caption[0].upper() + caption[1:], alt, picture, "chart"))
+    return blocks
 
 
-def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Block]:
-    """Phases as they are planned, and the scene as it stands in the directory."""
-    blocks: list[Block] = []
-    if scene is None:
-        blocks.append(Words(lines=[why_not], tone="warning"))
-    else:
+def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Markup]:
+    """Return the phases as they are planned, and the scene file in a directory."""
+    blocks = [words(why_not, tone="warning")] if scene is None else []
+    if scene is not None:
         planned = plan(scene)
         rows = [
             [
@@ -202,64 +206,108 @@ def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Blo
             ]
             for phase in planned.phases
         ]  # fmt: skip
-        blocks.append(
-            Table(caption="What happens", header=["phase", "type", "duration [s]", "time step [s]"], rows=rows)
-        )
-        blocks += [Words(lines=[f"Warning of the plan: {one}" for one in planned.warnings], tone="warning")]
+        blocks.append(table("What happens", ["phase", "type", "duration [s]", "time step [s]"], rows))
+        blocks += [words(f"Warning of the plan: {warning}", tone="warning") for warning in planned.warnings]
     file = directory / SCENE
     if file.is_file():
         text = file.read_text(encoding="utf-8", errors="replace")
-        blocks.append(Listing(caption="The scene, every default written out", text=text, folded=True))
+        blocks.append(listing("The scene, every default written out", text, folded=True))
     return blocks
 
 
-def effect_blocks(scene: Scene | None) -> list[Block]:
-    """Which effects a scene calls for, why, and what each adds."""
+def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
+    """Return the effects that scenes call for: in how many each is on, and why in the first where it is."""
+    rows = []
+    for same in zip(*map(decide, scenes), strict=True):
+        on = [effect for effect in same if effect.on]
+        effect = (on or same)[0]
+        state = f"{len(on)} of {len(same)}" if len(same) > 1 else "on" if on else "off"
+        rows.append([effect.name, state, effect.why, effect.adds.to_text()])
+    caption = "What acts and why; an effect that is off costs nothing"
+    return [table(caption, ["effect", "on in scenes", "why", "what it adds"], rows)] if rows else []
+
+
+def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
+    """Return the knobs of a scene's fidelity, and the measured errors of the named fidelities.
+
+    Args:
+        scene: None where it cannot be read.
+        path: table of `smarticles accuracy`; None: the one that ships.
+    """
     if scene is None:
         return []
+    base = scene.fidelity.base
+    named = fidelities(scene.engine)[base]
+    knobs = scene.fidelity.model_dump(exclude={"base"})
+    caption = f"Fidelity {base} on {scene.engine}, knob by knob"
+    rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
+    blocks = [table(caption, ["knob", "here", f"{base} by name"], rows)]
+    try:
+        known = read_table(path, of=tuple(QUANTITIES))
+    except InputError as error:
+        return [*blocks, words(f"How large its errors are is not known here: {error}", tone="note")]
+    here = [one for one in known.fidelities if (one.engine, one.fidelity) == (scene.engine, base)]
+    caption = (
+        f"Relative errors of named fidelities, measured with {known.count} smarticles of l/w = {known.aspect_ratio:g}, "
+        f"{known.activity}, against {known.reference}; ± is the half-width of the 95 % interval over seeds"
+    )
     rows = [
-        [str(effect.name), "on" if effect.on else "off", effect.why, effect.adds.to_text()]
-        for effect in plan(scene).effects
+        [one.engine, one.fidelity, str(one.seeds), *map(_percent, one.errors), "this one" if one in here else ""]
+        for one in known.fidelities
     ]
-    caption = "What acts in this scene and why; what is off is not constructed"
-    return [Table(caption=caption, header=["effect", "", "why", "what it adds"], rows=rows)]
+    notes = [] if here else [f"Fidelity {base} on {scene.engine} is not among those measured."]
+    changed = [knob for knob, value in knobs.items() if knob in named and value != named[knob]]
+    if changed:
+        notes.append(f"This scene changes {', '.join(changed)}, which the table does not cover.")
+    notes.append("These errors were measured on that pile; another pile, activity or quantity may err by more.")
+    header = ["engine", "fidelity", "seeds", *QUANTITIES.values(), ""]
+    return [*blocks, table(caption, header, rows), words(*notes, tone="note")]
 
 
-def warning_blocks(directories: dict[str, Path]) -> list[Block]:
-    """Warnings and errors of logs, those that repeat told once; by the runs' names, empty for one run alone."""
-    found: Counter[tuple[str, str]] = Counter()
+def _percent(error: Error) -> str:
+    return told_number(100 * error.value, "+.1f", 100 * error.band) + ("" if error.value != error.value else " %")
+
+
+def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
+    """Return warnings and errors of logs, each once; by the runs' names, empty for one run alone."""
+    found: dict[str, Counter[str]] = {}
     for name, directory in directories.items():
-        if (directory / LOG).is_file():
-            for line in (directory / LOG).read_text(encoding="utf-8", errors="replace").splitlines():
-                said = re.match(r"\S+ \S+ (WARNING|ERROR|CRITICAL) (.*)", line)
-                if said:
-                    found[(name, f"{said[1].lower()}: {said[2]}")] += 1
+        log = directory / LOG
+        for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if log.is_file() else ():
+            match = re.match(r"\S+ \S+ (WARNING|ERROR|CRITICAL) (.*)", line)
+            if match:
+                found.setdefault(f"{match[1].lower()}: {match[2]}", Counter())[name] += 1
     if not found:
-        return [Words(lines=["None in the logs."], tone="note")]
-    by_text: dict[str, list[str]] = {}
-    for (name, text), count in found.items():
-        by_text.setdefault(text, []).append(f"{name} {count} ×".strip() if count > 1 else name)
-    rows = [[text, ", ".join(filter(None, names))] for text, names in list(by_text.items())[:_MOST_WARNINGS]]
-    more = len(by_text) - len(rows)
-    caption = "Warnings of the logs" + (f", the first {_MOST_WARNINGS}; {more} more" if more > 0 else "")
-    return [Table(caption=caption, header=["warning", "where"], rows=rows)]
-
-
-def _repeat(run: Run, directory: Path) -> list[Block]:
+        return [words("None in the logs.", tone="note")]
     rows = [
-        ["scene hash (SHA-256)", run.manifest.scene_sha256],
-        ["seed", str(run.manifest.seed)],
-        ["started", run.manifest.started],
-        ["threads", word(run.manifest.threads)],
-        *([f"version of {name}", version] for name, version in run.manifest.versions.items()),
+        [text, ", ".join(filter(None, (f"{name} {n} ×".strip() if n > 1 else name for name, n in counts.items())))]
+        for text, counts in list(found.items())[:_MOST_WARNINGS]
     ]
-    # From the folder that the directory is in: where that lies on this machine is nobody else's.
-    here, there = shlex.quote(directory.name), shlex.quote(f"{directory.name}-again")
+    more = f", the first {_MOST_WARNINGS}; {len(found) - len(rows)} more" if len(found) > len(rows) else ""
+    return [table(f"Warnings of the logs{more}", ["warning", "where"], rows)]
+
+
+def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]) -> Markup:
+    """Return what made a run or sweep, facts first, then versions."""
+    rows = [*facts, *([f"version of {name}", version] for name, version in versions.items())]
+    return table("What made it", ["what", "value"], rows)
+
+
+def _repeat(run: Run) -> list[Markup]:
+    made = run.manifest
+    # From the folder that the directory is in: its place on this machine is private.
+    here, there = shlex.quote(run.path.name), shlex.quote(f"{run.path.name}-again")
     again = f"smarticles run {here}/{SCENE} --out {there}\nsmarticles compare {here} {there}"
-    told = "One thread gives the same bits with the same versions; smarticles compare tells whether it did."
+    same = "One thread gives the same bits with the same versions; smarticles compare shows whether it did."
+    facts = [
+        ["scene hash (SHA-256)", made.scene_sha256],
+        ["seed", str(made.seed)],
+        ["started", made.started],
+        ["threads", word(made.threads)],
+    ]
     return [
-        Listing(caption="The command of this run", text=run.manifest.command),
-        Listing(caption="The same once more", text=again),
-        Words(lines=[told if run.manifest.threads == 1 else "Several threads: the same numbers only within rounding."]),
-        Table(caption="What made it", header=["what", "value"], rows=rows),
-    ]  # fmt: skip
+        listing("The command of this run", made.command),
+        listing("The same once more", again),
+        words(same if made.threads == 1 else "Several threads: the same numbers only within rounding."),
+        provenance_table(facts, made.versions),
+    ]

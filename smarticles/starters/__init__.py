@@ -7,11 +7,11 @@ from pathlib import Path
 from dem.errors import InputError, nearest
 
 KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain")
-"""In the order in which they are told: the first one is written unless another is asked for."""
+"""In the order of the help; the first one is the default."""
 
 
 def starter(kind: str) -> str:
-    """The text of a scene.
+    """Return the text of a scene.
 
     Args:
         kind: one of `KINDS`.
@@ -26,5 +26,5 @@ def starter(kind: str) -> str:
 
 
 def about(kind: str) -> str:
-    """What a scene does, in one line."""
+    """Return what a scene does, in one line."""
     return starter(kind).partition("\n")[0].removeprefix("# ")

@@ -1,4 +1,4 @@
-"""What is known about a cluster, as data: partitions, limits, modules, container."""
+"""Facts about a cluster, as data: partitions, limits, modules, container."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, ValidationError, field_validator, mo
 from dem.errors import InputError, nearest
 from dem.refusal import refusals
 from dem.strict import Strict
-from templates.sweep.files import read_text
+from templates.sweep.sweep_file import read_text
 
 SHIPPED = Path(__file__).parent / "clusters"
 
@@ -36,11 +36,9 @@ def _plain_option(text: str) -> str:
 Word = Annotated[str, Field(max_length=200), AfterValidator(_plain_word)]
 Option = Annotated[str, Field(max_length=200), AfterValidator(_plain_option)]
 
-_UNITS = (86400, 3600, 60, 1)
-
 
 def parse_time(text: str) -> int:
-    """Seconds of a time as Slurm writes it: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M`, `D-H:M:S`.
+    """Return the seconds of a time as Slurm writes it: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M`, `D-H:M:S`.
 
     Raises:
         ValueError: it is not such a time, or not longer than zero.
@@ -62,13 +60,9 @@ def parse_time(text: str) -> int:
 
 
 def format_time(seconds: float) -> str:
-    """`D-HH:MM:SS`, or `HH:MM:SS` below a day."""
-    rest, parts = round(seconds), []
-    for unit in _UNITS:
-        parts.append(rest // unit)
-        rest %= unit
-    days, hours, minutes, seconds_ = parts
-    clock = f"{hours:02d}:{minutes:02d}:{seconds_:02d}"
+    """Format a time as `D-HH:MM:SS`, or `HH:MM:SS` below a day."""
+    days, rest = divmod(round(seconds), 86400)
+    clock = f"{rest // 3600:02d}:{rest // 60 % 60:02d}:{rest % 60:02d}"
     return f"{days}-{clock}" if days else clock
 
 
@@ -149,7 +143,7 @@ class Cluster(Strict):
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
-        """A partition and its name; by default the cluster's default.
+        """Return a partition and its name; by default the cluster's default.
 
         Raises:
             InputError: the cluster has no such partition.
@@ -163,29 +157,12 @@ class Cluster(Strict):
 
 
 def shipped_clusters() -> list[str]:
-    """Names of the clusters that come with the project."""
+    """Return the names of the clusters that come with the project."""
     return sorted(path.stem for path in SHIPPED.glob("*.toml"))
 
 
-def cluster_file(reference: str) -> Path:
-    """The file of a cluster that is given by name or by file.
-
-    Raises:
-        InputError: there is no cluster of that name.
-    """
-    if reference.endswith(".toml"):
-        return Path(reference)
-    if reference not in shipped_clusters():
-        msg = (
-            f"--cluster {reference}: is not known; {nearest(reference, sorted(shipped_clusters()))} "
-            "or give a file of your own, FILE.toml"
-        )
-        raise InputError(msg)
-    return SHIPPED / f"{reference}.toml"
-
-
 def load_cluster(reference: str) -> Cluster:
-    """Read what is known about a cluster.
+    """Read the facts about a cluster.
 
     Args:
         reference: a shipped cluster's name, or a file that ends in .toml.
@@ -193,7 +170,12 @@ def load_cluster(reference: str) -> Cluster:
     Raises:
         InputError: unknown name, unreadable file, unknown key, bad value.
     """
-    path = cluster_file(reference)
+    own = reference.endswith(".toml")
+    if not own and reference not in shipped_clusters():
+        advice = nearest(reference, shipped_clusters())
+        msg = f"--cluster {reference}: is not known; {advice} or give a file of your own, FILE.toml"
+        raise InputError(msg)
+    path = Path(reference) if own else SHIPPED / f"{reference}.toml"
     try:
         content = tomllib.loads(read_text(path, "cluster file"))
     except tomllib.TOMLDecodeError as error:

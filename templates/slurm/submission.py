@@ -1,29 +1,39 @@
-"""Submissions of a sweep to a queue: what was submitted, what of it is still to come, what is to be submitted.
+"""Submissions of a sweep to Slurm: what was submitted, what the queue says of it, what is to be submitted.
 
 DIR/jobs/001/array.sh    the job script; works by hand
 DIR/jobs/001/runs.txt    its runs, one name per line; task i computes the i-th group of lines
 DIR/jobs/001/job.json    cluster, job name, job number once it is submitted
-DIR/jobs/001/0.txt       what task 0 said
+DIR/jobs/001/0.txt       output of task 0
 """
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from dem.record.document import Document
 from dem.record.files import write_text
-from templates.slurm import queue
-from templates.slurm.cluster import Cluster
-from templates.slurm.request import Request
-from templates.slurm.script import RUN_LIST, SCRIPT, job_name, render_script
+from templates.slurm.cluster import load_cluster
+from templates.slurm.job import (
+    RUN_LIST,
+    SCRIPT,
+    Request,
+    Wishes,
+    job_name,
+    plan_request,
+    render_script,
+    smarticles_words,
+)
 from templates.sweep.folder import Entry, Folder, RunStatus
 
 JOBS, JOB = "jobs", "job.json"
@@ -35,7 +45,7 @@ class Submission(Document):
     Attributes:
         job_name: Name of the job; unique, so that the job is found even if its number was lost.
         job_id: Number of the job; None where the script was only written.
-        cluster: What --cluster said.
+        cluster: The value of --cluster.
         runs: Names of the runs, in the order of the tasks.
         number: Name of its folder in `jobs/`.
     """
@@ -58,20 +68,13 @@ class Submission(Document):
         return f"{JOBS}/{self.number}/{SCRIPT}"
 
     def of_task(self, index: int) -> tuple[str, ...]:
-        """Names of the runs of one task."""
+        """Return the names of the runs of one task."""
         return self.runs[index * self.runs_per_task : (index + 1) * self.runs_per_task]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """A submission that is rendered but not written.
-
-    Args:
-        submission: what it is.
-        request: what it asks for.
-        script: the job script.
-        entries: its runs.
-    """
+    """A submission that is rendered but not written."""
 
     submission: Submission
     request: Request
@@ -85,7 +88,7 @@ class Draft:
 
 
 def submissions(folder: Path) -> list[Submission]:
-    """What was submitted or written for submission, oldest first.
+    """Return what was submitted or written for submission, oldest first.
 
     Raises:
         InputError: a record is damaged.
@@ -95,39 +98,30 @@ def submissions(folder: Path) -> list[Submission]:
 
 
 def draft(
-    path: Path,
-    name: str,
-    entries: Sequence[Entry],
-    *,
-    cluster: Cluster,
-    reference: str,
-    request: Request,
-    command: Sequence[str],
-    token: str | None = None,
+    path: Path, name: str, entries: Sequence[Entry], reference: str, wishes: Wishes, *, token: str | None = None
 ) -> Draft:
-    """Render a submission; nothing is written.
+    """Render a submission; write nothing.
 
     Args:
         path: the sweep's directory; it may be absent.
         name: the sweep's name.
         entries: runs to compute.
-        cluster: where.
-        reference: what --cluster said.
-        request: what is asked for.
-        command: the words of the command `smarticles`.
-        token: tells the job's name from all others; by default a random one.
+        reference: a shipped cluster's name, or a file that ends in .toml.
+        wishes: options of the user.
+        token: makes the job's name unique; by default a random one.
 
     Raises:
-        InputError: the script cannot be rendered.
+        InputError: unknown cluster, a request beyond its limits, or the script cannot be rendered.
     """
+    cluster = load_cluster(reference)
+    request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
     # Runs that take about as long share a task: then no core waits for a longer neighbour.
     ordered = tuple(sorted(entries, key=lambda entry: -entry.expected_s))
     taken = [int(folder.name) for folder in path.glob(f"{JOBS}/*") if folder.name.isdecimal()]
-    number = f"{max(taken, default=0) + 1:03d}"
     submission = Submission(
-        number=number,
+        number=f"{max(taken, default=0) + 1:03d}",
         job_name=job_name(name, token or uuid.uuid4().hex[:8]),
-        cluster=reference,
+        cluster=str(Path(reference).resolve()) if reference.endswith(".toml") else reference,
         runs_per_task=request.runs_per_task,
         runs=tuple(entry.name for entry in ordered),
     )
@@ -135,20 +129,16 @@ def draft(
         cluster,
         request,
         sweep=path,
-        number=number,
+        number=submission.number,
         name=submission.job_name,
         count=len(ordered),
-        command=command,
+        command=("smarticles",) if cluster.container else smarticles_words(),
     )
     return Draft(submission=submission, request=request, script=script, entries=ordered)
 
 
 def write(folder: Folder, draft: Draft) -> Path:
-    """Write a submission's files; runs that cannot go on are set aside.
-
-    Returns:
-        Its folder.
-    """
+    """Write a submission's files, set aside runs that cannot go on, and return its folder."""
     for entry in draft.entries:
         if not folder.can_resume(entry):
             folder.set_aside(entry)
@@ -165,11 +155,19 @@ def submit(folder: Folder, draft: Draft) -> Submission:
     """Submit what was written, and keep the job's number.
 
     Raises:
-        RunError: Slurm refused it.
+        RunError: Slurm rejects it, or its answer is no job number.
     """
     # The name was stored before: a job whose number is lost here is still found in the queue by its name.
-    number = queue.submit(draft.submission.script, folder.path)
-    submitted = draft.submission.model_copy(update={"job_id": number})
+    script = folder.path / draft.submission.script
+    try:
+        answer = _call(("sbatch", "--parsable", draft.submission.script), folder.path)
+    except (OSError, subprocess.SubprocessError) as error:
+        msg = (
+            f"{script}: sbatch rejects it: {_reason(error)}; "
+            f"correct that, then: smarticles resume {folder.path} --submit slurm"
+        )
+        raise RunError(msg) from error
+    submitted = draft.submission.model_copy(update={"job_id": parse_job_id(answer, script)})
     _store(folder, submitted)
     return submitted
 
@@ -179,46 +177,48 @@ def _store(folder: Folder, submission: Submission) -> None:
     stored.write(folder.path / JOBS / submission.number / JOB)
 
 
-def tasks_of_runs(found: Sequence[Submission]) -> dict[str, queue.Task]:
-    """What the queue says about each run: of its newest task that waits or computes, else of its newest.
+def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
+    """Return the task of each run: its newest one that waits or computes, else its newest.
 
     Raises:
         QueueError: the queue cannot be asked.
-        RunError: the queue says what is not understood.
+        RunError: an answer of the queue is not understood.
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}
-    tasks = queue.ask_queue(list(by_name))
+    tasks = _ask_queue(list(by_name))
     tasks.sort(key=lambda task: (task.state != "ended", order[task.job_name], task.job_id))
     return {run: task for task in tasks for run in by_name[task.job_name].of_task(task.index)}
 
 
-def merged(status: RunStatus, task: queue.Task | None) -> RunStatus:
-    """State of a run from its directory and from the queue together.
+def merged(status: RunStatus, task: Task | None) -> RunStatus:
+    """Return the state of a run from its directory and from the queue together.
 
-    What the directory says about an end counts: `done` and `failed` stay.
+    The directory decides about an end: `done` and `failed` stay.
     """
     if task is None:
         return status
+    state, cause = status.state, status.cause
+    reason = f"Slurm: {task.slurm_state}"
     if status.state in ("done", "failed"):
-        return replace(status, job=task.label)
-    if task.state == "ended":
-        cause = f"Slurm: {task.slurm_state}" + (f", {status.cause}" if status.cause else "")
-        return replace(status, job=task.label, cause=status.cause if task.slurm_state == "COMPLETED" else cause)
-    if task.state == "running":
-        return replace(status, job=task.label, state="running", cause=None)
-    cause = f"Slurm: {task.slurm_state}" + (f", {task.reason}" if task.reason else "")
-    return replace(status, job=task.label, state="queued", cause=cause)
+        pass
+    elif task.state == "ended":
+        cause = cause if task.slurm_state == "COMPLETED" else ", ".join(filter(None, (reason, cause)))
+    elif task.state == "running":
+        state, cause = "running", None
+    else:
+        state, cause = "queued", ", ".join(filter(None, (reason, task.reason)))
+    return replace(status, job=task.label, state=state, cause=cause)
 
 
-def to_submit(folder: Folder, tasks: Mapping[str, queue.Task]) -> list[Entry]:
-    """Runs without a result that no task of the queue is going to compute."""
+def to_submit(folder: Folder, tasks: Mapping[str, Task]) -> list[Entry]:
+    """Return the runs without a result that no task of the queue is going to compute."""
     busy = {run for run, task in tasks.items() if task.state != "ended"}
     return [entry for entry in folder.entries if entry.name not in busy and not folder.is_done(entry)]
 
 
-def refuse_queued(folder: Folder) -> None:
-    """Refuse to compute here what a queue may be computing elsewhere.
+def reject_queued(folder: Folder) -> None:
+    """Reject to compute here what a queue may be computing elsewhere.
 
     Raises:
         InputError: runs are in the queue, or it cannot be asked.
@@ -226,7 +226,7 @@ def refuse_queued(folder: Folder) -> None:
     found = submissions(folder.path)
     try:
         tasks = tasks_of_runs(found)
-    except queue.QueueError as error:
+    except QueueError as error:
         jobs = ", ".join(str(one.job_id or one.job_name) for one in found)
         msg = (
             f"{folder.path}: was submitted to Slurm (jobs {jobs}), and {error}; resume where the queue can be asked, "
@@ -242,7 +242,137 @@ def refuse_queued(folder: Folder) -> None:
         raise InputError(msg)
 
 
-def plain(tasks: Mapping[str, queue.Task]) -> dict[str, Any]:
-    """How many tasks are in each of Slurm's states, for JSON."""
-    unique = {task.label: task.slurm_state for task in tasks.values()}
-    return {state: list(unique.values()).count(state) for state in sorted(set(unique.values()))}
+# -- Slurm's commands --------------------------------------------------------------------------------------------------
+
+JobState = Literal["queued", "running", "ended"]
+
+_BY_MEANING: dict[JobState, str] = {
+    "queued": """PENDING CONFIGURING EXPEDITING POWER_UP_NODE RESV_DEL_HOLD REQUEUED REQUEUE_FED REQUEUE_HOLD
+        SPECIAL_EXIT""",
+    "running": "RUNNING COMPLETING SUSPENDED STOPPED RESIZING SIGNALING STAGE_OUT UPDATE_DB",
+    "ended": """COMPLETED CANCELLED FAILED TIMEOUT NODE_FAIL BOOT_FAIL DEADLINE OUT_OF_MEMORY PREEMPTED REVOKED
+        LAUNCH_FAILED RECONFIG_FAIL""",
+}
+STATES: dict[str, JobState] = {state: meaning for meaning, states in _BY_MEANING.items() for state in states.split()}
+"""Slurm's job states (man squeue, 22.05 to 25.05), and their meaning for the runs of a task."""
+
+_TIMEOUT_S = 60.0
+
+
+class QueueError(RunError):
+    """The queue cannot be asked."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One task of an array job in the queue; state and reason in Slurm's words."""
+
+    job_name: str
+    job_id: int
+    index: int
+    slurm_state: str
+    reason: str
+
+    @property
+    def state(self) -> JobState:
+        """Meaning of the state."""
+        return STATES[self.slurm_state]
+
+    @property
+    def label(self) -> str:
+        """`12_3`, as Slurm writes it."""
+        return f"{self.job_id}_{self.index}"
+
+
+def require_sbatch() -> None:
+    """Reject to submit where Slurm is not installed.
+
+    Raises:
+        InputError: there is no sbatch.
+    """
+    if shutil.which("sbatch") is None:
+        msg = (
+            "--submit slurm: there is no `sbatch` on this machine; submit on the cluster, "
+            "or write the scripts with --submit none --cluster NAME"
+        )
+        raise InputError(msg)
+
+
+def parse_job_id(answer: str, script: Path) -> int:
+    """Return the number in the answer of `sbatch --parsable`: `12` or `12;cluster`.
+
+    Raises:
+        RunError: it is something else.
+    """
+    lines = [line for line in answer.splitlines() if line.strip()]
+    found = re.fullmatch(r"([1-9][0-9]*)(?:;\S+)?", lines[-1].strip()) if lines else None
+    if found is None:
+        msg = (
+            f"{script}: sbatch answered {answer.strip()!r}, which is no job number; "
+            "look with `squeue --me` whether the job is in the queue before submitting again"
+        )
+        raise RunError(msg)
+    return int(found[1])
+
+
+def _ask_queue(names: Sequence[str]) -> list[Task]:
+    """Return the tasks of some jobs that Slurm still knows, ended ones included for a while.
+
+    Args:
+        names: names of the jobs. By name, since a number that Slurm has forgotten is an error.
+    """
+    if not names:
+        return []
+    asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")
+    try:
+        answer = _call(("squeue", *asked), None)
+    except (OSError, subprocess.SubprocessError) as error:
+        msg = f"the queue cannot be asked: {_reason(error)}"
+        raise QueueError(msg) from error
+    return parse_queue(answer)
+
+
+def parse_queue(answer: str) -> list[Task]:
+    """Return the tasks from squeue's lines `name|job|index|state|reason`.
+
+    Raises:
+        RunError: a line is not understood, or names an unknown state.
+    """
+    tasks = []
+    for line in answer.splitlines():
+        found = re.fullmatch(r"([^|]+)\|([0-9]+)\|([0-9]+)\|([A-Z_]+)\|(.*)", line.strip())
+        if found is None:
+            msg = f"squeue answered {line.strip()!r}, which is not understood; please report it with `squeue --version`"
+            raise RunError(msg)
+        name, job, index, state, reason = found.groups()
+        if state not in STATES:
+            msg = (
+                f"Slurm says that task {job}_{index} is {state}, a state that is not known here, so nothing is assumed "
+                "about its runs; please report it with `squeue --version`"
+            )
+            raise RunError(msg)
+        reason = "" if reason == "None" else reason
+        tasks.append(Task(job_name=name, job_id=int(job), index=int(index), slurm_state=state, reason=reason))
+    return tasks
+
+
+def _call(command: Sequence[str], folder: Path | None) -> str:
+    return subprocess.run(
+        command,
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        stdin=subprocess.DEVNULL,
+        timeout=_TIMEOUT_S,
+    ).stdout
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f"there is no `{error.filename}` on this machine"
+    if isinstance(error, subprocess.TimeoutExpired):
+        return f"no answer within {_TIMEOUT_S:.0f} s"
+    said = getattr(error, "stderr", None) or str(error)
+    return " ".join(said.split()) or f"exit status {getattr(error, 'returncode', '?')}"

@@ -1,9 +1,8 @@
 """Jinja2 templates whose values cannot break out of the YAML they are put into.
 
-A template is text, so that loops and conditions may shape a scene. Values never become part of
-that text: each `{{ … }}` leaves a placeholder, the text is read as YAML, and the placeholders are
-then replaced by the values themselves. A value that stands alone keeps its type; a value within
-longer or quoted text becomes text. No string, however hostile, can add a key or end a quotation.
+A template is text, so that loops and conditions may shape a scene. Each `{{ … }}` leaves a placeholder, the text is
+read as YAML, and the placeholders are then replaced by the values themselves: a value that stands alone keeps its type,
+and no string can add a key or end a quotation.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from dem.errors import InputError, nearest
 from dem.scene.yaml_text import StrictLoader, parse_yaml
 
 Value = Any
-"""What a variable may hold: None, bool, int, float, str, and lists and mappings of these."""
+"""Value of a variable: None, bool, int, float, str, and lists and mappings of these."""
 
 
 def _environment(finalize: Callable[..., Any] | None = None) -> ImmutableSandboxedEnvironment:
-    """Make a sandbox in which a misspelt name is an error."""
+    """Return a sandbox in which a misspelt name is an error."""
     return ImmutableSandboxedEnvironment(
         undefined=jinja2.StrictUndefined,
         finalize=finalize,
@@ -44,7 +43,7 @@ def _plain(value: Value) -> bool:
 
 
 def _line(error: BaseException) -> int | None:
-    """Line of the template in which a rendering error arose."""
+    """Return the line of the template in which a rendering error arose."""
     line, step = None, error.__traceback__
     while step is not None:
         if step.tb_frame.f_code.co_filename == "<template>":
@@ -53,7 +52,7 @@ def _line(error: BaseException) -> int | None:
     return line
 
 
-def _refuse(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
+def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
     """Raise the InputError that explains why a template or an expression failed."""
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
@@ -65,17 +64,17 @@ def _refuse(error: Exception, where: str, values: Mapping[str, Value]) -> NoRetu
     raise InputError(msg) from error
 
 
-# What templates and expressions raise: Jinja2's own errors and those of the values in them.
+# Errors of templates and expressions: Jinja2's own and those of the values in them.
 _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError)
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
 
     Args:
         expression: the expression, without braces.
         values: the variables it may use.
-        source: file and key, for the error message.
+        source: file and key, for error messages.
 
     Raises:
         InputError: it uses an unknown name, fails, or gives something that is not plain data.
@@ -86,7 +85,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
         if isinstance(result, jinja2.Undefined):
             str(result)  # StrictUndefined raises, with the name
     except _FAILURES as error:
-        _refuse(error, f"{source} = {expression!r}", values)
+        _reject(error, f"{source} = {expression!r}", values)
     if not _plain(result):
         what = type(result).__name__
         msg = f"{source} = {expression!r}: gives {what}; it must give numbers or text"
@@ -95,7 +94,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """A short text with `{{ … }}` in it, rendered as it stands; for names, not for YAML.
+    """Render a short text with `{{ … }}` in it as it stands; for names, not for YAML.
 
     Raises:
         InputError: it uses an unknown name, or fails.
@@ -103,19 +102,11 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
     try:
         return _environment().from_string(template).render(**values)
     except _FAILURES as error:
-        _refuse(error, f"{source} = {template!r}", values)
+        _reject(error, f"{source} = {template!r}", values)
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """The data a YAML template gives for some values.
-
-    Args:
-        template: YAML with Jinja2 in it.
-        values: the variables it may use.
-        source: the template's file, for error messages.
-
-    Returns:
-        Mappings, lists and plain values.
+    """Return the data, mappings, lists and plain values, of a YAML template with Jinja2 in it.
 
     Raises:
         InputError: an unknown name, a Jinja2 or YAML mistake; the message names the line.
@@ -140,12 +131,12 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
         text = environment.from_string(template).render(**values)
     except _FAILURES as error:
         number = getattr(error, "lineno", None) or _line(error)
-        _refuse(error, f"{source}, line {number}" if number else source, values)
+        _reject(error, f"{source}, line {number}" if number else source, values)
     return parse_yaml(text, source, _loader(re.compile(rf"{prefix}(\d+)z"), held))
 
 
 def _loader(placeholder: re.Pattern[str], held: list[Value]) -> type[StrictLoader]:
-    """A loader that puts held values in the place of their placeholders."""
+    """Return a loader that puts held values in the place of their placeholders."""
 
     class Loader(StrictLoader):
         pass

@@ -1,27 +1,14 @@
-"""The sweep file: which scenes one template makes.
+"""The sweep file: how one template makes many scenes; `smarticles sweep --help` shows one with all its keys.
 
-schema_version: 1
-name: friction                      # what the sweep is called
-template: scene.yaml.j2             # Jinja2 template of a scene, beside this file
-run_name: "mu{{ '%.1f' | format(friction) }}_seed{{ seed }}"
-constants: {count: 100}             # the same in every point
-points:                             # any of these; several are crossed with each other
-  table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file, all or some
-  list: [{friction: 0.4, count: 100}]                       # points written out
-  zip: {friction: [0.2, 0.4], count: [90, 100]}             # first with first, second with second
-  grid: {friction: [0.2, 0.4], count: [90, 100]}            # every combination
-derived: {half: "(count / 2) | round | int"}                # expressions, in order
-repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
-                                    # `seed_by_seed: true` beside it: all points with the first seed come first
-                                    # `more: {seeds: [4], only: {friction: [0.2]}}`: more of some points, afterwards
-again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}   # some of the points once more, changed
-variants:                           # JSON merge patches (RFC 7386) of this file; null removes a key
-  quick: {constants: {count: 20}, repeats: {seeds: [1]}}    # FILE@quick; FILE@code,quick applies two, in this order
+Variants are JSON merge patches (RFC 7386) of the file: FILE@quick applies one, FILE@code,quick two in this order.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,16 +21,16 @@ from dem.errors import InputError, nearest, shown
 from dem.refusal import refusals
 from dem.scene.yaml_text import parse_yaml
 from dem.strict import Strict
-from templates.sweep.files import IDENTIFIER, parse_table, read_text
 from templates.sweep.render import Value
 
 SEED = "seed"
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
 
 
 def _names(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
     for name in mapping:
-        if not IDENTIFIER.match(name) or name in _RESERVED:
+        if not _IDENTIFIER.match(name) or name in _RESERVED:
             msg = (
                 f"{name!r} cannot name a variable: use letters, digits and _, "
                 f"and none of {', '.join(sorted(_RESERVED))}"
@@ -79,22 +66,21 @@ class Points(Strict):
 
     @model_validator(mode="after")
     def _check(self) -> Points:
-        if self.table is None and self.list_ is None and self.zip_ is None and self.grid is None:
+        rows, zip_, grid = self.list_ or [], self.zip_ or {}, self.grid or {}
+        if not (self.table or rows or zip_ or grid):
             msg = "no points: give at least one of table, list, zip, grid"
             raise ValueError(msg)
-        for row in self.list_ or []:
-            if set(row) != set((self.list_ or [row])[0]):
+        for row in rows:
+            if set(_names(row)) != set(rows[0]):
                 msg = f"list: every point needs the same variables: got {row!r}"
                 raise ValueError(msg)
-        for columns in (self.zip_, self.grid, *(self.list_ or [])):
-            _names(columns or {})
-        for source, columns in (("zip", self.zip_), ("grid", self.grid)):
-            for name, values in (columns or {}).items():
+        for source, columns in (("zip", zip_), ("grid", grid)):
+            for name, values in _names(columns).items():
                 _finite(values)
                 if not values:
                     msg = f"{source}: {name} has no values"
                     raise ValueError(msg)
-        lengths = {name: len(values) for name, values in (self.zip_ or {}).items()}
+        lengths = {name: len(values) for name, values in zip_.items()}
         if len(set(lengths.values())) > 1:
             msg = f"zip: lists of unequal length: got {lengths}"
             raise ValueError(msg)
@@ -112,7 +98,7 @@ Seeds = Annotated[tuple[int, ...], AfterValidator(_once_each)]
 
 
 class MoreSeeds(Strict):
-    """Further seeds of some points, where an answer asks for them; after those that all points have."""
+    """Further seeds of some points, after those that all points have."""
 
     seeds: Seeds = Field(min_length=1, description="seeds beside those of all points, one run each")
     only: dict[str, list[Value]] = Field(
@@ -150,7 +136,7 @@ class Again(Strict):
 
 
 class SweepFile(Strict):
-    """What a sweep file says, validated."""
+    """A sweep file, validated."""
 
     schema_version: Literal[1]
     name: str = Field(min_length=1)
@@ -192,18 +178,7 @@ class SweepFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep file and everything it refers to.
-
-    Args:
-        path: the sweep file.
-        text: its text.
-        content: what it says.
-        template: path of the scene template.
-        template_text: its text.
-        table: rows of the table, those that are kept; empty without a table.
-        table_path: the table's file, or None.
-        table_text: the table's text, or None.
-    """
+    """A sweep file with its text, its scene template, and its table, of which `table` has the rows that are kept."""
 
     path: Path
     text: str
@@ -211,12 +186,7 @@ class Sweep:
     template: Path
     template_text: str
     table: tuple[Mapping[str, Value], ...] = ()
-    table_path: Path | None = None
     table_text: str | None = None
-
-
-VARIANT = "@"
-"""Stands between a sweep file and the names of its variants, which commas separate: `strength.yaml@code,quick`."""
 
 
 def load_sweep(path: Path) -> Sweep:
@@ -228,7 +198,7 @@ def load_sweep(path: Path) -> Sweep:
     Raises:
         InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
     """
-    name, _, variants = path.name.partition(VARIANT)
+    name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
     if variants and isinstance(data, dict):
@@ -247,7 +217,7 @@ def load_sweep(path: Path) -> Sweep:
         msg = f"{path}: {refusals(error, data, described='`smarticles sweep --help`')}"
         raise InputError(msg) from error
     template = path.parent / content.template
-    table, table_path, table_text = _read_table(path, content.points.table)
+    table, table_text = _read_table(path, content.points.table)
     return Sweep(
         path=path,
         text=text,
@@ -255,7 +225,6 @@ def load_sweep(path: Path) -> Sweep:
         template=template,
         template_text=read_text(template, "scene template"),
         table=tuple(table),
-        table_path=table_path,
         table_text=table_text,
     )
 
@@ -289,7 +258,7 @@ def merged(value: Any, patch: Any) -> Any:
 
 
 def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
-    """The same sweep with other values for some of its constants.
+    """Return a sweep with other values for some of its constants.
 
     Raises:
         InputError: the sweep has no such constant.
@@ -307,7 +276,7 @@ ENGINE = "engine"
 
 
 def on_engine(sweep: Sweep, engine: str) -> Sweep:
-    """The same sweep with all its runs on one engine: nothing is run again on another.
+    """Return a sweep with all its runs on one engine, none of them once more on another.
 
     Raises:
         InputError: the sweep has no constant that names its engine.
@@ -331,33 +300,102 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
     return replace(sweep, content=content.model_copy(update={"constants": constants, "again": again}))
 
 
-def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], Path | None, str | None]:
+def read_text(path: Path, what: str) -> str:
+    """Return the text of a file.
+
+    Raises:
+        InputError: the file cannot be read, or is not UTF-8 text.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        msg = f"{path}: not UTF-8 text (byte {error.start}); a {what} is a text file"
+        raise InputError(msg) from error
+    except OSError as error:
+        msg = f"{path}: cannot read the {what}: {error.strerror}; check the path"
+        raise InputError(msg) from error
+
+
+def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
+    """Return the rows of a CSV text whose first line names the columns; cells are numbers where they can be.
+
+    Raises:
+        InputError: no rows, a bad column name, a row of another length, an empty cell.
+    """
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    if len(rows) < 2:
+        msg = f"{source}: the table has no rows; the first line names the columns, rows follow"
+        raise InputError(msg)
+    header = [name.strip() for name in rows[0]]
+    for name in header:
+        if not _IDENTIFIER.match(name) or header.count(name) > 1:
+            msg = (
+                f"{source}, line 1: column {name!r} cannot be a variable; column names are "
+                "letters, digits and _, each once"
+            )
+            raise InputError(msg)
+    table = []
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header) or not all(cell.strip() for cell in row):
+            msg = f"{source}, row {number}: expected {len(header)} filled cells ({', '.join(header)}): got {row!r}"
+            raise InputError(msg)
+        table.append({name: _cell(cell.strip()) for name, cell in zip(header, row, strict=True)})
+    return table
+
+
+def _cell(text: str) -> int | float | str:
+    for convert in (int, float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], str | None]:
     if table is None:
-        return [], None, None
+        return [], None
     file = path.parent / table.file
     text = read_text(file, "table")
     rows = parse_table(text, str(file))
-    for row in rows:
-        try:
+    try:
+        for row in rows:
             for value in _names(row).values():
                 _finite(value)
-        except ValueError as error:
-            msg = f"{file}: {error}"
-            raise InputError(msg) from error
-    for column, wanted in table.only.items():
-        if column not in rows[0]:
-            msg = f"{path}: points.table.only.{column}: no such column; {nearest(column, sorted(rows[0]))}"
+    except ValueError as error:
+        msg = f"{file}: {error}"
+        raise InputError(msg) from error
+    return matching(rows, table.only, f"{path}: points.table.only", ("column", f"row of {file}")), text
+
+
+def matching(
+    rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
+) -> list[dict[str, Value]]:
+    """Return the rows, or points, whose variables hold one of the values wanted.
+
+    Args:
+        rows: values by the name of their variable.
+        only: values wanted, by variable.
+        where: file and key, for error messages.
+        nouns: of a variable and of a row, for error messages.
+
+    Raises:
+        InputError: a variable is unknown, no row has one of its values, or no row has all of them.
+    """
+    variable, row_ = nouns
+    kept = list(rows)
+    for name, wanted in only.items():
+        if name not in rows[0]:
+            msg = f"{where}.{name}: no such {variable}; {nearest(name, sorted(rows[0]))}"
             raise InputError(msg)
-        present = [row[column] for row in rows]
+        present = [row[name] for row in rows]
         for value in wanted:
             if value not in present:
-                msg = (
-                    f"{path}: points.table.only.{column}: {value!r} is not in {file}; "
-                    f"it has {', '.join(map(str, present))}"
-                )
+                known = ", ".join(dict.fromkeys(map(str, present)))
+                msg = f"{where}.{name}: no {row_} has {value!r}; there are {known}"
                 raise InputError(msg)
-        rows = [row for row in rows if row[column] in wanted]
-    if not rows:
-        msg = f"{path}: points.table.only: keeps no row of {file}; give fewer conditions"
+        kept = [row for row in kept if row[name] in wanted]
+    if not kept:
+        msg = f"{where}: keeps no {row_}; give fewer conditions"
         raise InputError(msg)
-    return rows, file, text
+    return kept

@@ -31,7 +31,7 @@ mapfile -t -s $((task * 36)) -n 36 runs <jobs/001/runs.txt
 began=jobs/001/$task.began
 : >"$began" # what is newer was made by this task
 pids=()
-told=
+signalled=
 
 state() {
     if [ -e "runs/$1/done.json" ]; then
@@ -50,7 +50,7 @@ start() {
     pids+=("$!")
 }
 
-tell() {
+send() {
     local pid
     for pid in "${pids[@]}"; do
         kill -s "$1" "$pid" 2>/dev/null || true # it has ended
@@ -66,20 +66,20 @@ computing() {
 }
 
 # USR1: the time limit is near; runs end at their next checkpoint. TERM: runs end at once.
-trap 'told=USR1; tell USR1' USR1
-trap 'told=TERM; tell TERM' TERM
+trap 'signalled=USR1; send USR1' USR1
+trap 'signalled=TERM; send TERM' TERM
 
 mkdir -p runs logs
 for run in "${runs[@]}"; do
     [ "$(state "$run")" != open ] || start "$run"
 done
-[ -z "$told" ] || tell "$told" # those that were not started yet
+[ -z "$signalled" ] || send "$signalled" # those that were not started yet
 until wait; do # a signal ends it early
     patience=$((SECONDS + 270))
     while computing && ((SECONDS < patience)); do
         sleep 1
     done
-    tell TERM
+    send TERM
 done
 
 finished=0 failed=0 open=0 progress=no
@@ -93,8 +93,8 @@ for run in "${runs[@]}"; do
         [ ! "runs/$run/$file" -nt "$began" ] || progress=yes
     done
 done
-echo "task $task: $finished finished, $failed failed, $open not finished${told:+, ended by $told}"
-if [ "$told" = USR1 ] && [ "$open" -gt 0 ]; then
+echo "task $task: $finished finished, $failed failed, $open not finished${signalled:+, ended by $signalled}"
+if [ "$signalled" = USR1 ] && [ "$open" -gt 0 ]; then
     if [ "$progress" = no ]; then
         echo "task $task: not queued again: no run reached a checkpoint; ask for more --time" >&2
     elif ((${SLURM_RESTART_COUNT:-0} >= 3)); then

@@ -27,7 +27,7 @@ from scenes import CHAIN, SMALL, changed, small
 from dem.errors import InputError
 from dem.plan.outlook import plan
 from dem.scene.reading import dump_scene, json_schema
-from smarticles.scenes import read_scene
+from smarticles.commands.run import read_scene
 from studies.registry import STUDIES
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep

@@ -38,7 +38,7 @@ def test_a_run_that_lost_its_series_is_not_the_same(
     assert "identical bits: no, one has more samples, columns or frames, 16 of 16 frames are the same" in said.out
 
 
-def test_what_differs_is_told_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_what_differs_is_listed_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     one = write_run(tmp_path / "a")
     other = write_run(tmp_path / "b", packing=(0.1, 0.105, 0.15, 0.132), shake_time=10.0)
     manifest = json.loads((other / "run.json").read_text())

@@ -29,11 +29,6 @@ def test_every_scene_begins_with_what_it_does_and_comments_its_keys(kind: str) -
     assert sum("  # " in line for line in lines) >= 5
 
 
-def test_the_help_tells_every_kind(smarticles: Smarticles) -> None:
-    said = smarticles("init", "--help").out
-    assert all(f"  {kind:<10}{about(kind)}" in said for kind in KINDS)
-
-
 def test_nothing_is_overwritten_nor_written_through_a_link(tmp_path: Path, smarticles: Smarticles) -> None:
     mine = tmp_path / "scene.yaml"
     mine.write_text("precious")

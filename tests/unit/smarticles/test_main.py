@@ -1,4 +1,4 @@
-"""The command line: help, refusals, and what becomes of errors."""
+"""The command line: help, rejections, and what becomes of errors."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from command_cases import Smarticles
 from syrupy.assertion import SnapshotAssertion
 
 from dem.errors import InputError, RunError
-from smarticles.main import build_parser, guarded
-from smarticles.stopping import orderly_stop
+from smarticles.command_line import Cell, columns
+from smarticles.main import build_parser, guarded, orderly_stop
 
 COMMANDS = {
     "run", "plan", "schema", "doctor", "measure", "render", "view", "export", "sweep", "status", "resume", "study",
@@ -115,8 +115,9 @@ class TestGuarded:
             ),
             (
                 ModuleNotFoundError("No module named 'pandas'", name="pandas"),
-                1,
-                "error: the Python package 'pandas' is not installed; run `make setup`, then `smarticles doctor`",
+                2,
+                "error: the Python package 'pandas' is missing; install it: pip install smarticles, "
+                "or `make setup` in the repository",
             ),
             (
                 ZeroDivisionError("division by zero"),
@@ -216,3 +217,9 @@ def test_python_m_smarticles_is_the_command(tmp_path: Path) -> None:
     answer = subprocess.run(command("plan", str(tmp_path / "absent.yaml")), capture_output=True, check=False, text=True)
     assert answer.returncode == 2
     assert answer.stderr.startswith(f"smarticles: error: {tmp_path}/absent.yaml: ")
+
+
+def test_columns_of_numbers_are_aligned_to_the_right() -> None:
+    text = columns(["name", "value", "note"], [["a", 1.23456, "x y"], ["long", None, ""], ["b", float("nan"), ""]])
+    assert text.splitlines() == ["name  value  note", "a     1.235  x y", "long      -", "b         -"]
+    assert columns(["φ"], [[Cell("0.10")], [Cell("-")]]).splitlines() == ["   φ", "0.10", "   -"]

@@ -1,4 +1,4 @@
-"""--ranks: processes of engine: lammps, on this machine and on a cluster; refused where it has no meaning."""
+"""--ranks: processes of engine: lammps, on this machine and on a cluster; rejected where it has no meaning."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_ranks_are_those_asked_for_and_one_by_default(
     assert seen == [("1", "1"), ("3", "1")]
 
 
-def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_told(
+def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_asked(
     scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]]
 ) -> None:
     scene, out = load_scene(scene_file, ["engine=lammps"]), scene_file.parent / "out"
@@ -64,7 +64,7 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_told(
         (["--engine", "lammps", "--ranks", "0"], "--ranks: must be a whole number from 1: got '0'"),
     ],
 )
-def test_what_has_no_meaning_is_refused_before_anything_starts(
+def test_what_has_no_meaning_is_rejected_before_anything_starts(
     scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]], options: list[str], told: str
 ) -> None:
     said = smarticles("run", scene_file, "--out", scene_file.parent / "out", *options)
@@ -85,9 +85,9 @@ def test_a_sweep_asks_a_cluster_for_ranks(sweep_file: Path, tmp_path: Path, smar
     assert "2 tasks of 1 run on 96 ranks: 2 nodes" in said.out
     assert "#SBATCH --nodes=2\n#SBATCH --ntasks=96\n#SBATCH --cpus-per-task=1\n" in said.out
     assert '--out "runs/$1" --ranks 96 ' in said.out
-    refused = smarticles(*words, "--engine", "links", *cluster)
-    assert refused.status == 2
-    assert "--ranks 96: engine: links is one process; leave it out, or give --engine lammps" in refused.err
+    rejected = smarticles(*words, "--engine", "links", *cluster)
+    assert rejected.status == 2
+    assert "--ranks 96: engine: links is one process; leave it out, or give --engine lammps" in rejected.err
     alone = smarticles(*words, "--engine", "lammps")
     assert alone.status == 2
     assert "--ranks: is for a cluster; give --submit slurm" in alone.err

@@ -10,9 +10,6 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from PIL import Image
 
-from postprocess.pictures.canvas import VIEWS
-from smarticles.layout import Cell, columns
-
 
 def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
@@ -41,18 +38,7 @@ def test_measure_names_each_definition_within_100_columns(
         assert ("SE: their standard error" in told) == (not words)
 
 
-def test_measure_writes_a_table_of_several_runs(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
-    table = tmp_path / "table.csv"
-    said = smarticles("measure", *runs, "--table", table)
-    assert said.status == 0
-    with table.open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["run"] for row in rows] == [str(runs[0])] * 4 + [str(runs[1])] * 4
-    assert said.out.splitlines()[-1].startswith(f"{table}: 8 rows, ")
-
-
-def test_measure_does_not_overwrite_unless_told(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_does_not_overwrite_unless_asked(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run, table = write_run(tmp_path / "a"), tmp_path / "table.csv"
     table.write_text("precious")
     said = smarticles("measure", run, "--table", table)
@@ -88,10 +74,10 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     said = smarticles("measure", run, "--frames", "--json")
     assert said.status == 0
 
-    def refuse(word: str) -> None:
+    def reject(word: str) -> None:
         raise AssertionError(word)
 
-    rows = json.loads(said.out, parse_constant=refuse)
+    rows = json.loads(said.out, parse_constant=reject)
     assert [row["frame"] for row in rows] == list(range(16))
     assert rows[0]["phi voxel [-]"] is None
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
@@ -132,7 +118,7 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     assert "standard error over runs" in said.out
 
 
-def test_measure_refuses_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_rejects_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     said = smarticles("measure", run, "--by", "seeed")
     assert (said.status, said.err) == (
@@ -141,13 +127,6 @@ def test_measure_refuses_groups_that_are_none(tmp_path: Path, write_run: WriteRu
     )
     assert "leave --frames out" in smarticles("measure", run, "--by", "seed", "--frames").err
     assert "names no column" in smarticles("measure", run, "--by", ",").err
-
-
-def test_measure_of_nothing_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("measure", tmp_path / "absent")
-    assert said.status == 2
-    assert said.err.startswith("smarticles: error: ")
-    assert "absent" in said.err
 
 
 def test_a_frame_that_is_cut_off_has_a_way_out_that_works(
@@ -165,7 +144,7 @@ def test_a_frame_that_is_cut_off_has_a_way_out_that_works(
     assert len(rows) == 15
 
 
-def test_measure_tells_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_measure_warns_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     assert smarticles("measure", run).err == ""
     (run / "series.h5").unlink()
@@ -175,14 +154,6 @@ def test_measure_tells_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun
     (line,) = said.err.splitlines()
     assert line.startswith(f"smarticles: warning: {run / 'series.h5'}: is gone, although the run is done, ")
     assert "put it back, or run" in line
-
-
-def test_render_names_the_kinds_of_files(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a", frames_per_phase=1)
-    said = smarticles("render", run, "--output", tmp_path / "film.avi")
-    assert said.status == 2
-    assert "'.avi' is no kind of file that is drawn here; end the name in .png for a picture" in said.err
-    assert ".gif, .webp, .mp4 for a film" in said.err
 
 
 def test_a_picture_that_is_there_hides_no_bad_option(
@@ -204,22 +175,6 @@ def test_a_picture_that_is_there_hides_no_bad_option(
         assert told in said.err
 
 
-@pytest.mark.parametrize(
-    ("command", "told"),
-    [
-        ("render", "it is a sweep; give one of its runs, "),
-        ("measure", "no run of this sweep has frames yet; start them with: smarticles resume"),
-    ],
-)
-def test_a_sweep_where_a_run_is_wanted(
-    command: str, told: str, tmp_path: Path, sweep_file: Path, smarticles: Smarticles
-) -> None:
-    smarticles("sweep", sweep_file, "--out", tmp_path / "out")
-    said = smarticles(command, tmp_path / "out")
-    assert said.status == 2
-    assert told in said.err
-
-
 @pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
 def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, smarticles: Smarticles) -> None:
     (tmp_path / "photos").mkdir()
@@ -234,12 +189,6 @@ def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, sma
         assert said.status == 2
         assert told in said.err
         assert "; give the directory of a run" in said.err
-
-
-def test_render_refuses_a_time_for_a_film(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("render", tmp_path, "--time", "1", "--output", tmp_path / "film.gif")
-    assert said.status == 2
-    assert said.err.startswith("smarticles: error: --time 1: a film shows all times; ")
 
 
 def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -287,6 +236,8 @@ def test_render_draws_runs_beside_each_other_and_one_smarticle(
         (("--fps", "10"), "--fps 10: a picture shows one time; use --time, or write a film: --output film.gif"),
         (("--from", "1"), "--from 1: a picture shows one time"),
         (("--smarticle", "1", "--output", "a.gif"), "--smarticle 1: is drawn alone, in a picture; leave it out"),
+        (("--time", "1", "--output", "film.gif"), "--time 1: a film shows all times; "),
+        (("--output", "film.avi"), "'.avi' is no kind of file that is drawn here; end the name in .png for a picture"),
         (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
         (("--clim", "all"), "must be LOW:HIGH, two numbers in order, or run: got 'all'"),
         (("--size", "12y3"), "must be a number of pixels from 1, or two as in 1280x720: got '12y3'"),
@@ -298,20 +249,3 @@ def test_render_says_what_has_no_meaning(
     said = smarticles("render", tmp_path, *words)
     assert said.status == 2
     assert message in said.err
-
-
-def test_render_help_names_all_it_can_do(smarticles: Smarticles) -> None:
-    text = smarticles("render", "--help").out
-    assert all(name in text for name in ["crossings", "contacts", "height", "speed", "id", *VIEWS])
-
-
-def test_columns() -> None:
-    text = columns(["name", "value", "note"], [["a", 1.23456, "x y"], ["long", None, ""], ["b", float("nan"), ""]])
-    assert text.splitlines() == [
-        "name  value  note",
-        "a     1.235  x y",
-        "long      -",
-        "b         -",
-    ]
-    assert columns(["a", "b"], []) == "a  b"
-    assert columns(["φ"], [[Cell("0.10")], [Cell("-")]]).splitlines() == ["   φ", "0.10", "   -"]

@@ -81,7 +81,7 @@ def test_files_and_folders_that_are_no_scene(
 
 
 @pytest.mark.parametrize(("threads", "told"), [("2", False), ("3", True), ("64", True)])
-def test_more_threads_than_cores_are_told(
+def test_more_threads_than_cores_are_warned_of(
     threads: str, told: bool, scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
@@ -93,27 +93,8 @@ def test_more_threads_than_cores_are_told(
     assert said.err.endswith("use at most 2\n") == told
 
 
-@pytest.mark.parametrize(("options", "threads"), [([], "1"), (["--threads", "3"], "3")])
-def test_threads_are_those_asked_for_whatever_the_batch_system_says(
-    scene_file: Path,
-    smarticles: Smarticles,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
-    threads: str,
-) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "64")
-    seen: list[str] = []
-
-    def run_scene(*_: object, **__: object) -> None:
-        seen.append(os.environ["OMP_NUM_THREADS"])
-
-    monkeypatch.setattr("dem.run.run.run_scene", run_scene)
-    assert smarticles("run", scene_file, "--out", scene_file.parent / "out", *options).status == 0
-    assert seen == [threads]
-
-
 @pytest.mark.parametrize(("options", "threads"), [([], "3"), (["--threads", "1"], "1")])
-def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
+def test_a_resumed_run_has_the_threads_that_it_began_with_unless_asked(
     scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch, options: list[str], threads: str
 ) -> None:
     out = scene_file.parent / "out"
@@ -133,10 +114,3 @@ def test_a_resumed_run_has_the_threads_that_it_began_with_unless_told(
     shutil.copy(scene_file, out / "scene.yaml")
     assert smarticles("resume", out, *options).status == 0
     assert seen == [threads, threads]
-
-
-@pytest.mark.parametrize("number", ["0", "-1", "two"])
-def test_a_number_of_threads_that_is_none_is_refused(scene_file: Path, smarticles: Smarticles, number: str) -> None:
-    said = smarticles("run", scene_file, "--out", scene_file.parent / "out", "--threads", number)
-    assert said.status == 2
-    assert f"--threads: must be a whole number from 1: got '{number}'" in said.err

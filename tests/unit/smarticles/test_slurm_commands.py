@@ -1,4 +1,4 @@
-"""sweep, status and resume with a queue: refusals before anything is written, dry runs, states."""
+"""sweep, status and resume with a queue: rejections before anything is written, dry runs, states."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from command_cases import SWEEP, Smarticles
 
-from templates.slurm import queue as slurm
+from templates.slurm import submission as slurm
 
 LARGE = ("--cluster", "example-large")
 
@@ -54,7 +54,7 @@ def test_a_dry_run_shows_list_and_script_and_writes_nothing(sweep_file: Path, sm
         ([*LARGE, "--memory", "900000"], "1 × 900000 MiB are more than the 250000 MiB"),
     ],
 )
-def test_what_a_cluster_cannot_give_is_refused_before_anything_is_written(
+def test_what_a_cluster_cannot_give_is_rejected_before_anything_is_written(
     words: list[str], message: str, sweep_file: Path, smarticles: Smarticles, queue: list[str]
 ) -> None:
     out = sweep_file.parent / "out"
@@ -114,18 +114,6 @@ def test_a_sweep_is_submitted_followed_and_resumed(
     assert (out / "jobs/002/runs.txt").read_text() == "n5\n"
 
 
-def test_an_unknown_state_is_an_error(
-    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str]
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
-    queue.append("NAME|7|0|DREAMING|None")
-    for command in (("status", out), ("resume", out, "--submit", "slurm")):
-        said = smarticles(*command)
-        assert said.status == 1
-        assert "task 7_0 is DREAMING, a state that is not known here" in said.err
-
-
 def test_status_says_when_the_queue_does_not_answer(
     sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,7 +132,7 @@ def test_status_says_when_the_queue_does_not_answer(
     assert "the queue cannot be asked" in said.err
 
 
-def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+def test_too_many_points_are_rejected_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     sweep_file.write_text(SWEEP.replace("[5, 6]", str(list(range(1, 200))).replace(" ", "")))
     sweep_file.write_text(sweep_file.read_text().replace("}}", "}}", 1) + f"repeats: {{seeds: {list(range(100))}}}\n")
     said = smarticles("sweep", sweep_file, "--out", tmp_path / "out")
@@ -153,19 +141,3 @@ def test_too_many_points_are_refused_unless_wanted(sweep_file: Path, tmp_path: P
     sweep_file.write_text(SWEEP)
     assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "1").status == 2
     assert smarticles("sweep", sweep_file, "--dry-run", "--max-points", "2").status == 0
-
-
-def test_status_of_a_thousand_runs(tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    points = [{"name": f"s{k}", "scene_sha256": "x", "expected_s": 1.0, "values": {"seed": k}} for k in range(1000)]
-    (out / "runs").mkdir(parents=True)
-    (out / "sweep.json").write_text(json.dumps({"format": 1, "name": "many", "command": "c", "points": points}))
-    for number, point in enumerate(points):
-        run = out / "runs" / str(point["name"])
-        run.mkdir()
-        (run / "run.json").write_text("{}")
-        (run / ("done.json" if number % 2 else "progress.json")).write_text(
-            json.dumps({"status": "done", "time_s": 1.0, "steps": 1, "wall_s": 1.0, "phases": []})
-        )
-    said = smarticles("status", out)
-    assert said.out.splitlines()[-1] == "many: 1000 runs, 500 stopped, 500 done"

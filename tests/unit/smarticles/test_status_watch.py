@@ -1,4 +1,4 @@
-"""status --watch: looks again until nothing goes on."""
+"""status --watch: checks again until nothing goes on."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_it_ends_when_nothing_runs(
     said = smarticles("status", out, "--watch", "--every", "0.5")
     assert (said.status, said.err) == (0, "")
     assert clock.waits == [0.5] * 3
-    # A look that shows nothing new is not told again.
+    # A check that shows nothing new prints nothing.
     lasts = [line for line in said.out.splitlines() if line.startswith("counts: ")]
     assert lasts == ["counts: 2 runs, 1 done, 1 running"] * 2 + ["counts: 2 runs, 2 done"]
     assert [line.split()[1] for line in said.out.splitlines() if line.startswith("n6")] == ["running"] * 2 + ["done"]
@@ -72,7 +72,7 @@ def test_ctrl_c_is_its_way_to_end(
     assert said.out.count("running") == 2
 
 
-def test_of_what_does_not_run_it_is_one_look(out: Path, smarticles: Smarticles) -> None:
+def test_where_nothing_runs_it_checks_once(out: Path, smarticles: Smarticles) -> None:
     assert smarticles("status", out, "--watch").out == smarticles("status", out).out
     assert smarticles("status", "--watch", out).out == smarticles("status", out).out
     said = smarticles("status", out, "--every", "5")

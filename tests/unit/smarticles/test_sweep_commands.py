@@ -9,7 +9,6 @@ import pytest
 from command_cases import SWEEP, Smarticles, WriteRun
 from synthetic import write_ended
 
-from dem.errors import InputError
 from dem.record.rundir import claimed
 from studies.registry import study_file
 from templates.sweep.expand import expand
@@ -47,13 +46,7 @@ def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, 
     assert not (out / "runs").exists()
 
 
-def test_a_sweep_needs_a_place(sweep_file: Path, smarticles: Smarticles) -> None:
-    said = smarticles("sweep", sweep_file)
-    assert said.status == 2
-    assert said.err.startswith("smarticles: error: sweep: --out DIR is missing; give a directory")
-
-
-def test_status_of_one_run_tells_whether_a_process_works_in_it(
+def test_status_of_one_run_shows_whether_a_process_works_in_it(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "a", status="unfinished")
@@ -65,13 +58,6 @@ def test_status_of_one_run_tells_whether_a_process_works_in_it(
     with claimed(run, resume=True):
         assert state() == "running"
     assert state() == "stopped"
-
-
-def test_a_run_is_not_started_over_another_one(tmp_path: Path, write_run: WriteRun) -> None:
-    run = write_run(tmp_path / "a", status="unfinished")
-    message = "holds a run and is left as it is; go on with it by --resume, or choose another directory"
-    with pytest.raises(InputError, match=message), claimed(run, resume=False):
-        pass
 
 
 def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> None:
@@ -97,12 +83,6 @@ def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smartic
     ]
 
 
-def test_status_of_one_run(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    said = smarticles("status", write_run(tmp_path / "alone"))
-    assert said.status == 0
-    assert said.out.splitlines()[1].split()[:2] == ["alone", "done"]
-
-
 def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -117,14 +97,6 @@ def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     assert json.loads(smarticles("status", run, "--json").out)["runs"][0]["checkpoint_s"] == 3.2
     # Where all went well, nobody asks.
     assert "checkpoint s" not in smarticles("status", write_run(tmp_path / "done")).out
-
-
-def test_status_of_something_else_is_status_2(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("status", tmp_path)
-    assert said.status == 2
-    assert said.err.startswith(
-        f"smarticles: error: {tmp_path}: holds neither a run (run.json) nor a sweep (sweep.json); "
-    )
 
 
 def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
@@ -148,7 +120,7 @@ def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: P
 
 
 def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    """The real command of a run, given a scene that it refuses before YADE is needed."""
+    """The real command of a run, given a scene that it rejects before YADE is needed."""
     out = tmp_path / "out"
     smarticles("sweep", sweep_file, "--out", out)
     finish(out)
@@ -168,7 +140,7 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
 
 
-def test_another_study_in_the_same_directory_is_refused(
+def test_another_study_in_the_same_directory_is_rejected(
     sweep_file: Path, tmp_path: Path, smarticles: Smarticles
 ) -> None:
     out = tmp_path / "out"
@@ -242,62 +214,11 @@ def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path
     assert "lw1.00_yade_seed1" in missing
 
 
-def test_a_study_can_be_analysed_without_starting_a_run(finished_study: Path, smarticles: Smarticles) -> None:
-    said = smarticles("study", "gravish", "--quick", "--analyse", "--out", finished_study)
-    assert said.status == 0
-    assert "FOUND: φ_f is above φ_0 at every l/w" in said.out.splitlines()
-    assert "lw1.00_yade_seed1" in (finished_study / "results" / "missing.csv").read_text(encoding="utf-8")
-    assert not (finished_study / "runs" / "lw1.00_yade_seed1").exists()
-
-
 def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("study", "gravish", "--quick", "--analyse", "--out", tmp_path / "out")
     assert said.status == 2
     assert "is finished; leave --analyse out to start them" in said.err
     assert not (tmp_path / "out" / "results").exists()
-
-
-def test_the_study_of_procedures_is_analysed(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "study"
-    points = expand(load_sweep(study_file("procedures", quick=True)))
-    smarticles("sweep", study_file("procedures", quick=True), "--out", out)
-    after = {"external": 0.115, "shape-change": 0.09, "internal": 0.13}
-    for point in points[:-1]:
-        values = point.values
-        run = write_run(
-            out / "runs" / point.name,
-            aspect_ratio=values["l_over_w"],
-            seed=values["seed"],
-            theta=values["theta_deg"],
-            count=6,
-            frames_per_phase=1,
-            phases=tuple(phase.type for phase in point.scene.phases),
-            packing=(0.1, 0.1, after[values["procedure"]], after[values["procedure"]]),
-            shake_time=2.0,
-            oscillate_time=2.0,
-            straight=1.3,
-            work=1e-5,
-        )
-        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
-        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
-    monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)
-    monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
-    said = smarticles("study", "procedures", "--quick", "--analyse", "--out", out)
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 36 runs instead of 326; ")
-    assert lines[1].split()[:10] == ["engine", "procedure", "θ", "l/w", "seeds", "φ_f", "φ", "at", "rest", "again"]
-    assert [line.split()[1] for line in lines[2:14]] == (
-        ["static"] * 3 + ["external"] * 3 + ["shape-change"] * 3 + ["internal"] * 3
-    )
-    assert "FOUND: Shape change: the centre of mass rises when the smarticles straighten" in lines
-    assert "NO DATA: Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5" in lines
-    findings = (out / "results" / "findings.csv").read_text(encoding="utf-8")
-    assert "Study procedures, fidelity draft, engine links and yade: 35 of 36 runs, 1 missing" in findings
-    assert "external_lw0.70_yade_seed1" in (out / "results" / "missing.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -311,7 +232,7 @@ def test_the_study_of_procedures_is_analysed(
         (["--fidelity", "fine"], "--fidelity fine: is not known; known: draft, standard, reference"),
     ],
 )
-def test_what_a_study_does_not_have_is_refused(
+def test_what_a_study_does_not_have_is_rejected(
     words: list[str], message: str, tmp_path: Path, smarticles: Smarticles
 ) -> None:
     said = smarticles("study", "sensitivity", *words, "--out", tmp_path / "out")
@@ -330,7 +251,7 @@ def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path
     assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
 
 
-def test_a_study_of_both_engines_refuses_one(tmp_path: Path, smarticles: Smarticles) -> None:
+def test_a_study_of_both_engines_rejects_one(tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("study", "engines", "--engine", "links", "--out", tmp_path / "out")
     assert said.status == 2
     assert said.err.startswith("smarticles: error: --engine links: study engines cannot be run on it (")
@@ -338,7 +259,7 @@ def test_a_study_of_both_engines_refuses_one(tmp_path: Path, smarticles: Smartic
     assert not (tmp_path / "out").exists()
 
 
-def test_a_fidelity_at_which_a_study_cannot_be_run_is_refused_by_its_option(
+def test_a_fidelity_at_which_a_study_cannot_be_run_is_rejected_by_its_option(
     tmp_path: Path, smarticles: Smarticles
 ) -> None:
     said = smarticles("study", "chain", "--quick", "--fidelity", "reference", "--out", tmp_path / "out")
@@ -348,7 +269,7 @@ def test_a_fidelity_at_which_a_study_cannot_be_run_is_refused_by_its_option(
     assert len(said.err.splitlines()) == 1
 
 
-def test_a_study_whose_template_ignores_the_fidelity_refuses_it(
+def test_a_study_whose_template_ignores_the_fidelity_rejects_it(
     sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def file_of(name: str, *, quick: bool = False) -> Path:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 def main() -> int:
     behaviour, scene, directory = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
-    if behaviour == "refuse":
+    if behaviour == "reject":
         print("smarticles: error: scene.yaml: count: -1 is negative; use 1", file=sys.stderr)
         return 2
     resume = sys.argv[4:] == ["--resume"]

@@ -8,7 +8,7 @@ import pytest
 
 from dem.errors import InputError
 from templates.slurm.cluster import Cluster, format_time, load_cluster, parse_time, shipped_clusters
-from templates.slurm.request import Request, Wishes, plan_request
+from templates.slurm.job import Request, Wishes, plan_request
 
 FILE = """\
 schema_version = 1
@@ -52,17 +52,12 @@ def test_shipped_clusters_are_valid(name: str) -> None:
         ("max_array_size", "max_aray_size", "^[^ ]*: unknown key 'max_aray_size'; did you mean 'max_array_size'?"),
         ("max_time", "maxtime", "partitions.long: unknown key 'maxtime'; did you mean 'max_time'?"),
         ('name = "mine"', "", "name: missing"),
-        ("= 100", "= 0", "max_array_size: 0 is out of range; use at least 1"),
         ('"1-00:00:00"', '"a day"', "'a day' is not a time; write D-HH:MM:SS"),
         ('= "long"', '= "logn"', "default_partition: there is no 'logn'; did you mean 'long'?"),
         ('name = "mine"', 'name = "my cluster"', "name: 'my cluster' would need quoting in a job script; use letters"),
         ('name = "mine"', 'name = "m"\nmodules = ["a; rm -rf /"]', "modules.0: .*rm -rf"),
         ('name = "mine"', 'name = "m"\noptions = ["--x\\n#SBATCH --y"]', "options.0: "),
-        ('"slurm"', "5", "scheduler: 5 is not known; use 'slurm'"),
-        ('"slurm"', '"slurn"', "scheduler: 'slurn' is not known; did you mean 'slurm'"),
         ("= 16", '= "16"', "partitions.long.cores_per_node: '16' is no whole number from 1"),
-        ("= 16", "= 0", 'cores_per_node: 0 is no whole number from 1; give one, or "here"'),
-        ("= 100", '= "100"', "max_array_size: got the text '100', expected a number; leave out the quotes"),
         ("schema_version = 1", "schema_version = ", "not valid TOML: .*line 1"),
         ('"slurm"', '"pbs"', "scheduler: 'pbs' is not known; use 'slurm'"),
     ],
@@ -94,7 +89,7 @@ def test_times_are_read_as_slurm_reads_them(text: str, seconds: int) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "1h", "-5", "1:2:3:4", "0", "00:00", "1-", "1-2:3:4:5", "1.5", "١"])
-def test_other_times_are_refused(text: str) -> None:
+def test_other_times_are_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="time"):
         parse_time(text)
 
@@ -128,7 +123,7 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
         ({"time": "1-00:01:00"}, "--time 1-00:01:00: partition long of mine allows 1-00:00:00"),
         ({"time": "00:31:00", "partition": "short"}, "partition short of mine allows 00:30:00"),
         ({"time": "soon"}, "--time: 'soon' is not a time"),
-        ({"time": "2"}, "--time 2: runs are told to stop 120 s before the end"),
+        ({"time": "2"}, "--time 2: runs are asked to stop 120 s before the end"),
         ({"runs_per_task": 17}, "--runs-per-task 17: partition long of mine has 16 cores"),
         ({"runs_per_task": 16, "memory_mib": 2001}, "16 × 2001 MiB are more than the 32000 MiB"),
         ({"memory_mib": 40000}, "--runs-per-task 1: 1 × 40000 MiB are more than"),
@@ -136,7 +131,7 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
         ({"partition": "lng"}, "--partition lng: cluster mine has no such partition; did you mean 'long'?"),
     ],
 )
-def test_requests_beyond_the_limits_are_refused(cluster: Cluster, wishes: dict[str, object], message: str) -> None:
+def test_requests_beyond_the_limits_are_rejected(cluster: Cluster, wishes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         planned(cluster, **wishes)  # type: ignore[arg-type]
 
@@ -158,9 +153,3 @@ def test_an_array_of_exactly_the_limit_is_given_and_one_more_is_not(cluster: Clu
     assert planned(cluster, 100, runs_per_task=1).tasks == 100
     with pytest.raises(InputError, match=r"101 runs, 1 per task, make an array of 101 tasks; mine allows 100"):
         planned(cluster, 101, runs_per_task=1)
-
-
-def test_a_cluster_may_be_this_machine() -> None:
-    _, partition = load_cluster("local-slurm").partition(None)
-    assert partition.cores >= 1
-    assert partition.memory_mib > 100

@@ -9,29 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dem.errors import InputError
-from templates.sweep.render import evaluate, render_text, render_yaml
-
-HOSTILE = [
-    'a: b\ninjected: "yes"',
-    "x # a comment",
-    "'; } ] --- ...",
-    '"quoted" and \\ back',
-    "{{ 7 * 7 }}",
-    "{% raw %}",
-    "- item",
-    "*alias &anchor !!python/object:os.system",
-    "yes",
-    "null",
-    "1e3",
-    "",
-    "  padded  ",
-    "tab\tnew\nline\r\n",
-    "value0z",
-    "\u2028\u00e9\U0001f600",
-]
+from templates.sweep.render import evaluate, render_yaml
 
 
-@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("text", ['a: b\ninjected: "yes"', "'; } ] --- # {{ 7 * 7 }}", "null", "", "value0z"])
 @pytest.mark.parametrize("place", ["{{ s }}", '"{{ s }}"', "'{{ s }}'"])
 def test_a_hostile_string_stays_one_string(text: str, place: str) -> None:
     data = render_yaml(f"before: 1\nkey: {place}\nflow: {{a: {place}, b: 2}}\n", {"s": text}, "t")
@@ -56,7 +37,7 @@ def test_a_value_within_text_becomes_text() -> None:
     assert data == {"name": "lw0.7-#a: b", "quoted": "0.7"}
 
 
-def test_a_list_within_text_is_refused() -> None:
+def test_a_list_within_text_is_rejected() -> None:
     with pytest.raises(InputError, match=r"^t, line 1.*list or mapping within text: \[1\]"):
         render_yaml("name: lw{{ x }}", {"x": [1]}, "t")
 
@@ -87,14 +68,6 @@ def test_constants_and_filters_work() -> None:
     assert render_yaml(template, {"x": 0.7}, "t") == {"a": 3, "b": "0.70", "c": 1}
 
 
-def test_numbers_in_exponent_form_are_numbers() -> None:
-    assert render_yaml("a: 1e-3\nb: 1.27e-3\nc: -2E6", {}, "t") == {
-        "a": 1e-3,
-        "b": 1.27e-3,
-        "c": -2e6,
-    }
-
-
 def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
     with pytest.raises(InputError) as caught:
         render_yaml("a: 1\nb: {{ cuont }}\n", {"count": 3, "seed": 1}, "scene.yaml.j2")
@@ -109,6 +82,7 @@ def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
         ("a: 1\na: 2\n", r"t, line 2, column 1: not valid YAML: key 'a' is given twice"),
         ("a: {{ x.y }}", "has no attribute 'y'"),
         ("a: {{ x / 0 }}", "t, line 1: .*division"),
+        ("a: !!python/object/apply:os.getcwd []", "could not determine a constructor"),
         ("a: {{ range }}", "gives function; it must give numbers, text or lists"),
         ("{% include 'other' %}", "t, line 1: no loader"),
         ("a: {{ x.__class__.__mro__ }}", "unsafe"),
@@ -118,11 +92,6 @@ def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
 def test_mistakes_in_a_template_are_input_errors(template: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         render_yaml(template, {"x": 1}, "t")
-
-
-def test_yaml_cannot_make_python_objects() -> None:
-    with pytest.raises(InputError, match="could not determine a constructor"):
-        render_yaml("a: !!python/object/apply:os.getcwd []", {}, "t")
 
 
 @pytest.mark.parametrize(
@@ -159,9 +128,3 @@ def test_expressions(expression: str, value: Any) -> None:
 def test_bad_expressions_are_input_errors(expression: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         evaluate(expression, {"n": 270}, "f: derived.x")
-
-
-def test_names_are_rendered_as_text() -> None:
-    assert render_text("lw{{ '%.2f' | format(x) }}", {"x": 0.7}, "t") == "lw0.70"
-    with pytest.raises(InputError, match="'y' is undefined"):
-        render_text("lw{{ y }}", {"x": 0.7}, "t")

@@ -12,12 +12,21 @@ from sweep_cases import MakeFolder
 from synthetic import write_ended
 
 from dem.errors import InputError, RunError
-from templates.slurm import queue as slurm
 from templates.slurm import submission
-from templates.slurm.cluster import load_cluster
-from templates.slurm.queue import STATES, QueueError, Task, parse_job_id, parse_queue
-from templates.slurm.request import Wishes, plan_request
-from templates.slurm.submission import draft, merged, refuse_queued, submissions, tasks_of_runs, to_submit, write
+from templates.slurm.job import Wishes
+from templates.slurm.submission import (
+    QueueError,
+    Task,
+    draft,
+    merged,
+    parse_job_id,
+    parse_queue,
+    reject_queued,
+    submissions,
+    tasks_of_runs,
+    to_submit,
+    write,
+)
 from templates.sweep.folder import Folder, RunStatus
 
 
@@ -50,13 +59,6 @@ def test_a_line_that_is_not_understood_is_an_error() -> None:
         parse_queue("slurm_load_jobs: something\n")
 
 
-def test_every_state_of_the_manual_is_known() -> None:
-    manual = """BOOT_FAIL CANCELLED COMPLETED CONFIGURING COMPLETING DEADLINE FAILED NODE_FAIL OUT_OF_MEMORY PENDING
-    PREEMPTED RUNNING RESV_DEL_HOLD REQUEUE_FED REQUEUE_HOLD REQUEUED RESIZING REVOKED SIGNALING SPECIAL_EXIT STAGE_OUT
-    STOPPED SUSPENDED TIMEOUT"""
-    assert set(manual.split()) <= set(STATES)
-
-
 @pytest.fixture
 def folder(make_folder: MakeFolder) -> Folder:
     """Four runs; n20 is expected to take longer."""
@@ -64,18 +66,8 @@ def folder(make_folder: MakeFolder) -> Folder:
 
 
 def submitted(folder: Folder, number: int | None = 12, runs_per_task: int = 2) -> submission.Draft:
-    cluster = load_cluster("example-large")
-    request = plan_request([entry.expected_s for entry in folder.entries], cluster, Wishes(runs_per_task=runs_per_task))
-    made = draft(
-        folder.path,
-        folder.name,
-        folder.entries,
-        cluster=cluster,
-        reference="example-large",
-        request=request,
-        command=("smarticles",),
-        token="tt",
-    )
+    wishes = Wishes(runs_per_task=runs_per_task)
+    made = draft(folder.path, folder.name, folder.entries, "example-large", wishes, token="tt")
     write(folder, made)
     if number is not None:
         file = folder.path / "jobs" / made.submission.number / "job.json"
@@ -92,7 +84,7 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         assert command[0] == "squeue"
         return "\n".join(lines)
 
-    monkeypatch.setattr(slurm, "_call", call)
+    monkeypatch.setattr(submission, "_call", call)
     return lines
 
 
@@ -132,12 +124,6 @@ def test_a_job_whose_number_was_lost_is_found_by_its_name(folder: Folder, queue:
     assert to_submit(folder, tasks) == []
 
 
-def test_a_waiting_task_counts_more_than_one_that_ended(folder: Folder, queue: list[str]) -> None:
-    submitted(folder)
-    queue += ["test.tt|12|0|RUNNING|None", "test.tt|11|0|TIMEOUT|None"]
-    assert tasks_of_runs(submissions(folder.path))["n20_seed1"].label == "12_0"
-
-
 def status(state: Any, **more: Any) -> RunStatus:
     return RunStatus(name="a", directory=Path("a"), state=state, **more)
 
@@ -163,12 +149,12 @@ def test_queue_and_directory_together(directory: str, slurm_state: str, state: s
 
 
 def test_nothing_is_computed_here_while_it_is_in_the_queue(folder: Folder, queue: list[str]) -> None:
-    refuse_queued(folder)
+    reject_queued(folder)
     submitted(folder)
-    refuse_queued(folder)
+    reject_queued(folder)
     queue.append("test.tt|12|0|RUNNING|None")
     with pytest.raises(InputError, match=r"in Slurm's queue \(jobs 12\).*scancel 12"):
-        refuse_queued(folder)
+        reject_queued(folder)
 
 
 def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,11 +163,11 @@ def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypa
     def call(command: tuple[str, ...], _: Path | None) -> str:
         raise subprocess.CalledProcessError(1, command, stderr="Unable to contact\nslurm controller")
 
-    monkeypatch.setattr(slurm, "_call", call)
+    monkeypatch.setattr(submission, "_call", call)
     with pytest.raises(QueueError, match="the queue cannot be asked: Unable to contact slurm controller"):
         tasks_of_runs(submissions(folder.path))
     with pytest.raises(InputError, match="was submitted to Slurm"):
-        refuse_queued(folder)
+        reject_queued(folder)
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"job_id": "x"}'])

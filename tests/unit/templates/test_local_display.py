@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from dem.record.document import Progress
-from templates.local.display import Display, Outcome, Snapshot, duration
+from templates.local import Display, Outcome, Snapshot, duration
 
 RUNNING = (
     ("lw0.70_seed1", 33.1, Progress(phase="shake", time_s=1.2, end_s=5.5, phi=0.1234)),

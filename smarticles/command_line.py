@@ -1,8 +1,9 @@
-"""argparse with errors that are one line and name the nearest thing that was meant."""
+"""What commands share: argparse with one-line errors, common options, and aligned columns."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -13,18 +14,18 @@ from dem.engine import ENGINES
 from dem.errors import InputError, nearest
 
 Handler = Callable[[argparse.Namespace], int]
-"""Does what a subcommand says; returns the exit status."""
+"""Does the work of a subcommand; returns the exit status."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises InputError instead of printing its usage first."""
+    """Raises InputError, with the nearest known word, instead of printing its usage first."""
 
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Refuse the command line.
+        """Reject the command line.
 
         Raises:
             InputError: always.
@@ -34,14 +35,12 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"[\w-]+", invalid[2])
             what = message.partition(":")[0].removeprefix("argument ")
             message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known)}"
-        wrong = re.fullmatch(r"(argument .*): invalid (?:float|int) value: ('.*')", message, flags=re.DOTALL)
-        if wrong:
-            message = f"{wrong[1]}: {wrong[2]} is not a number"
+        message = re.sub(r"invalid (?:float|int) value: ('.*')", r"\1 is not a number", message, flags=re.DOTALL)
         msg = f"{message}; see `{self.prog} --help`"
         raise InputError(msg)
 
-    def refuse_unknown(self, words: Sequence[str]) -> NoReturn:
-        """Refuse arguments that the command does not have.
+    def reject_unknown(self, words: Sequence[str]) -> NoReturn:
+        """Reject arguments that the command does not have.
 
         Raises:
             InputError: always.
@@ -65,7 +64,7 @@ class Commands:
 
         Args:
             name: its name.
-            handler: what does it.
+            handler: does its work.
             summary: one line for the list of commands.
             text: what it does and what to expect, for its own help.
             examples: command lines that work, with what they do.
@@ -82,6 +81,9 @@ class Commands:
         return parser
 
 
+# -- options that several commands have --------------------------------------------------------------------------------
+
+
 def add_debug(parser: Parser, default: Any = False) -> None:
     """Add --debug."""
     parser.add_argument("--debug", action="store_true", default=default, help="show the traceback of an error")
@@ -92,8 +94,13 @@ def add_json(parser: Parser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
 
 
-def add_scene(parser: Parser) -> None:
-    """Add the scene and --set."""
+def add_overwrite(parser: Parser) -> None:
+    """Add --overwrite."""
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+
+
+def add_scene(parser: Parser, what: str) -> None:
+    """Add the scene, --set and --engine; `what` is what --engine sets, for the help."""
     parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
     parser.add_argument(
         "--set",
@@ -102,6 +109,7 @@ def add_scene(parser: Parser) -> None:
         metavar="KEY=VALUE",
         help="change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
     )
+    add_engine(parser, what)
 
 
 def add_engine(parser: Parser, what: str) -> None:
@@ -113,21 +121,9 @@ def add_engine(parser: Parser, what: str) -> None:
     )
 
 
-def engine_settings(arguments: argparse.Namespace) -> list[str]:
-    """What --set and --engine say, as `KEY=VALUE`.
-
-    Raises:
-        InputError: they say different things.
-    """
-    settings: list[str] = list(arguments.set)
-    if arguments.engine is None:
-        return settings
-    for setting in settings:
-        key, _, value = setting.partition("=")
-        if key.strip() == "engine" and value.strip() != arguments.engine:
-            msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
-            raise InputError(msg)
-    return [*settings, f"engine={arguments.engine}"]
+def add_jobs(parser: Parser) -> None:
+    """Add --jobs."""
+    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
 
 
 def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
@@ -140,18 +136,36 @@ def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
     )
 
 
-def add_slots(parser: Parser) -> None:
-    """Add --jobs."""
-    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
+def scene_settings(arguments: argparse.Namespace) -> list[str]:
+    """Return --set and --engine as `KEY=VALUE`.
+
+    Raises:
+        InputError: they contradict each other.
+    """
+    settings: list[str] = list(arguments.set)
+    if arguments.engine is None:
+        return settings
+    for setting in settings:
+        key, _, value = setting.partition("=")
+        if key.strip() == "engine" and value.strip() != arguments.engine:
+            msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
+            raise InputError(msg)
+    return [*settings, f"engine={arguments.engine}"]
 
 
-def add_overwrite(parser: Parser) -> None:
-    """Add --overwrite."""
-    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
+    """Reject an output that exists, before the work and not after it.
+
+    Raises:
+        InputError: it exists and must not be replaced.
+    """
+    if path is not None and path.exists() and not overwrite:
+        msg = f"{option} {path}: exists; choose another name or give --overwrite"
+        raise InputError(msg)
 
 
 def positive_number(text: str) -> float:
-    """A finite number above 0."""
+    """Read a finite number above 0."""
     try:
         number = float(text)
     except ValueError:
@@ -163,7 +177,7 @@ def positive_number(text: str) -> float:
 
 
 def positive_int(text: str) -> int:
-    """A whole number from 1."""
+    """Read a whole number from 1."""
     try:
         number = int(text)
     except ValueError:
@@ -172,3 +186,52 @@ def positive_int(text: str) -> int:
         msg = f"must be a whole number from 1: got {text!r}"
         raise argparse.ArgumentTypeError(msg)
     return number
+
+
+# -- output ------------------------------------------------------------------------------------------------------------
+
+
+class Cell(str):
+    """A number that is formatted already; aligned as numbers are."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, value: float, form: str, factor: float = 1.0) -> Cell:
+        """Format a number times a factor; a dash where it is not finite."""
+        return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
+
+
+def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return a table of aligned columns; numbers to the right, NaN and None as a dash; nothing is cut to a width."""
+    cells = [[_text(value) for value in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(header, *cells, strict=True)]
+    numbers = [
+        bool(rows) and all(isinstance(row[k], int | float | Cell | None) for row in rows) for k in range(len(header))
+    ]
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if number else cell.ljust(width)
+            for cell, width, number in zip(line, widths, numbers, strict=True)
+        ).rstrip()
+        for line in [list(header), *cells]
+    )
+
+
+def _text(value: object) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def as_json(value: Any) -> str:
+    """Return indented JSON; numbers that are not finite become null, since JSON has none."""
+    return json.dumps(_finite(value), indent=2, ensure_ascii=False, default=str)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,76 @@
+"""How far contacts give way in a scene, from its loads and speeds, and how stiff they have to be.
+
+Estimates: the hardest impact, of `typical_effective_mass` at the greatest speed that a phase gives and a fall by w; the
+pile's weight times 1 + Γ, on two contacts of as many smarticles as can lie on the floor; a hook that lifts the pile's
+weight, by four contacts. The overlap of an impact falls with the root of the stiffness, that of a load with the
+stiffness itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from dem.phases.phase import SceneView
+from dem.phases.pull_hook import PullHook
+from dem.phases.shake import Shake
+from dem.physics.contact import typical_effective_mass
+
+LINEAR, LIMIT = 0.25, 0.5  # diameters up to which contacts are linear, and from which on a scene is rejected
+
+
+class Overlap(NamedTuple):
+    """An expected overlap.
+
+    Args:
+        cause: in words.
+        diameters: overlap over the diameter of a link's section [1].
+        stiffness: kn at which it is `LINEAR` [N/m].
+    """
+
+    cause: str
+    diameters: float
+    stiffness: float
+
+
+def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
+    """Return the expected overlaps of a scene: impact, weight, and a hook's pull where there is one."""
+    gravity, width, mass = scene.gravity_m_per_s2, scene.smarticle.middle_length_m, scene.smarticle.boxes.mass
+    stiffness, diameter = scene.fidelity.stiffness_N_per_m, scene.sphere_diameter
+    speeds = [phase.peak_speed(gravity) for phase in scene.phases]
+    if scene.actuates:
+        speeds.append(scene.motor.speed_limit_rad_per_s * scene.smarticle.boxes.barb_length)
+    speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
+    impact = speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness) / diameter
+    shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
+    pile = scene.count * mass * gravity
+    lying = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
+    loads = {"the pile's weight": pile * (1 + shaken) / (2 * lying)}
+    if any(isinstance(phase, PullHook) for phase in scene.phases):
+        loads["a hook that lifts the pile"] = pile / 4
+    found = [Overlap(f"an impact at {speed:.2g} m/s", impact, (impact / LINEAR) ** 2 * stiffness)]
+    found += [Overlap(name, load / stiffness / diameter, load / diameter / LINEAR) for name, load in loads.items()]
+    return tuple(found)
+
+
+def stiffness_for(scene: SceneView) -> float:
+    """Return the stiffness [N/m] at which no expected overlap is beyond the linear range, rounded up to two digits."""
+    needed = max(overlap.stiffness for overlap in expected_overlaps(scene))
+    unit = 10.0 ** (math.floor(math.log10(needed)) - 1)
+    return math.ceil(needed / unit) * unit
+
+
+def check_stiffness(scene: SceneView) -> None:
+    """Reject contacts that would give way by more than `LIMIT` diameters.
+
+    Raises:
+        ValueError: one line with key, value and the way out.
+    """
+    worst = max(expected_overlaps(scene), key=lambda overlap: overlap.diameters)
+    if worst.diameters > LIMIT:
+        msg = (
+            f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {worst.cause} presses contacts "
+            f"in by about {worst.diameters:.2g} of their thickness; use about {stiffness_for(scene):.2g} N/m, or leave "
+            "it out"
+        )
+        raise ValueError(msg)
