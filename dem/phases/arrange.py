@@ -23,30 +23,26 @@ class Arrange(Part, Phase):
     gap_m: Length = Field(..., description="free distance of neighbours where they will touch first [m]")
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the chain can be laid out, fits between its walls, and can reach them."""
         _check_links(scene, chain_of(scene))
         if scene.plane is not None and scene.plane.width_m is not None:
             _check_walls(scene, chain_of(scene), scene.plane.width_m)
 
     @property
     def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
         return 0.0
 
     @property
     def progress_duration(self) -> None:
-        """See `Phase.progress_duration`."""
         return
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return Arranging(chain_of(scene))
 
 
 def chain_of(scene: SceneView) -> Chain:
-    """The chain of a scene that begins with one."""
+    """Return the chain of a scene that begins with one."""
     first = scene.phases[0]
-    assert isinstance(first, Arrange)  # the caller has asked
+    assert isinstance(first, Arrange)  # the caller has checked
     return Chain(scene.particle, scene.count, first.gap_m)
 
 
@@ -86,13 +82,12 @@ def _check_walls(scene: SceneView, chain: Chain, width: float) -> None:
 
 
 class Arranging:
-    """The chain is laid out, at once."""
+    """Lays out the chain at once."""
 
     def __init__(self, chain: Chain) -> None:
         self._chain = chain
         self.memory: Memory = {}
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         engine.add(self._chain.poses())
         return 0.0

@@ -11,8 +11,16 @@ from pydantic import Field
 from dem.body.placement import place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.phases.settling import SETTLE_SECONDS, Settle, has_settled
+from dem.phases.phase import (
+    CHECK_INTERVAL,
+    SETTLE_SECONDS,
+    Memory,
+    Phase,
+    SceneView,
+    Settle,
+    Stage,
+    has_settled,
+)
 from dem.setting.part import Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
@@ -53,16 +61,13 @@ class Deposit(Part, Phase):
     settle: Settle = Field(default_factory=Settle, description="when the poured pile counts as settled")
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: something comes down, and a wall is high enough for one layer."""
         if scene.gravity_m_per_s2 == 0:
             msg = "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
             raise ValueError(msg)
         height = scene.container.height_m
-        if height is not None:
-            self._check_first_layer(scene, height)
-
-    def _check_first_layer(self, scene: SceneView, height: float) -> None:
-        """The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top."""
+        if height is None:
+            return
+        # The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top.
         slab = self.layer_height_w * scene.smarticle.middle_length_m
         least = 2 * scene.particle.radius + slab + scene.particle.reach
         if height < least:
@@ -75,27 +80,19 @@ class Deposit(Part, Phase):
             )
             raise ValueError(msg)
 
-    @property
-    def known_duration(self) -> None:
-        """See `Phase.known_duration`."""
-        return
-
     def expected_duration(self, count: int) -> float:
-        """See `Phase.expected_duration`."""
         layer = LAYER_SECONDS if self.every_s is None else self.every_s
         return layer * math.ceil(count / self.per_layer) + SETTLE_SECONDS
 
     def peak_speed(self, gravity: float) -> float:
-        """See `Phase.peak_speed`."""
         return self.thrown_at_m_per_s
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return Pouring(self, scene)
 
 
 class Pouring:
-    """Layers of random poses just above all others, the next when it is due; then the pile settles."""
+    """Pours layers of random poses above all others, each when it is due; then waits until the pile settles."""
 
     def __init__(self, phase: Deposit, scene: SceneView) -> None:
         self._phase = phase
@@ -112,14 +109,13 @@ class Pouring:
         }
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         memory, every = self.memory, self._phase.every_s
         if memory["left"] and every is not None:
             self._pour(engine)
-            memory["layer"] = 0  # nobody waits for it
+            memory["layer"] = 0  # the next layer does not wait for it
             return every
         if memory["layer"]:
-            self._look_at_layer(engine)
+            self._check_layer(engine)
         elif not memory["left"] and has_settled(self._phase.settle, memory, engine):
             return 0.0
         if memory["left"] and not memory["layer"]:
@@ -135,7 +131,7 @@ class Pouring:
         _pour_layer(self._phase, self._scene, engine, size, rng)
         memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)
 
-    def _look_at_layer(self, engine: Engine) -> None:
+    def _check_layer(self, engine: Engine) -> None:
         size, limit = self.memory["layer"], self._phase.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
         if fastest < limit and engine.touches()[-size:].min() > 0:

@@ -31,46 +31,32 @@ class RemoveContainer(Part, Phase):
     )
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the container is taken away once at most."""
         for earlier, phase in enumerate(scene.phases[:index]):
             if phase.frees:
                 msg = f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
                 raise ValueError(msg)
 
     @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
-    @property
     def pushing_speed(self) -> float:
-        """See `Phase.pushing_speed`."""
         return self.speed_m_per_s or 0.0
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         speed = self.speed_m_per_s
         how = "at once" if speed is None else f"lifted at {1e3 * speed:.3g} mm/s"
         return {EffectName.WALL_REMOVAL: f"phase {index}: {how}"}
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return Removing(self)
 
 
 class Removing:
-    """The container's wall goes away, at once or upwards, and the pile rests on the floor.
-
-    Args:
-        phase: the phase.
-    """
+    """Takes the container's wall away, at once or upwards; the pile rests on the floor."""
 
     def __init__(self, phase: RemoveContainer) -> None:
         self._phase = phase
         self.memory: Memory = {"end": None, "lifting": False}
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         memory, speed = self.memory, self._phase.speed_m_per_s
         if memory["end"] is None:
             memory["end"] = engine.time + self._phase.duration_s

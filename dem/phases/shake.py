@@ -31,11 +31,10 @@ class Shake(Part, Phase):
     )
 
     def amplitude(self, gravity: float) -> float:
-        """A = Γ g / (2πf)² [m], gravity in m/s²."""
+        """Return A = Γ g / (2πf)² [m], gravity in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`: shaking that never lets go of the pile."""
         if not 0 < self.peak_acceleration_g < 1:
             return ()
         return (
@@ -43,17 +42,10 @@ class Shake(Part, Phase):
             "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
         )
 
-    @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
     def peak_speed(self, gravity: float) -> float:
-        """See `Phase.peak_speed`."""
         return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         alone = ", the floor alone" if _freed(scene, index) or self.moves == "floor" else ""
         return {
             EffectName.CONTAINER_MOTION: f"phase {index}: Γ = {self.peak_acceleration_g:g}, f = "
@@ -61,7 +53,7 @@ class Shake(Part, Phase):
         }
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: a floor that moves alone stays within its wall."""
+        # A floor that moves alone stays within its wall.
         amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
         if self.moves == "floor" and amplitude > below:
             msg = (
@@ -71,22 +63,21 @@ class Shake(Part, Phase):
             raise ValueError(msg)
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return Shaking(self, scene.gravity_m_per_s2, freed=_freed(scene, index))
 
 
 def _freed(scene: SceneView, index: int) -> bool:
-    """Whether the container is taken away before a phase."""
+    """Return whether an earlier phase takes the container away."""
     return any(before.frees for before in scene.phases[:index])
 
 
 class Shaking:
-    """The container moves, or its floor alone where the wall was taken away.
+    """Shakes the container, or its floor alone.
 
     Args:
         phase: the phase.
         gravity: g [m/s²].
-        freed: whether the wall was to be taken away before.
+        freed: whether an earlier phase takes the wall away.
     """
 
     def __init__(self, phase: Shake, gravity: float, *, freed: bool) -> None:
@@ -96,7 +87,6 @@ class Shaking:
         self.memory: Memory = {"begun": False}
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         if self.memory["begun"]:
             engine.boundaries.stop()
             return 0.0

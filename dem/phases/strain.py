@@ -10,9 +10,8 @@ from pydantic import Field
 from dem.body.chain import Chain, parted
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.phases.actuated import ActuatedPhase, Actuating, Drive, Gait, drive
 from dem.phases.arrange import chain_of
-from dem.phases.gaits.actuated import ActuatedPhase, Actuating
-from dem.phases.gaits.drive import Drive, Gait, drive
 from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
 from dem.physics.strings import StringLaw
 from dem.setting.motion import Hold
@@ -44,7 +43,6 @@ class Strain(Part, ActuatedPhase):
         return self.distance_m / self.speed_m_per_s
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the strings reach the axis."""
         super().check(scene, index)
         chain = chain_of(scene)
         if self.string_length_m < chain.width:
@@ -55,31 +53,21 @@ class Strain(Part, ActuatedPhase):
             raise ValueError(msg)
 
     @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
-    @property
     def pushing_speed(self) -> float:
-        """See `Phase.pushing_speed`."""
         return self.speed_m_per_s
 
     @property
     def pulled_by(self) -> tuple[float, float]:
-        """See `Phase.pulled_by`."""
         return self.string_stiffness_N_per_m, self.string_damping_N_s_per_m
 
     def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
-        """See `ActuatedPhase.gait`: barbs stay."""
         hold = Hold(type="hold")
         return Gait(motions=(hold, hold), duration=self.duration_s)
 
     def own(self, key: str) -> tuple[str, float | None]:
-        """See `ActuatedPhase.own`."""
         return "distance_m", self.distance_m
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         return {
             **super().calls(scene, index),
             EffectName.STRINGS: f"phase {index} pulls at {1e3 * self.speed_m_per_s:.3g} mm/s, tied at the "
@@ -87,21 +75,19 @@ class Strain(Part, ActuatedPhase):
         }
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return Straining(drive(scene, index), scene.fidelity.control_interval_s, self, chain_of(scene))
 
 
 class Straining(Actuating):
-    """The motors hold while strings pull the chain apart, until it has parted or the end of the way."""
+    """Pulls the chain apart by strings while the motors hold, until it has parted or the end of the distance."""
 
     def __init__(self, schedule: Drive, interval: float, phase: Strain, chain: Chain) -> None:
-        self._looks_per_check = max(1, round(CHECK_INTERVAL / interval))
-        super().__init__(schedule, interval, halt_every=self._looks_per_check)
+        self._updates_per_check = max(1, round(CHECK_INTERVAL / interval))
+        super().__init__(schedule, interval, halt_every=self._updates_per_check)
         self._phase = phase
         self._chain = chain
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         phase, diameter = self._phase, 2 * self._chain.particle.radius
         if self.memory["look"] == 0:
             engine.motors.articulate()
@@ -111,7 +97,7 @@ class Straining(Actuating):
                 damping=phase.string_damping_N_s_per_m,
             )
             engine.strings.tie(self._chain.ties(phase.tied_at), law, (0.0, phase.speed_m_per_s))
-        over = self.memory["look"] % self._looks_per_check == 0 and parted(engine.state(), diameter)
+        over = self.memory["look"] % self._updates_per_check == 0 and parted(engine.state(), diameter)
         wait = 0.0 if over else super().proceed(engine)
         if not wait:
             engine.strings.untie()

@@ -1,15 +1,17 @@
-"""The phase that takes over the smarticles of another run, on whatever engine that one was computed.
+"""The phase that takes over the smarticles of another run of any engine.
 
-A frame holds poses to the last bit, and no contacts: what springs of friction held is forgotten, and smarticles begin
-at rest. On another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each
-other's valleys, smooth links do not. What overlaps by that is let apart without speed, before time goes on freely.
+A frame holds poses to the last bit, and no contacts: friction springs are lost, and smarticles begin at rest. On
+another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each other's
+valleys, smooth links do not. Such overlaps are first relaxed without speed.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self, cast
@@ -18,25 +20,84 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
-from dem.body.fitting import fitted_poses
-from dem.body.placement import Poses
+from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.phases.settling import Settle, has_settled
-from dem.record.taken import LAST, Taken, take
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, Stage, has_settled
+from dem.record.frame import Frame
+from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
 from dem.setting.part import Part
 
 Array = NDArray[np.float64]
 
+LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
-STRIDE = 10  # steps between looks at whether what overlaps flies apart; a contact swings in about as many
+STRIDE = 10  # steps between checks whether overlapping smarticles fly apart; a contact swings in about as many
 # Sphere diameters that a vertex may be from its place in the scene's shape. A hinge on YADE gives way by 0.01 in a
 # pile, and contacts at rest are about as deep, so that it makes no more overlap than there is.
 MOST_OFF = 0.02
 # Keys of a smarticle that run.json has too.
 _SHAPE = ("aspect_ratio", "middle_length_m", "thickness_normal_m", "thickness_in_plane_m")
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One frame of another run, by its number."""
+
+    run: Run
+    number: int
+    frame: Frame
+
+    @property
+    def vertices(self) -> Array:
+        """(N, 4, 3) above the floor [m]."""
+        return self.frame.vertices - [0.0, 0.0, self.frame.floor_z]
+
+    @property
+    def sha256(self) -> str:
+        """Hash of these vertices: all of a frame that decides what comes after."""
+        return hashlib.sha256(np.ascontiguousarray(self.vertices, dtype="<f8").tobytes()).hexdigest()
+
+    @property
+    def fastest(self) -> float:
+        """Greatest speed of a link's centre [m/s], which is not taken over."""
+        return float(np.linalg.norm(self.frame.link_velocity, axis=-1).max())
+
+    def __str__(self) -> str:
+        return f"frame {self.number} of {self.run.path}"
+
+
+def take(path: Path, frame: int | str) -> Taken:
+    """Read a frame of a run, by its number or `LAST`.
+
+    Raises:
+        InputError: no such run or frame, damaged, or the run is not over; begins with the wrong key, `run` or `frame`.
+    """
+    try:
+        run = open_run(path)
+        frames, state = run.frames, run.status.state
+    except InputError as error:
+        msg = f"run: {error}"
+        raise InputError(msg) from None
+    number = len(frames) - 1 if frame == LAST else int(frame)
+    msg = ""
+    if state == "running":
+        msg = f"run: {run} is still being computed; wait until it is done: smarticles status {run}"
+    elif frame == LAST and state != "done":
+        msg = (
+            f"frame: {LAST}, but {run} is {state}; go on with it (smarticles resume {run}), or give the "
+            "number of a frame"
+        )
+    elif number >= len(frames):
+        msg = f"frame: {number}, but the frames of {run} are 0 … {len(frames) - 1}; use one of them, or {LAST}"
+    if msg:
+        raise InputError(msg)
+    try:
+        return Taken(run, number, frames[number])
+    except InputError as error:
+        msg = f"frame: {error}"
+        raise InputError(msg) from None
 
 
 class TakeOver(Part, Phase):
@@ -86,22 +147,18 @@ class TakeOver(Part, Phase):
     @model_validator(mode="wrap")
     @classmethod
     def _pinned(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """What is meant today: the number of the last frame, and the hash of its content."""
+        """Fill in the number of the last frame and the hash of its content, as they are today."""
         made = handler(data)
         if made.sha256 is not None and made.frame != LAST:
             return made
         taken = take(Path(made.run), made.frame)
         pinned = {"frame": taken.number, "sha256": made.sha256 or taken.sha256}
-        # What was filled in here was not said: another run in its place has a hash of its own.
+        # Filled in here, not given by the user: another run in its place has a hash of its own.
         return cast("Self", cls.model_construct(_fields_set=made.model_fields_set, **{**dict(made), **pinned}))
 
     @cached_property
     def taken(self) -> Taken:
-        """The frame.
-
-        Raises:
-            InputError: it is not there, or not what the scene was made from.
-        """
+        """The frame; an InputError if it is missing, or not the one that the scene was made from."""
         taken = take(Path(self.run), self.frame)
         if taken.sha256 != self.sha256:
             msg = (
@@ -112,10 +169,7 @@ class TakeOver(Part, Phase):
         return taken
 
     def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the frame's smarticles are the scene's, and fit into its container.
-
-        A source that is gone is no reason to refuse a scene that was run; `ready` refuses to run one.
-        """
+        # A scene whose source is gone can still be read; `ready` rejects it before a run.
         if scene.gravity_m_per_s2 == 0:
             msg = "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
             raise ValueError(msg)
@@ -126,7 +180,6 @@ class TakeOver(Part, Phase):
         poses_of(scene, taken)
 
     def ready(self, scene: SceneView) -> None:
-        """See `Phase.ready`."""
         try:
             taken = self.taken
         except InputError as error:
@@ -136,7 +189,6 @@ class TakeOver(Part, Phase):
 
     @property
     def origin(self) -> Mapping[str, Any]:
-        """See `Phase.origin`."""
         taken = self.taken
         return {
             "run": self.run,
@@ -150,7 +202,6 @@ class TakeOver(Part, Phase):
         }
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`."""
         try:
             taken = self.taken
         except InputError:
@@ -163,32 +214,25 @@ class TakeOver(Part, Phase):
             "m/s), and velocities are not taken over; use a frame at the end of a relax phase",
         )
 
-    @property
-    def known_duration(self) -> None:
-        """See `Phase.known_duration`."""
-        return
-
     def expected_duration(self, count: int) -> float:
-        """See `Phase.expected_duration`: nothing falls, so that little more than the hold is needed."""
+        # Nothing falls, so that little more than the hold is needed.
         return self.settle.hold_s + TAKEN_SECONDS
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
         return TakingOver(self, scene)
 
 
 class TakingOver:
-    """All smarticles are put in at once, at rest; what overlaps is let apart without speed; then the pile settles."""
+    """Adds all smarticles at once, at rest; relaxes overlaps without speed; then waits until the pile settles."""
 
     def __init__(self, phase: TakeOver, scene: SceneView) -> None:
         self._phase = phase
         self._scene = scene
-        # `task`: what is due; `stops`: how often smarticles were stopped; `height` [m] of their mean when they were put
-        # in; `waited` [s] since; `still` [s] that the pile has been.
+        # `task`: what is due; `stops`: how often smarticles were stopped; `height`: their mean when added [m];
+        # `waited`: since then [s]; `still`: that the pile has been [s].
         self.memory: Memory = {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
 
     def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
         wait = self._do(engine)
         self.memory["waited"] += wait
         return wait
@@ -211,7 +255,7 @@ class TakingOver:
                 self._stop(engine, fastest)
                 return stride
             memory["task"] = "settle"
-            self._tell(engine)
+            self._warn(engine)
         return 0.0 if has_settled(settle, memory, engine) else CHECK_INTERVAL
 
     def _stop(self, engine: Engine, fastest: float) -> None:
@@ -226,7 +270,7 @@ class TakingOver:
         engine.still()
         self.memory["stops"] += 1
 
-    def _tell(self, engine: Engine) -> None:
+    def _warn(self, engine: Engine) -> None:
         memory = self.memory
         if memory["stops"]:
             memory["warning"] = (
@@ -241,10 +285,10 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """The smarticles of a frame as poses of the scene's own.
+    """Return the smarticles of a frame as poses of the scene's own.
 
     Raises:
-        InputError: they are others, or do not fit into its container; one line with key, value and the way out.
+        InputError: they differ, or do not fit into its container; one line with key, value and the way out.
     """
     if taken.run.manifest.planar:
         msg = f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
@@ -253,7 +297,7 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
     _check_room(scene, taken)
     poses, off = fitted_poses(scene.particle.boxes, taken.vertices)
     if off.max() > MOST_OFF * scene.sphere_diameter:
-        _refuse_angles(scene, taken)
+        _reject_angles(scene, taken)
     return poses
 
 
@@ -286,7 +330,7 @@ def _check_smarticle(scene: SceneView, taken: Taken) -> None:
 
 
 def _check_room(scene: SceneView, taken: Taken) -> None:
-    """No link's axis may lie outside the wall, under the floor or in a hook, from where no contact pushes it back."""
+    """Check that no link's axis lies outside the wall, under the floor or in a hook: no contact would push it back."""
     cylinder, vertices = scene.cylinder, taken.vertices
     heights, off_axis = vertices[..., 2], np.hypot(vertices[..., 0], vertices[..., 1])
     room = cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)
@@ -317,10 +361,7 @@ def _check_room(scene: SceneView, taken: Taken) -> None:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Vertices with both tips a radius [m] further in, where a chain or strand has its last point: what touches.
-
-    A tip may be under the floor by as much as a contact is deep.
-    """
+    """Return vertices with both tips a radius [m] further in, at the last contact point of a chain or strand."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -334,7 +375,7 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
-    """(N,) whether the axis of a link of each smarticle passes through a bar, looked at in steps of a quarter of it."""
+    """Return (N,) whether the axis of a link passes through a bar, checked in steps of a quarter of its side."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
@@ -345,13 +386,12 @@ def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _refuse_angles(scene: SceneView, taken: Taken) -> NoReturn:
+def _reject_angles(scene: SceneView, taken: Taken) -> NoReturn:
     angles = _angles(taken)
     low, high = angles.min(axis=0), angles.max(axis=0)
-    told = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
-    here = scene.smarticle.angles_deg
-    middle = (low + high) / 2
-    # Of barbs that stand alike a scene can be made.
+    reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
+    here, middle = scene.smarticle.angles_deg, (low + high) / 2
+    # A scene can be made with barbs that all stand alike.
     alike = float((high - low).max()) / 2 * math.pi / 180 * scene.particle.boxes.barb_length
     way_out = (
         f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
@@ -360,22 +400,20 @@ def _refuse_angles(scene: SceneView, taken: Taken) -> NoReturn:
     )
     msg = (
         f"smarticle.angles_deg: ({here[0]:g}, {here[1]:g}) here, but the barbs of {taken}, which phases.0 (take-over) "
-        f"takes over, stand at {told}; {way_out}"
+        f"takes over, stand at {reached}; {way_out}"
     )
     raise InputError(msg)
 
 
 def _angles(taken: Taken) -> Array:
-    """(N, 2) angles of the barbs [deg]; of a run whose frames do not tell them without their sign."""
+    """Return (N, 2) angles of the barbs [deg], without their sign where frames do not hold them."""
     recorded = taken.frame.cell_data.get("angle_rad")
     if recorded is not None:
-        told: Array = np.degrees(recorded[:, [0, 2]])
-        return told
+        return np.asarray(np.degrees(recorded[:, [0, 2]]))
     tip_1, hinge_1, hinge_2, tip_2 = np.moveaxis(taken.vertices, 1, 0)
     along = hinge_2 - hinge_1
     cosines = [
         np.einsum("ni,ni->n", way, barb) / np.linalg.norm(way, axis=1) / np.linalg.norm(barb, axis=1)
         for way, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
     ]
-    seen: Array = np.degrees(np.arccos(np.clip(cosines, -1, 1))).T
-    return seen
+    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))).T)

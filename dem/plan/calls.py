@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dem.engine.effect import EffectName
+from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
-from dem.phases.gaits.checks import overshoot
 from dem.scene.scene import Scene
 
 Call = tuple[bool, str]

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import small
 
-from dem.phases.gaits.drive import Drive, actuated, drive
+from dem.phases.actuated import ActuatedPhase, Drive, drive
 from dem.scene.scene import Scene
 from dem.setting.motion import Triangle
 
@@ -65,7 +65,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
     def wave(**changes: Any) -> Triangle:
         scene = active({**OSCILLATION, **changes}, smarticle__aspect_ratio=ratio, motor__speed_limit_rad_per_s=4)
         phase = scene.phases[1]
-        assert actuated(phase)
+        assert isinstance(phase, ActuatedPhase)
         motion = phase.gait(scene.smarticle, scene.motor).motions[1]
         assert isinstance(motion, Triangle)
         return motion

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dem.errors import InputError
-from dem.phases.gaits.checks import actuation_warnings, overshoot
+from dem.phases.actuated import actuation_warnings, overshoot
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -109,15 +109,15 @@ def test_first_sphere_of_a_barb_against_the_middle_link(scene_data: SceneData) -
 # -- what is not refused, but said ---------------------------------------------------------------------------------
 
 
-def test_motors_that_one_look_takes_far_beyond_their_limit_are_warned_of(scene_data: SceneData) -> None:
+def test_motors_that_exceed_their_limit_in_one_control_update_are_warned_of(scene_data: SceneData) -> None:
     quick = {"motor__speed_limit_rad_per_s": 60}
     scene = checked(scene_data, SHAPE_CHANGE, **quick)
     # k ω Δt = 3e-3 · 60 · 2e-4 N m over the paper's 1.607e-5 N m.
     assert overshoot(scene) == pytest.approx(3e-3 * 60 * 2e-4 / 1.607e-5, rel=1e-3)
     (warning,) = actuation_warnings(scene)
     assert warning == (
-        "motor.torque_limit_N_m: τ_max = 1.61e-05 N m, but within one look of fidelity.control_interval_s = 0.0002 s "
-        "at motor.speed_limit_rad_per_s = 60 rad/s a motor can go beyond it by 2.24 τ_max; use control_interval_s: "
+        "motor.torque_limit_N_m: τ_max = 1.61e-05 N m, but within one control update of "
+        "fidelity.control_interval_s = 0.0002 s at motor.speed_limit_rad_per_s = 60 rad/s a motor can exceed it by 2.24 τ_max; use control_interval_s: "
         "4e-05 or stiffness_N_m_per_rad: 0.000669, or law: slip"
     )
     planned = plan(scene)

@@ -9,7 +9,7 @@ from double import EngineDouble
 from scenes import small
 
 from dem.phases.phase import CHECK_INTERVAL
-from dem.phases.pull_hook import HELD_FAST, PullHook, Pulling
+from dem.phases.pull_hook import HELD_SECONDS, PullHook, Pulling
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004
 ARRIVAL = DISTANCE / SPEED
@@ -48,7 +48,7 @@ def test_a_hook_that_is_held_stops_at_the_first_look_with_a_mean_above_its_limit
     reached = 0.02 / 10.0 / SPEED + CHECK_INTERVAL / 2
     assert reached - 2 * DT <= raised / SPEED <= reached + CHECK_INTERVAL + 2 * DT
     assert raised < 0.6 * DISTANCE
-    assert engine.time == pytest.approx(raised / SPEED + HELD_FAST, abs=2 * DT)
+    assert engine.time == pytest.approx(raised / SPEED + HELD_SECONDS, abs=2 * DT)
 
 
 def test_what_a_pull_remembers_is_enough_to_go_on() -> None:
