@@ -9,8 +9,7 @@ from typing import Any
 import yaml
 
 from dem.errors import InputError
-from dem.scene.overrides import apply_override
-from dem.scene.reading import SCHEMA_VERSION
+from dem.scene.reading import SCHEMA_VERSION, apply_override
 from dem.scene.scene import Scene
 from dem.scene.yaml_text import load_yaml
 from dem.setting.fidelity import fidelities

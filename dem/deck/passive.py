@@ -18,7 +18,7 @@ from dem.phases.shake import Shake
 from dem.phases.take_over import TakeOver, poses_of
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_steps
-from dem.scene.carried import foreign
+from dem.scene.rules import foreign
 from dem.scene.scene import Scene
 
 Array = NDArray[np.float64]

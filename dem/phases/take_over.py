@@ -381,7 +381,7 @@ def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
     points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
     above = points - [0.0, 0.0, cross.height]
-    inside = [(np.abs(above) < extents).all(axis=-1).any(axis=-1) for extents in cross.half_extents]
+    inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
     found: NDArray[np.bool_] = np.logical_or.reduce(inside)
     return found
 

@@ -29,8 +29,7 @@ from dem.record.run import Run
 from dem.record.rundir import claimed, log_of
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
-from dem.scene.comparing import difference
-from dem.scene.reading import dump_scene, load_scene, scene_hash
+from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
 
 

@@ -109,7 +109,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
             "phases.3.duration_s=1",
             "--set phases.3.duration_s=1: there is no '3' in the scene; lists are numbered from 0",
         ),
-        ("count.x=1", "--set count.x=1: there is no 'x' to set; lists are numbered from 0"),
+        ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
         ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
         ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
