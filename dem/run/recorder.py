@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
-from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frame import centreline_mesh, motor_fields, sphere_mesh
 from dem.record.frames import FrameWriter
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
@@ -74,16 +74,16 @@ class Recorder:
         self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
             motors = engine.motors.readings if engine.motors.articulated else None
-            mesh = frame_mesh(
-                state,
+            at_work = () if motors is None else (motors.torques, motors.work, motors.halted)
+            mesh = centreline_mesh(
+                state.vertices,
+                velocities=state.link_velocities,
+                spins=state.link_spins,
                 contacts=engine.neighbours(),
                 time=engine.time,
                 floor=engine.boundaries.floor,
                 phase=phase,
-                hinged=engine.motors.present,
-                torques=None if motors is None else motors.torques,
-                work=None if motors is None else motors.work,
-                halted=None if motors is None else motors.halted,
+                extra=motor_fields(state.angles, *at_work) if engine.motors.present else None,
             )
             self.frames.write(mesh, engine.time)
             if self.forces is not None:
