@@ -1,4 +1,4 @@
-"""What a running simulation tells: `progress.json` for other processes, one line for the person at the terminal."""
+"""Progress of a running simulation: `progress.json` for other processes, one line on the terminal."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def _now() -> float:
 
 @dataclass
 class ProgressWriter:
-    """Tells at most once per second.
+    """Reports progress at most once per second.
 
     Args:
-        folder: the run directory; `progress.json` in it is replaced.
+        folder: the run directory.
         total: smarticles in the scene.
         show: whether to draw a line on standard error.
     """
@@ -43,26 +43,26 @@ class ProgressWriter:
     _seen: tuple[float, int] | None = None
 
     def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
-        """A phase begins, or is gone on with.
+        """Begin or resume a phase.
 
         Args:
             index: number of the phase.
             phase: its type.
             start: simulated time at which it began [s].
             now: simulated time [s].
-            end: when it will end [s], if that is known.
+            end: simulated time at which it will end [s], if known.
         """
         self._index, self._phase, self._start, self._end = index, phase, start, end
         self._here_since = (_now(), now)
         self._last = -math.inf
 
     def warn(self, message: str) -> None:
-        """Tell the person at the terminal at once."""
+        """Print a warning at once."""
         start = "\r\x1b[K" if self.show else ""
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
     def checkpointed(self, time: float) -> None:
-        """There is a checkpoint of a simulated time [s], from which the run would go on; told at once."""
+        """Report at once the simulated time [s] of a new checkpoint."""
         self._checkpoint = time
         if self._seen is not None:
             phi, count = self._seen
@@ -70,7 +70,7 @@ class ProgressWriter:
             self.update(time=time, phi=phi, count=count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
-        """Simulated time [s], packing fraction [1] and smarticles present."""
+        """Report simulated time [s], packing fraction [1] and smarticles present."""
         self._seen = (phi, count)
         now = _now()
         if now - self._last < INTERVAL:
@@ -88,16 +88,16 @@ class ProgressWriter:
             checkpoint_s=self._checkpoint,
         )
         try:
-            if self.folder.is_dir():  # one that was taken away is not made again
+            if self.folder.is_dir():  # a folder that was removed is not made again
                 said.write(self.folder / PROGRESS)
         except RunError:
-            # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
+            # A full disk stops the run where results are written, not here.
             return
         if self.show:
             self._draw(time, shown_phi, count, now)
 
     def finish(self) -> None:
-        """The run has ended."""
+        """End the report."""
         (self.folder / PROGRESS).unlink(missing_ok=True)
         if self.show:
             sys.stderr.write("\r\x1b[K")
