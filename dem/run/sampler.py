@@ -1,4 +1,4 @@
-"""What the series is made of: numbers that the engine is asked for at each sample."""
+"""Rows of the series: numbers that the engine reports at each sample."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ from dem.record.columns import (
 )
 from dem.record.packing import packing_fraction
 
+Array = NDArray[np.float64]
+
 COLUMNS_OF: Mapping[EffectName, Columns] = {
     EffectName.MOTORS: MOTOR_COLUMNS,
     EffectName.ENERGIES: ENERGY_COLUMNS,
@@ -39,7 +41,7 @@ COLUMNS_OF: Mapping[EffectName, Columns] = {
 
 @dataclass
 class Sampler:
-    """Makes a row of the series of what the engine says; means since the sample before are its memory.
+    """Makes rows of the series from an engine; for means between samples it remembers the sample before.
 
     Args:
         radius: of the container [m].
@@ -48,9 +50,10 @@ class Sampler:
 
     radius: float
     effects: Set[EffectName] = frozenset()
-    _before: tuple[float, float, NDArray[np.float64]] | None = None
-    _hooks_before: tuple[int, NDArray[np.float64]] | None = None
-    _strain_before: tuple[int, NDArray[np.float64]] | None = None
+    # Time [s], impulse of gravity [N s] and momentum [kg m/s]; steps, and forces summed over them [N].
+    _before: tuple[float, float, Array] | None = None
+    _hooks_before: tuple[int, Array] | None = None
+    _strain_before: tuple[int, Array] | None = None
 
     @property
     def described(self) -> Columns:
@@ -62,13 +65,7 @@ class Sampler:
         return columns
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
-        """One row.
-
-        Args:
-            engine: what is asked.
-            state: its smarticles now.
-            phase: index of the phase.
-        """
+        """Return one row, of an engine with its present state and the index of the phase."""
         boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
@@ -76,7 +73,7 @@ class Sampler:
         more: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
             lower, upper = self._hook_forces(engine)
-            # The balance does not tell hooks from the container.
+            # The balance includes the hooks.
             container_force -= lower + upper
             more |= {
                 "hook_upper_force_N": upper,
@@ -90,7 +87,7 @@ class Sampler:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
             more |= self._strain_row(engine, state)
-            # Nor does it tell strings, whose pull the smarticles received from elsewhere.
+            # It includes the strings, too.
             pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
             container_force += np.nan_to_num(pulls)
         row = {
@@ -117,25 +114,22 @@ class Sampler:
             row |= _ledger_row(engine, row)
         return row | more
 
-    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
-        # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
-        # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
-        # What smarticles were thrown with when they were added counts with what gravity gave.
+    def _mean_force(self, engine: Engine, momentum: Array) -> Array:
+        # The container received what the smarticles lost, apart from gravity and from the throw of added smarticles.
+        # This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
         time, impulse, before = engine.time, engine.impulse, self._before
         self._before = (time, impulse, momentum)
         if before is None or time <= before[0]:
             return np.full(3, math.nan)
         lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
-        mean: NDArray[np.float64] = lost / (time - before[0])
-        return mean
+        return np.asarray(lost / (time - before[0]))
 
-    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
+    def _hook_forces(self, engine: Engine) -> Array:
         steps, sums, before = engine.steps, engine.boundaries.hook_sums, self._hooks_before
         self._hooks_before = (steps, sums)
         if before is None or steps <= before[0]:
             return np.full_like(sums, math.nan)
-        mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
-        return mean
+        return np.asarray((sums - before[1]) / (steps - before[0]))
 
     def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
@@ -168,7 +162,7 @@ class Sampler:
         }
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken."""
+        """Restore what `memory` returned."""
         before = memory["before"]
         self._before = None if before is None else (before[0], before[1], np.array(before[2]))
         self._hooks_before, self._strain_before = (
@@ -180,9 +174,8 @@ def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
     motors = engine.motors.readings
     angles = _mean(state.angles)
     if motors is None or not engine.motors.articulated:
-        unknown = math.nan
         held = angles if motors is None else _mean(motors.commands)
-        behind = error = torque = halted = unknown
+        behind = error = torque = halted = math.nan
     else:
         held = _mean(motors.commands)
         behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
@@ -214,7 +207,6 @@ def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _mean(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) mean over smarticles of (N, 2); NaN without smarticles."""
-    mean: NDArray[np.float64] = angles.mean(axis=0) if len(angles) else np.full(2, math.nan)
-    return mean
+def _mean(angles: Array) -> Array:
+    """Return the (2,) mean over smarticles of (N, 2); NaN without smarticles."""
+    return np.asarray(angles.mean(axis=0)) if len(angles) else np.full(2, math.nan)

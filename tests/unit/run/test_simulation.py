@@ -18,7 +18,8 @@ from scenes import CHAIN, SMALL, changed
 from dem.errors import InputError, RunError
 from dem.plan.outlook import plan
 from dem.plan.steps import time_steps
-from dem.run.run import RunOutcome, run_scene
+from dem.record.document import Done
+from dem.run.run import run_scene
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
@@ -51,7 +52,7 @@ def kind(monkeypatch: pytest.MonkeyPatch) -> KindDouble:
     return kind
 
 
-def run(scene: Scene, out: Path, **how: Any) -> RunOutcome | None:
+def run(scene: Scene, out: Path, **how: Any) -> Done | None:
     return run_scene(scene, out, command="test", progress=False, **how)
 
 
