@@ -17,7 +17,7 @@ _WITH_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d]\S*\s*")
 _WITH_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
 # Words that may end a key, and how the unit that they spell is written.
 _UNITS = {
-    **{word: word for word in ("m", "s", "g", "w", "N", "kg", "rad", "deg")},
+    **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
 _OF_A_KEY = "[key]"  # how pydantic ends the place of a key that is wrong itself
@@ -136,7 +136,9 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
         if found["type"] == "default_factory_not_called" or (found["type"] == "too_short" and found["input"]):
             continue
         place, given = _place(found["loc"], data)
-        text = _text(found["type"], found["msg"], found["input"], found.get("ctx", {}), _unit(place))
+        text = _text(
+            found["type"], found["msg"], found["input"], found.get("ctx", {}), unit_of(place.rpartition(".")[2])[1]
+        )
         if found["type"] == "missing":
             text, given = f"{text}, see {described}", True
         if place:
@@ -151,14 +153,13 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     return "; also ".join(lines[:_MOST_ERRORS]) + more
 
 
-def _unit(key: str) -> str:
-    """Return the unit that the end of a key spells, `m/s` of `phases.2.speed_m_per_s`, or an empty string."""
-    words: list[str] = []
-    for word in reversed(key.rpartition(".")[2].split("_")[1:]):
-        if word not in _UNITS:
-            break
-        words.insert(0, _UNITS[word])
-    return " ".join(words).replace(" / ", "/")
+def unit_of(key: str) -> tuple[str, str]:
+    """Split a key into its name and the unit that its end spells: `speed`, `m/s` of `speed_m_per_s`."""
+    words = key.split("_")
+    count = len(words)
+    while count > 1 and words[count - 1] in _UNITS:
+        count -= 1
+    return "_".join(words[:count]), " ".join(_UNITS[word] for word in words[count:]).replace(" / ", "/")
 
 
 def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:

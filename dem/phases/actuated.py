@@ -7,7 +7,7 @@ seed, and where they begin follows from the phases before.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -74,14 +74,20 @@ class ActuatedPhase(Phase):
         """Return the key of this phase that sets `key` of the gait, and its value."""
         raise NotImplementedError
 
-    def check(self, scene: SceneView, index: int) -> None:
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if not any(before.actuates for before in scene.phases[:index]):
-            _check_barbs(scene, index)
-            _check_control(scene)
-        _check_active(scene, index)
-        highest = _check_motions(scene, index)
-        _check_crossing(scene, index, highest)
-        _check_first_spheres(scene, index, max(highest))
+            yield from _of_barbs(scene, index)
+            yield from _of_control(scene)
+        yield from _of_active(scene, index)
+        highest = yield from _of_motions(scene, index)
+        # A motor that halts is late, so that barbs may meet although their highest angles are not asked for at one
+        # time.
+        if scene.smarticle.tip_clearance(highest) < 0:
+            yield (
+                f"phases.{index}: at {highest[0]:.4g}° and {highest[1]:.4g}° the barbs of l/w = "
+                f"{scene.smarticle.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
+            )
+        yield from _of_first_spheres(scene, index, max(highest))
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         return actuation_warnings(scene)
@@ -89,38 +95,35 @@ class ActuatedPhase(Phase):
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         return {EffectName.ARTICULATION: str(index)}
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return Actuating(drive(scene, index), scene.fidelity.control_interval_s)
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"look": 0}
 
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        return self.follow(stage, engine)
 
-class Actuating:
-    """Motors follow their schedule, one control update per period; smarticles are articulated meanwhile.
+    def follow(self, stage: Stage, engine: Engine, halt_every: int | None = None) -> float:
+        """Let the motors follow the schedule, one control update per period; smarticles are articulated meanwhile.
 
-    Args:
-        schedule: the target angles.
-        interval: control period [s].
-        halt_every: control updates after which `proceed` returns, so that a caller can check the pile; None: never.
-    """
-
-    def __init__(self, schedule: Drive, interval: float, *, halt_every: int | None = None) -> None:
-        self._drive = schedule
-        self._interval = interval
-        self._looks = math.ceil(schedule.duration / interval - 1e-9)
-        self._halt_every = halt_every or self._looks
-        self.memory: Memory = {"look": 0}
-
-    def proceed(self, engine: Engine) -> float:
-        look: int = self.memory["look"]
+        After each `halt_every` updates it returns, so that the caller can check the pile.
+        """
+        look: int = stage.memory["look"]
         if look == 0:
             engine.motors.articulate()
+        schedule: Drive = stage.prepared
+        interval = stage.scene.fidelity.control_interval_s
+        last = math.ceil(schedule.duration / interval - 1e-9)
+        every = halt_every or last
         # The last update only adds up the work since the one before.
-        stop = min(look + engine.motors.looks_at_once, (look // self._halt_every + 1) * self._halt_every, self._looks)
+        stop = min(look + engine.motors.looks_at_once, (look // every + 1) * every, last)
         looks = range(look, max(look + 1, stop))
-        targets = [self._drive.targets(min((k + 1) * self._interval, self._drive.duration)) for k in looks]
-        engine.motors.actuate(np.stack(targets), self._interval)
-        self.memory["look"] = looks.stop
-        period = max(1, round(self._interval / engine.time_step)) * engine.time_step
-        return len(looks) * period if look < self._looks else 0.0
+        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in looks]
+        engine.motors.actuate(np.stack(targets), interval)
+        stage.memory["look"] = looks.stop
+        period = max(1, round(interval / engine.time_step)) * engine.time_step
+        return len(looks) * period if look < last else 0.0
+
+    def prepare(self, scene: SceneView, index: int) -> Drive:
+        return drive(scene, index)
 
 
 # -- target angles -----------------------------------------------------------------------------------------------------
@@ -246,24 +249,22 @@ def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
     )
 
 
-def _check_barbs(scene: SceneView, index: int) -> None:
+def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
     ratio, width, diameter = scene.smarticle.aspect_ratio, scene.smarticle.middle_length_m, scene.sphere_diameter
     if ratio == 0:
-        msg = (
+        yield (
             f"smarticle.aspect_ratio: 0 means no barbs, which phases.{index} ({scene.phases[index].kind}) is to move; "
             "use a larger aspect_ratio or leave the phase out"
         )
-        raise ValueError(msg)
     has_spheres = np.isin(BARB_LINKS, scene.particle.links).all()
     if not has_spheres or _first_station(scene) < diameter * (1 - TOLERANCE):
         # The first sphere begins where the hinge's ends, and the last one ends at the tip.
         least = (1.5 + HINGE_CLEARANCE) * diameter
-        msg = (
+        yield (
             f"smarticle.aspect_ratio: {ratio:g} means barbs of {ratio * width:.4g} m, too short for a sphere of their "
             f"own of {diameter:.4g} m beside the hinge's, which phases.{index} ({scene.phases[index].kind}) needs; use "
             f"at least {_up(least / width)} or a smaller fidelity.diameter_m"
         )
-        raise ValueError(msg)
 
 
 def _first_station(scene: SceneView) -> float:
@@ -273,17 +274,16 @@ def _first_station(scene: SceneView) -> float:
     return float(np.hypot(barb[:, 0], barb[:, 1]).min())
 
 
-def _check_control(scene: SceneView) -> None:
+def _of_control(scene: SceneView) -> Iterator[str]:
     interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
     updates = series / interval
     if updates >= 1 - 1e-6 and abs(updates - round(updates)) <= 1e-6:
         return
     wrong = "longer than" if updates < 1 - 1e-6 else "not a whole fraction of"
-    msg = (
+    yield (
         f"fidelity.control_interval_s: {interval:g} s is {wrong} recording.series_interval_s = {series:g} s; use e.g. "
         f"{_whole_fraction(series, max(1, math.ceil(updates * (1 - TOLERANCE))))} s"
     )
-    raise ValueError(msg)
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
@@ -295,17 +295,16 @@ def _whole_fraction(whole: float, parts: int) -> str:
     return repr(whole / parts)
 
 
-def _check_active(scene: SceneView, index: int) -> None:
+def _of_active(scene: SceneView, index: int) -> Iterator[str]:
     gait = _gait(scene, index)
     if not gait.active_count(scene.count):
-        msg = (
+        yield (
             f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
             f"use e.g. {_up(1 / scene.count)}"
         )
-        raise ValueError(msg)
 
 
-def _check_motions(scene: SceneView, index: int) -> tuple[float, float]:
+def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:
     """Check range and speed of the motions; return the highest angle [deg] of either barb, moving or not."""
     phase, gait, driven = scene.phases[index], _gait(scene, index), drive(scene, index)
     assert isinstance(phase, ActuatedPhase)
@@ -316,19 +315,22 @@ def _check_motions(scene: SceneView, index: int) -> tuple[float, float]:
         start = driven.start[driven.active, barb]
         for leg in gait.motions[barb].legs(start, start, until):
             key = ".".join(filter(None, (gait.keys[barb], leg.key)))
-            low, high = (np.degrees(angles) for angles in leg.extremes())
+            lows, highs, speed = leg.extent()
+            low, high = np.degrees(lows), np.degrees(highs)
             if isinstance(leg.motion, Sine | Triangle):
                 # All other angles are checked where they are read: only a swing can leave the range.
                 own, present = phase.own(f"{key}.amplitude_deg")
                 assert present is not None  # a swing has an amplitude
-                _check_range(f"phases.{index}.{own}", present, leg.motion, (float(low.min()), float(high.max())))
+                yield from _of_range(
+                    f"phases.{index}.{own}", present, leg.motion, (float(low.min()), float(high.max()))
+                )
             highest[barb] = max(highest[barb], high.max())
             own, _ = phase.own(f"{key}.{leg.motion.pace[0]}")
-            _check_speed(f"phases.{index}.{own}", leg.motion, leg.speed(), scene.motor.speed_limit_rad_per_s)
+            yield from _of_speed(f"phases.{index}.{own}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
     return float(highest[0]), float(highest[1])
 
 
-def _check_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> None:
+def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> Iterator[str]:
     """Reject a swing that leaves the range of the hinges; `present` [deg] is what sets it at `place`."""
     lowest, highest = HINGE_RANGE
     too_low, too_high = lowest - reached[0], reached[1] - highest
@@ -337,38 +339,26 @@ def _check_range(place: str, present: float, swing: Sine | Triangle, reached: tu
         return
     smaller = 1 - beyond / swing.amplitude_deg
     way_out = f"use at most {_down(present * smaller)}° or another centre" if smaller > TOLERANCE else "move its centre"
-    msg = (
+    yield (
         f"{place}: {present:g}° makes the barbs reach {reached[too_high > too_low]:.4g}°, outside {lowest:g}° … "
         f"{highest:g}°, the range of the hinges; {way_out}"
     )
-    raise ValueError(msg)
 
 
-def _check_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> None:
+def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> Iterator[str]:
     factor = speed / limit
     if factor <= 1 + TOLERANCE:
         return
     key, unit = motion.pace
     present = getattr(motion, key)
     way_out = f"at least {_up(present * factor)}" if key == "duration_s" else f"at most {_down(present / factor)}"
-    msg = (
+    yield (
         f"{place}: {present:g} {unit} makes {speed:.4g} rad/s, faster than motor.speed_limit_rad_per_s = "
         f"{limit:g} rad/s; use {way_out} {unit}"
     )
-    raise ValueError(msg)
 
 
-def _check_crossing(scene: SceneView, index: int, highest: tuple[float, float]) -> None:
-    # A motor that halts is late, so that barbs may meet although their highest angles are not asked for at one time.
-    if scene.smarticle.tip_clearance(highest) < 0:
-        msg = (
-            f"phases.{index}: at {highest[0]:.4g}° and {highest[1]:.4g}° the barbs of l/w = "
-            f"{scene.smarticle.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
-        )
-        raise ValueError(msg)
-
-
-def _check_first_spheres(scene: SceneView, index: int, angle: float) -> None:
+def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[str]:
     """Check that the first sphere of a barb beyond 90° does not touch the spheres of the middle link.
 
     At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
@@ -387,12 +377,11 @@ def _check_first_spheres(scene: SceneView, index: int, angle: float) -> None:
     near, inwards = s / d, -math.cos(math.radians(angle))
     apart = near * inwards + math.sqrt(max(0.0, (near * inwards) ** 2 + 1 - near**2))
     wider = apart / (1 - apart * d / scene.smarticle.middle_length_m)
-    msg = (
+    yield (
         f"fidelity.pitch: with {scene.fidelity.pitch:g} the middle link's spheres are {m[0] / d:.3g} diameters apart, "
         f"and the first sphere of a barb touches them at the {angle:.4g}° of phases.{index}; stay below "
         f"{_down(math.degrees(math.acos(-inward)))}° or use a pitch of at least {_up(wider, 2)}"
     )
-    raise ValueError(msg)
 
 
 def _up(value: float, digits: int = 3) -> str:

@@ -1,15 +1,17 @@
 """What every phase of a scene answers, what a phase is while it runs, and when a pile counts as settled.
 
-A kind of phase is one file: its data, a validated part of the scene; its checks; how long it takes; what it calls for;
-and its stage. `dem.phases.kinds` lists the kinds.
+A kind of phase has one file: its data, a validated part of the scene; its checks; how long it takes; what it calls for;
+and what it does. `dem.phases.kinds` lists the kinds.
 
-`Stage.proceed` is called again and again, after the time that it returned; in between, time advances and everything due
+`proceed` is called again and again, after the time that it returned; in between, time advances and everything due
 is recorded. All that a stage remembers is plain data, so that a run can stop between any two steps and be resumed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -29,21 +31,29 @@ SETTLE_SECONDS = 0.35  # that a poured pile takes to settle, about
 Memory = dict[str, Any]
 
 
-class Stage(Protocol):
-    """One phase while it runs."""
+@dataclass
+class Stage:
+    """A phase while it runs.
 
+    Args:
+        phase: the phase.
+        scene: its scene.
+        index: its number.
+        memory: all that the stage remembers: plain data, JSON-able without loss. `warning` is reported at its end.
+    """
+
+    phase: Phase
+    scene: SceneView
+    index: int
     memory: Memory
-    """All that the stage remembers: plain data, JSON-able without loss; `warning` is reported when the phase ends."""
+
+    @cached_property
+    def prepared(self) -> Any:
+        """What the phase needs besides the memory."""
+        return self.phase.prepare(self.scene, self.index)
 
     def proceed(self, engine: Engine) -> float:
-        """Do what is due now.
-
-        Returns:
-            Time [s] until the next call; 0: the phase is over.
-
-        Raises:
-            RunError: the phase did not end as it should; the message says by how much.
-        """
+        return self.phase.proceed(self, engine)
 
 
 class Phase:
@@ -67,12 +77,12 @@ class Phase:
         """Its `type` in a scene file."""
         return str(getattr(self, "type"))  # noqa: B009 - a field of the part that this is mixed into
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """Check it against the rest of its scene, where it is number `index`.
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        """Yield what is wrong with it in its scene, where it is number `index`: one line with key, value and way out.
 
-        Raises:
-            ValueError: one line with key, value and the way out.
+        Each item relies on the ones before not to be yielded.
         """
+        yield from ()
 
     def ready(self, scene: SceneView) -> None:
         """Check before a run begins that what it needs is still there.
@@ -134,6 +144,24 @@ class Phase:
 
     def begin(self, scene: SceneView, index: int) -> Stage:
         """Return its stage, at the beginning."""
+        return Stage(self, scene, index, self.first_memory(scene))
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        """Return what its stage remembers at the beginning."""
+        return {}
+
+    def prepare(self, scene: SceneView, index: int) -> Any:
+        """Return what its stage computes only once."""
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        """Do what is due now.
+
+        Returns:
+            Time [s] until the next call; 0: the phase is over.
+
+        Raises:
+            RunError: the phase did not end as it should; the message says by how much.
+        """
         raise NotImplementedError
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -45,10 +45,9 @@ class PullHook(Part, Phase):
             raise ValueError(msg)
         return self
 
-    def check(self, scene: SceneView, index: int) -> None:
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.hooks is None:
-            msg = f"phases.{index}: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {{}}` will do)"
-            raise ValueError(msg)
+            yield f"phases.{index}: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {{}}` will do)"
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         hooks = scene.hooks
@@ -91,40 +90,27 @@ class PullHook(Part, Phase):
             f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}"
         }
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return Pulling(self)
-
-
-# Widths w and thicknesses t2 that the keys are by default.
-_DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
-
-
-def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
-    """Fill the keys of a pull-hook that follow from the smarticle; return other phases unchanged."""
-    pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
-    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
-
-
-class Pulling:
-    """Raises the upper hook until it has arrived or takes too much force; then it stays there."""
-
-    def __init__(self, phase: PullHook) -> None:
-        self._phase = phase
+    def first_memory(self, scene: SceneView) -> Memory:
         # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last check.
-        self.memory: Memory = {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
+        return {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
 
-    def proceed(self, engine: Engine) -> float:
-        memory, phase = self.memory, self._phase
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory = stage.memory
         if memory["end"] is None:
-            arrival = engine.time + phase.distance_m / phase.speed_m_per_s
-            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True, felt=_felt_above(engine))
+            arrival = engine.time + self.distance_m / self.speed_m_per_s
+            memory.update(arrival=arrival, end=engine.time + self.duration_s, raising=True, felt=_felt_above(engine))
             engine.motors.weld()
-            engine.boundaries.raise_upper(phase.speed_m_per_s)
-            self._note(engine)
-        elif memory["raising"] and self._overloaded(engine):
-            memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
+            engine.boundaries.raise_upper(self.speed_m_per_s)
+            _note(memory, engine)
+        elif memory["raising"]:
+            # Whether the mean force on the hook since the last check exceeds its limit.
+            before, step = memory["force_sum"], memory["step"]
+            _note(memory, engine)
+            limit = self.force_limit_N
+            if limit is not None and before - memory["force_sum"] > limit * (memory["step"] - step):
+                memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
         if memory["raising"] and (left := time_left(engine, memory["arrival"])):
-            return left if phase.force_limit_N is None else min(CHECK_INTERVAL, left)
+            return left if self.force_limit_N is None else min(CHECK_INTERVAL, left)
         if memory["raising"]:
             memory["raising"] = False
             engine.boundaries.stop()
@@ -136,14 +122,19 @@ class Pulling:
             )
         return left
 
-    def _overloaded(self, engine: Engine) -> bool:
-        """Return whether the mean force on the hook since the last check exceeds its limit."""
-        limit, before, step = self._phase.force_limit_N, self.memory["force_sum"], self.memory["step"]
-        self._note(engine)
-        return limit is not None and before - self.memory["force_sum"] > limit * (self.memory["step"] - step)
 
-    def _note(self, engine: Engine) -> None:
-        self.memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
+def _note(memory: Memory, engine: Engine) -> None:
+    memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
+
+
+# Widths w and thicknesses t2 that the keys are by default.
+_DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
+
+
+def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
+    """Fill the keys of a pull-hook that follow from the smarticle; return other phases unchanged."""
+    pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
+    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
 
 
 def _felt_above(engine: Engine) -> list[float]:

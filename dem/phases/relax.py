@@ -18,20 +18,12 @@ class Relax(Part, Phase):
     type: Literal["relax"]
     duration_s: Duration = Field(0.5, description="length of the phase [s]")
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return Resting(self.duration_s)
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
 
-
-class Resting:
-    """Waits for a time [s]; nothing acts but gravity."""
-
-    def __init__(self, duration: float) -> None:
-        self._duration = duration
-        self.memory: Memory = {"begun": False}
-
-    def proceed(self, engine: Engine) -> float:
-        if self.memory["begun"]:
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
             return 0.0
-        self.memory["begun"] = True
+        stage.memory["begun"] = True
         engine.motors.weld()
-        return self._duration
+        return self.duration_s

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -30,11 +30,10 @@ class RemoveContainer(Part, Phase):
         "[m/s]; a wall that is not clear of it at the end of the phase stays where it is; null: gone at once",
     )
 
-    def check(self, scene: SceneView, index: int) -> None:
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         for earlier, phase in enumerate(scene.phases[:index]):
             if phase.frees:
-                msg = f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
-                raise ValueError(msg)
+                yield f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
 
     @property
     def pushing_speed(self) -> float:
@@ -45,21 +44,13 @@ class RemoveContainer(Part, Phase):
         how = "at once" if speed is None else f"lifted at {1e3 * speed:.3g} mm/s"
         return {EffectName.WALL_REMOVAL: f"phase {index}: {how}"}
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return Removing(self)
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"end": None, "lifting": False}
 
-
-class Removing:
-    """Takes the container's wall away, at once or upwards; the pile rests on the floor."""
-
-    def __init__(self, phase: RemoveContainer) -> None:
-        self._phase = phase
-        self.memory: Memory = {"end": None, "lifting": False}
-
-    def proceed(self, engine: Engine) -> float:
-        memory, speed = self.memory, self._phase.speed_m_per_s
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory, speed = stage.memory, self.speed_m_per_s
         if memory["end"] is None:
-            memory["end"] = engine.time + self._phase.duration_s
+            memory["end"] = engine.time + self.duration_s
             engine.motors.weld()
             if speed is None:
                 engine.boundaries.remove_wall()

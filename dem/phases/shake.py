@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -52,45 +52,23 @@ class Shake(Part, Phase):
             f"{self.frequency_hz:g} Hz, A = {1e3 * self.amplitude(scene.gravity_m_per_s2):.3g} mm{alone}"
         }
 
-    def check(self, scene: SceneView, index: int) -> None:
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         # A floor that moves alone stays within its wall.
         amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
         if self.moves == "floor" and amplitude > below:
-            msg = (
+            yield (
                 f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
                 f"{below:.3g} m below it; use a lower peak_acceleration_g, a higher frequency_hz, or moves: container"
             )
-            raise ValueError(msg)
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return Shaking(self, scene.gravity_m_per_s2, freed=_freed(scene, index))
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
 
-
-def _freed(scene: SceneView, index: int) -> bool:
-    """Return whether an earlier phase takes the container away."""
-    return any(before.frees for before in scene.phases[:index])
-
-
-class Shaking:
-    """Shakes the container, or its floor alone.
-
-    Args:
-        phase: the phase.
-        gravity: g [m/s²].
-        freed: whether an earlier phase takes the wall away.
-    """
-
-    def __init__(self, phase: Shake, gravity: float, *, freed: bool) -> None:
-        self._phase = phase
-        self._amplitude = phase.amplitude(gravity)
-        self._freed = freed
-        self.memory: Memory = {"begun": False}
-
-    def proceed(self, engine: Engine) -> float:
-        if self.memory["begun"]:
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
             engine.boundaries.stop()
             return 0.0
-        if self._freed and engine.boundaries.walled:
+        if _freed(stage.scene, stage.index) and engine.boundaries.walled:
             edge = engine.boundaries.wall_bottom - engine.boundaries.floor
             msg = (
                 f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
@@ -98,8 +76,13 @@ class Shaking:
                 "speed_m_per_s"
             )
             raise RunError(msg)
-        self.memory["begun"] = True
+        stage.memory["begun"] = True
         engine.motors.weld()
-        walls = self._phase.moves == "container"
-        engine.boundaries.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz, walls=walls)
-        return self._phase.duration_s
+        amplitude = self.amplitude(stage.scene.gravity_m_per_s2)
+        engine.boundaries.shake(amplitude=amplitude, frequency=self.frequency_hz, walls=self.moves == "container")
+        return self.duration_s
+
+
+def _freed(scene: SceneView, index: int) -> bool:
+    """Return whether an earlier phase takes the container away."""
+    return any(before.frees for before in scene.phases[:index])

@@ -10,11 +10,11 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,16 +168,14 @@ class TakeOver(Part, Phase):
             raise InputError(msg)
         return taken
 
-    def check(self, scene: SceneView, index: int) -> None:
-        # A scene whose source is gone can still be read; `ready` rejects it before a run.
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.gravity_m_per_s2 == 0:
-            msg = "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
-            raise ValueError(msg)
+            yield "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
         try:
             taken = self.taken
         except InputError:
-            return
-        poses_of(scene, taken)
+            return  # a scene whose source is gone can still be read; `ready` rejects it before a run
+        yield from _mismatches(scene, taken)
 
     def ready(self, scene: SceneView) -> None:
         try:
@@ -218,30 +216,21 @@ class TakeOver(Part, Phase):
         # Nothing falls, so that little more than the hold is needed.
         return self.settle.hold_s + TAKEN_SECONDS
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        return TakingOver(self, scene)
-
-
-class TakingOver:
-    """Adds all smarticles at once, at rest; relaxes overlaps without speed; then waits until the pile settles."""
-
-    def __init__(self, phase: TakeOver, scene: SceneView) -> None:
-        self._phase = phase
-        self._scene = scene
+    def first_memory(self, scene: SceneView) -> Memory:
         # `task`: what is due; `stops`: how often smarticles were stopped; `height`: their mean when added [m];
         # `waited`: since then [s]; `still`: that the pile has been [s].
-        self.memory: Memory = {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
+        return {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
 
-    def proceed(self, engine: Engine) -> float:
-        wait = self._do(engine)
-        self.memory["waited"] += wait
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        wait = self._do(stage, engine)
+        stage.memory["waited"] += wait
         return wait
 
-    def _do(self, engine: Engine) -> float:
-        memory, settle, stride = self.memory, self._phase.settle, STRIDE * engine.time_step
+    def _do(self, stage: Stage, engine: Engine) -> float:
+        memory, settle, stride = stage.memory, self.settle, STRIDE * engine.time_step
         if memory["task"] == "put":
-            self._phase.ready(self._scene)
-            engine.add(poses_of(self._scene, self._phase.taken))
+            self.ready(stage.scene)
+            engine.add(poses_of(stage.scene, self.taken))
             memory.update(task="count", height=_mean_height(engine))
             return engine.time_step
         if memory["task"] == "count":
@@ -252,32 +241,24 @@ class TakingOver:
         if memory["task"] == "let apart":
             fastest = float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
             if fastest > settle.speed_m_per_s + stride * engine.gravity:
-                self._stop(engine, fastest)
+                if memory["waited"] > settle.timeout_s:
+                    msg = (
+                        f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up "
+                        f"to {fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
+                        "phases.0.settle.speed_m_per_s, or pour on this engine"
+                    )
+                    raise RunError(msg)
+                engine.still()
+                memory["stops"] += 1
                 return stride
             memory["task"] = "settle"
-            self._warn(engine)
+            if memory["stops"]:
+                memory["warning"] = (
+                    f"poses of {self.run} overlap as this scene has its links (engine, fidelity): smarticles were "
+                    f"stopped {memory['stops']} times in {memory['waited']:.3g} s while contacts let them apart, and "
+                    f"stand {1e3 * (_mean_height(engine) - memory['height']):.2g} mm higher on average"
+                )
         return 0.0 if has_settled(settle, memory, engine) else CHECK_INTERVAL
-
-    def _stop(self, engine: Engine, fastest: float) -> None:
-        settle: Settle = self._phase.settle
-        if self.memory["waited"] > settle.timeout_s:
-            msg = (
-                f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up to "
-                f"{fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
-                "phases.0.settle.speed_m_per_s, or pour on this engine"
-            )
-            raise RunError(msg)
-        engine.still()
-        self.memory["stops"] += 1
-
-    def _warn(self, engine: Engine) -> None:
-        memory = self.memory
-        if memory["stops"]:
-            memory["warning"] = (
-                f"poses of {self._phase.run} overlap as this scene has its links (engine, fidelity): smarticles were "
-                f"stopped {memory['stops']} times in {memory['waited']:.3g} s while contacts let them apart, and stand "
-                f"{1e3 * (_mean_height(engine) - memory['height']):.2g} mm higher on average"
-            )
 
 
 def _mean_height(engine: Engine) -> float:
@@ -290,74 +271,76 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
     Raises:
         InputError: they differ, or do not fit into its container; one line with key, value and the way out.
     """
-    if taken.run.manifest.planar:
-        msg = f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
-        raise InputError(msg)
-    _check_smarticle(scene, taken)
-    _check_room(scene, taken)
-    poses, off = fitted_poses(scene.particle.boxes, taken.vertices)
-    if off.max() > MOST_OFF * scene.sphere_diameter:
-        _reject_angles(scene, taken)
-    return poses
+    for mismatch in _mismatches(scene, taken):
+        raise InputError(mismatch)
+    return fitted_poses(scene.particle.boxes, taken.vertices)[0]
 
 
-def _check_smarticle(scene: SceneView, taken: Taken) -> None:
+def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
+    """Yield what of a frame does not fit the scene; each item relies on the ones before not to be yielded."""
+    manifest, taking = taken.run.manifest, "which phases.0 (take-over) takes over"
+    if manifest.planar:
+        yield f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
     for key in _SHAPE:
-        here, there = getattr(scene.smarticle, key), getattr(taken.run.manifest, key)
+        here, there = getattr(scene.smarticle, key), getattr(manifest, key)
         if not math.isclose(here, there, rel_tol=1e-9):
             unit = "" if key == "aspect_ratio" else " m"
-            msg = (
-                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, which phases.0 "
-                "(take-over) takes over; use the same, or another run"
+            yield (
+                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, {taking}; use the same, or "
+                "another run"
             )
-            raise InputError(msg)
     if taken.frame.count != scene.count:
-        whole = (
-            "" if taken.frame.count == taken.run.manifest.count else f" of {taken.run.manifest.count}, poured so far"
+        whole = "" if taken.frame.count == manifest.count else f" of {manifest.count}, poured so far"
+        yield (
+            f"count: {scene.count} here, but {taken}, {taking}, holds {taken.frame.count}{whole}; use the same, or "
+            "another frame"
         )
-        msg = (
-            f"count: {scene.count} here, but {taken}, which phases.0 (take-over) takes over, holds "
-            f"{taken.frame.count}{whole}; use the same, or another frame"
-        )
-        raise InputError(msg)
     straight = scene.smarticle.aspect_ratio == 0 or scene.smarticle.angles_deg == (0.0, 0.0)
     if straight and scene.fidelity.rows > 1:
-        msg = (
+        yield (
             f"fidelity.rows: {scene.fidelity.rows}, but frames do not know how a straight smarticle is turned about "
             "its length, which phases.0 (take-over) needs for more than 1; use 1, or angles_deg that are not 0"
         )
-        raise InputError(msg)
-
-
-def _check_room(scene: SceneView, taken: Taken) -> None:
-    """Check that no link's axis lies outside the wall, under the floor or in a hook: no contact would push it back."""
+    # No link's axis may lie outside the wall, under the floor or in a hook: no contact would push it back.
     cylinder, vertices = scene.cylinder, taken.vertices
     heights, off_axis = vertices[..., 2], np.hypot(vertices[..., 0], vertices[..., 1])
-    room = cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)
-    beyond = (off_axis > room).any(axis=1)
+    beyond = (off_axis > cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)).any(axis=1)
     if beyond.any():
-        msg = (
-            f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, which phases.0 "
-            f"(take-over) takes over, reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider "
-            "container or another run"
+        yield (
+            f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, {taking}, "
+            f"reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider container or another run"
         )
-        raise InputError(msg)
     lowest = float(_within_tips(vertices, scene.particle.radius)[..., 2].min())
     if heights.max() > cylinder.height or lowest < 0:
-        msg = (
-            f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, which phases.0 (take-over) "
-            f"takes over, lie at {lowest:.4g} to {heights.max():.4g} m; use a higher container or another "
-            "run"
+        yield (
+            f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, {taking}, lie at "
+            f"{lowest:.4g} to {heights.max():.4g} m; use a higher container or another run"
         )
-        raise InputError(msg)
     for name, cross in zip(("lower", "upper"), scene.hooks.crosses if scene.hooks else (), strict=False):
         inside = _in_cross(cross, vertices)
         if inside.any():
-            msg = (
-                f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, which phases.0 "
-                "(take-over) takes over, lie in this hook; take over a run that was poured with these hooks"
+            yield (
+                f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, {taking}, lie in "
+                "this hook; take over a run that was poured with these hooks"
             )
-            raise InputError(msg)
+    _, off = fitted_poses(scene.particle.boxes, vertices)
+    if off.max() <= MOST_OFF * scene.sphere_diameter:
+        return
+    angles = _angles(taken)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
+    (first, second), middle = scene.smarticle.angles_deg, (low + high) / 2
+    # A scene can be made with barbs that all stand alike.
+    alike = math.radians(float((high - low).max()) / 2) * scene.particle.boxes.barb_length
+    way_out = (
+        f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
+        if alike < MOST_OFF * scene.sphere_diameter
+        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
+    )
+    yield (
+        f"smarticle.angles_deg: ({first:g}, {second:g}) here, but the barbs of {taken}, {taking}, stand at {reached}; "
+        f"{way_out}"
+    )
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
@@ -384,25 +367,6 @@ def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
     inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
     found: NDArray[np.bool_] = np.logical_or.reduce(inside)
     return found
-
-
-def _reject_angles(scene: SceneView, taken: Taken) -> NoReturn:
-    angles = _angles(taken)
-    low, high = angles.min(axis=0), angles.max(axis=0)
-    reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
-    here, middle = scene.smarticle.angles_deg, (low + high) / 2
-    # A scene can be made with barbs that all stand alike.
-    alike = float((high - low).max()) / 2 * math.pi / 180 * scene.particle.boxes.barb_length
-    way_out = (
-        f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
-        if alike < MOST_OFF * scene.sphere_diameter
-        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
-    )
-    msg = (
-        f"smarticle.angles_deg: ({here[0]:g}, {here[1]:g}) here, but the barbs of {taken}, which phases.0 (take-over) "
-        f"takes over, stand at {reached}; {way_out}"
-    )
-    raise InputError(msg)
 
 
 def _angles(taken: Taken) -> Array:

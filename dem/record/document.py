@@ -75,25 +75,21 @@ class Manifest(Document):
     """What made a run, `run.json`.
 
     Attributes:
-        format: Version of the run directory.
-        versions: Version of each program that took part.
         engine: Absent in manifests written before the key was added.
-        threads: Threads that the engine ran with; ranks on lammps.
+        threads: Threads of the engine; ranks on lammps.
         fidelity: Name of the fidelity that the scene's is based on.
-        count: Number of smarticles of the scene.
         aspect_ratio: l/w [-].
-        thickness_normal_m: Thickness t1 along the normal of the smarticle's plane.
-        thickness_in_plane_m: Thickness t2 in the smarticle's plane.
-        middle_thickness_in_plane_m: That of the middle link, where it has its own.
+        thickness_normal_m: t1, along the normal of the smarticle's plane.
+        thickness_in_plane_m: t2, in the smarticle's plane.
+        middle_thickness_in_plane_m: That of the middle link, where it differs.
         solid_volume_m3: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2.
         container_radius_m: Of the widest tier.
         packing_radius_m: Radius that packing fractions are computed with, where it is not the container's.
         container_tiers: Cylinders of different radii that stand on each other.
         planar: Whether all motion is confined to a plane, without a container.
         channel_width_m: Distance of the two walls in the plane; None without.
-        sphere_diameter_m: Diameter of the spheres that stand for a smarticle.
         time_step_s: The shortest of its phases.
-        taken_over: Where its smarticles come from, if from another run.
+        taken_over: The source of its smarticles, if from another run.
     """
 
     format: Literal[1] = 1

@@ -130,7 +130,7 @@ class Recorder:
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns of the series."""
         times = {name: writer.times for name, writer in self._writers()}
-        return {"samples": self.samples, "next_step": self.next_step, **times, "series": self.sampler.memory}
+        return {"samples": self.samples, "next_step": self.next_step, **times, "series": dict(self.sampler.memory)}
 
     def _writers(self) -> list[tuple[str, FrameWriter]]:
         named = (("frames", self.frames), ("forces", self.forces), ("spheres", self.spheres))
@@ -140,7 +140,7 @@ class Recorder:
         """Restore what `memory` returned: later frames are removed, the series is cut back."""
         self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
-        self.sampler.restore(memory["series"])
+        self.sampler.memory = dict(memory["series"])
         self.series.restore(columns)
         self.series.write()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -50,10 +50,9 @@ class Sampler:
 
     radius: float
     effects: Set[EffectName] = frozenset()
-    # Time [s], impulse of gravity [N s] and momentum [kg m/s]; steps, and forces summed over them [N].
-    _before: tuple[float, float, Array] | None = None
-    _hooks_before: tuple[int, Array] | None = None
-    _strain_before: tuple[int, Array] | None = None
+    memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(("before", "hooks", "strain")))
+    """Plain data of the sample before: time [s], impulse of gravity [N s] and momentum [kg m/s]; for hooks and strain
+    steps, and forces summed over them [N]."""
 
     @property
     def described(self) -> Columns:
@@ -72,7 +71,7 @@ class Sampler:
         container_force = self._mean_force(engine, state.momentum)
         more: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
-            lower, upper = self._hook_forces(engine)
+            lower, upper = self._mean_since("hooks", engine.steps, engine.boundaries.hook_sums)
             # The balance includes the hooks.
             container_force -= lower + upper
             more |= {
@@ -117,19 +116,20 @@ class Sampler:
     def _mean_force(self, engine: Engine, momentum: Array) -> Array:
         # The container received what the smarticles lost, apart from gravity and from the throw of added smarticles.
         # This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
-        time, impulse, before = engine.time, engine.impulse, self._before
-        self._before = (time, impulse, momentum)
+        time, impulse, before = engine.time, engine.impulse, self.memory["before"]
+        self.memory["before"] = [time, impulse, momentum.tolist()]
         if before is None or time <= before[0]:
             return np.full(3, math.nan)
-        lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
+        lost = np.array(before[2]) - momentum - np.array([0.0, 0.0, impulse - before[1]])
         return np.asarray(lost / (time - before[0]))
 
-    def _hook_forces(self, engine: Engine) -> Array:
-        steps, sums, before = engine.steps, engine.boundaries.hook_sums, self._hooks_before
-        self._hooks_before = (steps, sums)
+    def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
+        """Return the mean over the steps since the sample before, from forces summed over all steps."""
+        before = self.memory[name]
+        self.memory[name] = [steps, sums.tolist()]
         if before is None or steps <= before[0]:
             return np.full_like(sums, math.nan)
-        return np.asarray((sums - before[1]) / (steps - before[0]))
+        return np.asarray((sums - np.array(before[1])) / (steps - before[0]))
 
     def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
@@ -138,36 +138,15 @@ class Sampler:
         if not engine.count:
             return row
         row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
-        before, self._strain_before = self._strain_before, None
         if not strings.tied:
+            self.memory["strain"] = None
             return row
         walls = engine.boundaries.channel_sums
         sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
-        self._strain_before = (engine.steps, sums)
         row["pulled_m"] = strings.pulled
         row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
-        if before is not None and engine.steps > before[0]:
-            means = (sums - before[1]) / (engine.steps - before[0])
-            row |= dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
-        return row
-
-    @property
-    def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
-        marks = {"hooks": self._hooks_before, "strain": self._strain_before}
-        before = self._before
-        return {
-            "before": None if before is None else [before[0], before[1], before[2].tolist()],
-            **{name: None if mark is None else [mark[0], mark[1].tolist()] for name, mark in marks.items()},
-        }
-
-    def restore(self, memory: Mapping[str, Any]) -> None:
-        """Restore what `memory` returned."""
-        before = memory["before"]
-        self._before = None if before is None else (before[0], before[1], np.array(before[2]))
-        self._hooks_before, self._strain_before = (
-            None if mark is None else (mark[0], np.array(mark[1])) for mark in (memory["hooks"], memory["strain"])
-        )
+        means = self._mean_since("strain", engine.steps, sums)
+        return row | dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
 
 
 def _motor_row(engine: Engine, state: State) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def _problems(scene: SceneView, engine: str) -> Iterator[str]:
     yield from _of_body(scene)
     yield from _of_recording(scene)
     for index, phase in enumerate(scene.phases):
-        phase.check(scene, index)
+        yield from phase.check(scene, index)
     if scene.hooks is not None:
         yield from _of_bars(scene.hooks)
         yield from _of_room(scene, scene.hooks)

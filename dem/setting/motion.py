@@ -23,6 +23,7 @@ from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
 
 Array = NDArray[np.float64]
 
+Angles = Array | float
 Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]
 
 
@@ -44,14 +45,10 @@ class Leg:
     home: Array
     until: float
 
-    def extremes(self) -> tuple[Array, Array]:
-        """Return the lowest and the highest angle [rad] for each start."""
-        low, high = self.motion.bounds(self.start, self.home, self.until)
-        return low + np.zeros_like(self.start), high + np.zeros_like(self.start)
-
-    def speed(self) -> float:
-        """Return the greatest speed [rad/s] over all starts, except for jumps."""
-        return float(np.max(self.motion.speeds(self.start, self.home)))
+    def extent(self) -> tuple[Array, Array, float]:
+        """Return the lowest and the highest angle [rad] for each start, and the greatest speed [rad/s] over all."""
+        low, high, speed = self.motion.extent(self.start, self.home, self.until)
+        return low + np.zeros_like(self.start), high + np.zeros_like(self.start), float(np.max(speed))
 
 
 class BaseMotion(Part):
@@ -87,12 +84,11 @@ class SimpleMotion(BaseMotion):
 
     pace: ClassVar[tuple[str, str]] = ("duration_s", "s")  # the key that sets the speed, and its unit
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array | float, Array | float]:
-        """Return the lowest and the highest angle [rad] up to the time `until` [s]."""
-        raise NotImplementedError
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
+        """Return lowest and highest angle [rad] and greatest speed [rad/s] up to the time `until` [s].
 
-    def speeds(self, start: Array, home: Array) -> Array | float:
-        """Return the greatest speed [rad/s], except for jumps."""
+        A jump does not count for the speed: the motor follows it at its speed limit.
+        """
         raise NotImplementedError
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
@@ -117,11 +113,8 @@ class Hold(_Endless):
     def course(self, start: Array, home: Array) -> Course:
         return lambda times: start
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
-        return start, start
-
-    def speeds(self, start: Array, home: Array) -> float:
-        return 0.0
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
+        return start, start, 0.0
 
 
 class _Straight(SimpleMotion):
@@ -147,12 +140,9 @@ class _Straight(SimpleMotion):
 
         return at
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         last = self.course(start, home)(np.array(until))
-        return np.minimum(start, last), np.maximum(start, last)
-
-    def speeds(self, start: Array, home: Array) -> Array:
-        return np.abs(self.goal(home) - start) / self.duration_s
+        return np.minimum(start, last), np.maximum(start, last), np.abs(self.goal(home) - start) / self.duration_s
 
 
 class Ramp(_Straight):
@@ -194,6 +184,11 @@ class _Wave(_Endless):
     def period(self) -> float:
         return 1 / self.frequency
 
+    @property
+    def fastest(self) -> float:
+        """Greatest speed [rad/s], reached in every half cycle."""
+        raise NotImplementedError
+
     def swing(self, cycles: Array) -> Array:
         """Return the distance from the centre over the amplitude [1] after a number of cycles."""
         raise NotImplementedError
@@ -203,7 +198,7 @@ class _Wave(_Endless):
         frequency, offset = self.frequency, self.cycles_offset
         return lambda times: centre + amplitude * self.swing(frequency * times + offset)
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[float, float]:
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         first = self.cycles_offset
         last = first + self.frequency * until
         ends = self.swing(np.array([first, last] if math.isfinite(last) else [first]))
@@ -211,7 +206,7 @@ class _Wave(_Endless):
         high = 1.0 if np.floor(last - 0.25) >= np.ceil(first - 0.25) else float(ends.max())
         low = -1.0 if np.floor(last - 0.75) >= np.ceil(first - 0.75) else float(ends.min())
         centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
-        return centre + amplitude * low, centre + amplitude * high
+        return centre + amplitude * low, centre + amplitude * high, self.fastest
 
 
 _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
@@ -252,8 +247,8 @@ class Sine(_Wave):
     def swing(self, cycles: Array) -> Array:
         return sine_of(cycles)
 
-    def speeds(self, start: Array, home: Array) -> float:
-        # The bound is met in every half cycle.
+    @property
+    def fastest(self) -> float:
         return 2 * math.pi * self.frequency_hz * math.radians(self.amplitude_deg)
 
 
@@ -273,7 +268,8 @@ class Triangle(_Wave):
         quarter = cycles - 0.25
         return 4 * np.abs(quarter - np.floor(quarter) - 0.5) - 1
 
-    def speeds(self, start: Array, home: Array) -> float:
+    @property
+    def fastest(self) -> float:
         return self.speed_rad_per_s
 
 

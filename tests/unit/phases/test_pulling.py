@@ -8,26 +8,27 @@ import pytest
 from double import EngineDouble
 from scenes import small
 
-from dem.phases.phase import CHECK_INTERVAL
-from dem.phases.pull_hook import HELD_SECONDS, PullHook, Pulling
+from dem.phases.phase import CHECK_INTERVAL, Stage
+from dem.phases.pull_hook import HELD_SECONDS, PullHook
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004
 ARRIVAL = DISTANCE / SPEED
 
 
-def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDouble, float, Pulling]:
+def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDouble, float, Stage]:
     """An engine without smarticles, whose hook takes `stiffness` N for each metre; how far it was raised, the stage.
 
     With `anew` the stage is made again from what it remembers at every look.
     """
     phase = PullHook(type="pull-hook", distance_m=DISTANCE, speed_m_per_s=SPEED, **keys)
-    engine, pulling = EngineDouble.of(small({"hooks": {}}), DT), Pulling(phase)
+    scene = small({"hooks": {}})
+    engine, pulling = EngineDouble.of(scene, DT), phase.begin(scene, 1)
     engine.boundaries.hook_stiffness = stiffness
     start = engine.boundaries.upper_height
     while wait := pulling.proceed(engine):
         engine.advance(max(1, round(wait / DT)))
         if anew:
-            memory, pulling = pulling.memory, Pulling(phase)
+            memory, pulling = pulling.memory, phase.begin(scene, 1)
             pulling.memory = dict(memory)
     assert engine.told == [("raise_upper", SPEED), ("stop",)]
     return engine, engine.boundaries.upper_height - start, pulling

@@ -35,7 +35,7 @@ def sample(sampler: Sampler, engine: EngineDouble) -> dict[str, np.ndarray]:
     """A row, and the sampler as a run that goes on from here has it."""
     row = sampler.sample(engine, engine.state(), 2)
     assert list(row) == list(sampler.described)
-    sampler.restore(json.loads(json.dumps(sampler.memory)))
+    sampler.memory = json.loads(json.dumps(sampler.memory))
     return row
 
 

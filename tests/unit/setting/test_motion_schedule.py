@@ -30,9 +30,8 @@ def angles_of(found: Motion, times: Any, start: float) -> NDArray[np.float64]:
 def extent_of(found: Motion, start: float, until: float) -> tuple[float, float, float]:
     """Lowest and highest angle [rad] and greatest speed [rad/s] up to a time [s]."""
     begun = np.array(start)
-    legs = list(found.legs(begun, begun, until))
-    lows, highs = zip(*(leg.extremes() for leg in legs), strict=True)
-    return min(map(float, lows)), max(map(float, highs)), max(leg.speed() for leg in legs)
+    lows, highs, speeds = zip(*(leg.extent() for leg in found.legs(begun, begun, until)), strict=True)
+    return min(map(float, lows)), max(map(float, highs)), max(speeds)
 
 
 def degrees(data: dict[str, Any], times: Any, start: float = 90.0) -> NDArray[np.float64]:
