@@ -42,21 +42,20 @@ def place_layer(
     rng: np.random.Generator,
     narrower: Callable[[Array], Array] | None = None,
 ) -> Poses:
-    """Random, non-overlapping poses in a slab of a cylinder.
+    """Return random poses without overlap in a slab of a cylinder.
 
-    Orientations are uniform over rotations, centres uniform over the disc and the slab's height, both subject to no
-    overlap. A slab that turns out to be too full grows upwards.
+    Orientations are uniform over rotations, centres over the disc and the slab's height, both subject to no overlap. A
+    slab that is too full grows upwards.
 
     Args:
         particle: one smarticle.
-        count: how many to place.
+        count: number of smarticles.
         radius: inner radius of the cylinder [m].
-        bottom: no sphere comes below this height [m].
+        bottom: height below which no sphere comes [m].
         height: height of the slab [m], in which the lowest spheres of the smarticles lie.
-        obstacles: (n, 3) centres of spheres [m], of the same diameter, that are there already.
+        obstacles: (n, 3) centres of present spheres of the same diameter [m].
         rng: source of randomness.
-        narrower: inner radii of the cylinder [m] at heights [m], where it is narrower in places; it must not be wider
-            higher up.
+        narrower: returns inner radii of the cylinder [m] at heights [m]; it must not be wider higher up.
 
     Raises:
         RunError: no room was found.
@@ -74,19 +73,10 @@ def place_layer(
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
-            distance, angle, lift = (
-                radius * math.sqrt(rng.random()),
-                2 * math.pi * rng.random(),
-                rng.random(),
-            )
+            distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
+            lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius
-            centre = np.array(
-                [
-                    distance * math.cos(angle),
-                    distance * math.sin(angle),
-                    bottom + lift * height - lowest,
-                ]
-            )
+            centre = np.array([distance * math.cos(angle), distance * math.sin(angle), bottom + lift * height - lowest])
             spheres += centre
             off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
             if off_axis.max() > widest:
@@ -113,16 +103,16 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """The poses at which a shape lies nearest to given vertices, by least squares.
+    """Return the poses at which a shape lies nearest to given vertices, by least squares.
 
-    Of a straight shape the turn about its length is unknown, and some is taken, the same for the same vertices.
+    The turn of a straight shape about its length is unknown; the choice depends on the vertices alone.
 
     Args:
         boxes: the shape.
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
 
     Returns:
-        The poses; and (N,) how far the farthest vertex of each is from its place [m], rounding for the same shape.
+        The poses; and (N,) distance of the farthest vertex of each from its place [m].
 
     Source:
         Horn, J. Opt. Soc. Am. A 4, 629 (1987).
@@ -136,7 +126,7 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
 
 
 def _turns(moments: Array) -> Array:
-    """(N, 3, 3) rotations R that make trace(Rᵀ M) largest, of M (N, 3, 3)."""
+    """Return (N, 3, 3) rotations R that make trace(Rᵀ M) largest, for M (N, 3, 3)."""
     m = moments / np.abs(moments).max(axis=(1, 2), keepdims=True)
     n = np.empty((len(m), 4, 4))
     for i in range(3):

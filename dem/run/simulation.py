@@ -92,8 +92,8 @@ class Simulation:
             if self.engine.time_step != self.time_steps[self._phase]:
                 self.engine.set_time_step(self.time_steps[self._phase])
                 self.recorder.schedule(self.engine)
-            entry = {"index": self._phase, "type": phase.type, "start_s": self.engine.time}
-            self._performed.append({**entry, "wall_s": -self.wall, "cpu_s": -self.cpu})
+            begun = {"index": self._phase, "type": phase.type, "start_s": self.engine.time}
+            self._performed.append({**begun, "wall_s": -self.wall, "cpu_s": -self.cpu})
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
         duration = phase.progress_duration

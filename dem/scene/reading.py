@@ -114,9 +114,11 @@ def apply_override(data: Any, override: str) -> None:
     except yaml.YAMLError:
         msg = f"--set {override}: the value is not valid YAML"
         raise InputError(msg) from None
-    here, parts = data, key.split(".")
+    here: Any = data
+    parts = key.split(".")
     for number, part in enumerate(parts, 1):
-        last, place = number == len(parts), int(part) if isinstance(here, list) and part.isdigit() else part
+        last = number == len(parts)
+        place: Any = int(part) if isinstance(here, list) and part.isdigit() else part
         if not isinstance(here, dict) and not (isinstance(here, list) and isinstance(place, int) and place < len(here)):
             msg = f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0"
             raise InputError(msg)
@@ -136,7 +138,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     A protocol would fill such keys in again, so that with one they are all kept.
     """
     data = scene.model_dump(mode="json")
-    optional = [
+    optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
         (data, {"engine": DEFAULT_ENGINE}),
         (data["recording"], {"contact_forces": False}),
         (data["smarticle"], {"middle_thickness_in_plane_m": None}),
