@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
-from dem.engine.demand import contact_law_of
+from dem.engine.demand import contact_law_of, motor_law_of
 from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
@@ -19,7 +19,6 @@ from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motors import LAWS
 from dem.engine.links.shape import shape_of
 from dem.physics.contact import ContactLaw
-from dem.physics.motor import MotorLaw
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
@@ -145,7 +144,6 @@ class LinksAccess:
         )
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Pushed:
-        motor = scene.motor
         return Pushed(
             particle=scene.particle,
             cylinder=Cylinder(radius=0.5, height=scene.cylinder.height, facets=16),
@@ -153,13 +151,7 @@ class LinksAccess:
             gravity=gravity,
             time_step=dt or time_step(scene),
             shaken=False,
-            motor_law=MotorLaw(
-                torque_limit=scene.torque_limit,
-                speed_limit=motor.speed_limit_rad_per_s,
-                stiffness=motor.stiffness_N_m_per_rad,
-                law=motor.law,
-                damping=motor.damping_N_m_s_per_rad,
-            ),
+            motor_law=motor_law_of(scene),
         )
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
-from dem.engine.demand import contact_law_of
+from dem.engine.demand import contact_law_of, motor_law_of
 from dem.engine.interface import Engine
 from dem.engine.yade.assembly import SMARTICLE_MATERIAL
 from dem.engine.yade.container import WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import hinge_law, motor_law
+from dem.engine.yade.kind import hinge_law
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
@@ -92,7 +92,7 @@ class YadeAccess:
             gravity=gravity,
             time_step=dt or time_step(scene),
             shaken=False,
-            hinges=(hinge_law(scene), motor_law(scene)),
+            hinges=(hinge_law(scene), motor_law_of(scene)),
         )
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
