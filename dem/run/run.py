@@ -19,7 +19,7 @@ import numpy as np
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.advice import warnings_of
-from dem.record.checkpoint import has_checkpoint, read_checkpoint
+from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
 from dem.record.document import Done, Ended, Failed, Manifest, Phase
 from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE
@@ -58,6 +58,7 @@ def run_scene(
     steps, made_by, threads = builders.steps(scene), (kind.name, kind.version()), kind.threads()
     if not resume:
         _check_ready(scene)
+    saved: tuple[Checkpoint, str | None] | None = None
     with claimed(out, resume=resume):
         if resume:
             _check_scene(scene, out)
@@ -65,6 +66,9 @@ def run_scene(
                 return None
             if not has_checkpoint(out):
                 _check_ready(scene)
+            else:
+                # Before anything is changed: it may be of another version.
+                saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
@@ -88,7 +92,7 @@ def run_scene(
                 for warning in warnings_of(scene):
                     simulation.warn(warning)
                 if resume:
-                    _restore(simulation, threads)
+                    _restore(simulation, saved, threads)
                 return _finish(simulation)
             except (Exception, KeyboardInterrupt) as error:
                 cause = _mark_ended(simulation, out, log, error)
@@ -126,14 +130,13 @@ def _check_scene(scene: Scene, out: Path) -> None:
     raise InputError(msg)
 
 
-def _restore(simulation: Simulation, threads: int) -> None:
+def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
     out, log = simulation.folder, simulation.log
-    if not has_checkpoint(out):
+    if saved is None:
         log.info("resumed from the start: no checkpoint was written")
         simulation.recorder.truncate({})
         return
-    wanted = scene_hash(simulation.scene)
-    checkpoint, warning = read_checkpoint(out, scene_sha256=wanted, made_by=simulation.made_by)
+    checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
