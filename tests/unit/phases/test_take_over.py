@@ -18,13 +18,14 @@ from scenes import SMALL, changed
 
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
-from dem.phases.take_over import STRIDE, TakeOver
+from dem.phases.take_over import STRIDE, TakeOver, _in_cross
 from dem.record.frame import Frame
 from dem.record.frames import read_frames
 from dem.run.run import run_scene
 from dem.run.simulation import Simulation
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
+from dem.setting.hooks import Cross
 
 DT = 2e-4
 RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04}
@@ -276,3 +277,12 @@ def test_what_never_comes_apart_fails(pour: Path) -> None:
     ):
         perform(scene, engine)
     assert engine.time < 0.11
+
+
+def test_links_in_any_bar_of_a_hook_are_found() -> None:
+    cross = Cross(height=0.01, side=1e-3, length=0.02, count=2)
+    upright = np.zeros((1, 4, 3))
+    upright[..., 2] = [0.005, 0.006, 0.014, 0.015]
+    assert not _in_cross(cross, upright).any()  # between the bars
+    for bar in cross.bars:
+        assert _in_cross(cross, upright + np.array([*bar.middle, 0.0])).all()
