@@ -25,12 +25,13 @@ Columns = Mapping[str, Column]
 """Datasets by name, in the order of the file."""
 
 
-def _columns(labels: Mapping[str, str] | None = None, /, **descriptions: str) -> Columns:
-    """Return columns from descriptions; their names spell unit and label, except for labels given."""
+def _columns(**described: str | tuple[str, str]) -> Columns:
+    """Return columns from descriptions, or labels and descriptions; names spell the unit, and the label by default."""
     found = {}
-    for name, description in descriptions.items():
-        label, unit = unit_of(name)
-        found[name] = Column(unit or "1", (labels or {}).get(name, label.replace("_", " ")), description)
+    for name, text in described.items():
+        own_label, unit = unit_of(name)
+        label, description = (own_label.replace("_", " "), text) if isinstance(text, str) else text
+        found[name] = Column(unit or "1", label, description)
     return found
 
 
@@ -69,66 +70,56 @@ ENERGY_COLUMNS = _columns(
 )
 # In scenes that sample dissipation; their labels are the names of the datasets.
 LEDGER_COLUMNS = _columns(
-    {
-        "added_energy_J": "added_energy_J",
-        "contact_elastic_energy_J": "contact_elastic_energy_J",
-        "hinge_elastic_energy_J": "hinge_elastic_energy_J",
-        "dissipated_energy_J": "dissipated_energy_J",
-        "energy_residual_J": "energy_residual_J",
-    },
-    added_energy_J="gravitational energy that smarticles had when they were poured, above the same height",
-    contact_elastic_energy_J="in the springs of all contacts",
-    hinge_elastic_energy_J="in the pins and dampers of all hinges",
-    dissipated_energy_J="by contacts, hinges and welding since the start, sampled",
-    energy_residual_J="added energy and work less everything stored and dissipated: the ledger's error",
+    added_energy_J=(
+        "added_energy_J",
+        "gravitational energy that smarticles had when they were poured, above the same height",
+    ),
+    contact_elastic_energy_J=("contact_elastic_energy_J", "in the springs of all contacts"),
+    hinge_elastic_energy_J=("hinge_elastic_energy_J", "in the pins and dampers of all hinges"),
+    dissipated_energy_J=("dissipated_energy_J", "by contacts, hinges and welding since the start, sampled"),
+    energy_residual_J=(
+        "energy_residual_J",
+        "added energy and work less everything stored and dissipated: the ledger's error",
+    ),
 )
 # In scenes with hooks.
 HOOK_COLUMNS = _columns(
-    {
-        "hook_upper_force_N": "upper hook force",
-        "hook_lower_force_N": "lower hook force",
-        "hook_upper_z_m": "upper hook z",
-    },
-    hook_upper_force_N="force of the smarticles on the upper hook (x, y, z), mean since the sample before",
-    hook_lower_force_N="force of the smarticles on the lower hook (x, y, z), mean since the sample before",
-    hook_upper_z_m="height of the upper hook's centre",
+    hook_upper_force_N=(
+        "upper hook force",
+        "force of the smarticles on the upper hook (x, y, z), mean since the sample before",
+    ),
+    hook_lower_force_N=(
+        "lower hook force",
+        "force of the smarticles on the lower hook (x, y, z), mean since the sample before",
+    ),
+    hook_upper_z_m=("upper hook z", "height of the upper hook's centre"),
 )
 # In scenes that take the container away.
 RELEASE_COLUMNS = _columns(
-    {"outside_count": "outside_count"},
-    outside_count="smarticles whose centre of mass is farther from the axis than the container's radius",
+    outside_count=(
+        "outside_count",
+        "smarticles whose centre of mass is farther from the axis than the container's radius",
+    ),
 )
 # In scenes that strain a chain. Forces are means since the sample before, and NaN while no string is tied.
 STRAIN_COLUMNS = _columns(
-    {
-        "string_fixed_force_N": "fixed string force",
-        "string_pulled_force_N": "pulled string force",
-        "channel_lower_force_N": "lower wall force",
-        "channel_upper_force_N": "upper wall force",
-    },
-    string_fixed_force_N="force of the string that is held on the chain (x, y, z)",
-    string_pulled_force_N="force of the string that is pulled on the chain (x, y, z)",
-    channel_lower_force_N="force of the chain on the wall at lower y (x, y, z); 0 without walls",
-    channel_upper_force_N="force of the chain on the wall at higher y (x, y, z); 0 without walls",
+    string_fixed_force_N=("fixed string force", "force of the string that is held on the chain (x, y, z)"),
+    string_pulled_force_N=("pulled string force", "force of the string that is pulled on the chain (x, y, z)"),
+    channel_lower_force_N=("lower wall force", "force of the chain on the wall at lower y (x, y, z); 0 without walls"),
+    channel_upper_force_N=("upper wall force", "force of the chain on the wall at higher y (x, y, z); 0 without walls"),
     pulled_m="how far the moved end of the string has gone",
     chain_length_m="distance along x of the two points where strings are tied",
     chain_width_m="extent of all links along y, with their thickness",
 )
 EVERY: Columns = {
-    **COLUMNS,
-    **MOTOR_COLUMNS,
-    **ENERGY_COLUMNS,
-    **LEDGER_COLUMNS,
-    **HOOK_COLUMNS,
-    **RELEASE_COLUMNS,
-    **STRAIN_COLUMNS,
+    **{**COLUMNS, **MOTOR_COLUMNS, **ENERGY_COLUMNS, **LEDGER_COLUMNS},
+    **{**HOOK_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS},
 }
 """All that any scene may have."""
 
 # Cell data of the frames: one value per link, in the order barb 1, middle link, barb 2 of each smarticle.
 FIELDS = _columns(
-    {"smarticle_id": "smarticle"},
-    smarticle_id="number of the smarticle, the same in all frames",
+    smarticle_id=("smarticle", "number of the smarticle, the same in all frames"),
     link="0 barb 1, 1 middle link, 2 barb 2",
     velocity_m_per_s="of the link's centre (x, y, z)",
     angular_velocity_rad_per_s="of the link (x, y, z)",
@@ -139,10 +130,9 @@ FIELDS = _columns(
 )
 # Cell data of the files of forces: one value per contact; with `recording.contact_forces`.
 FORCE_FIELDS = _columns(
-    {"first_smarticle": "first", "second_smarticle": "second"},
-    first_smarticle="number of the one that the force acts on",
+    first_smarticle=("first", "number of the one that the force acts on"),
     first_link="0 barb 1, 1 middle link, 2 barb 2",
-    second_smarticle="number of the one that exerts it, the higher one; -1 for a boundary",
+    second_smarticle=("second", "number of the one that exerts it, the higher one; -1 for a boundary"),
     second_link="likewise; -1 for a boundary",
     fixture="-1 none, 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls",
     normal_force_N="sum of those at the points of contact; above 0",
