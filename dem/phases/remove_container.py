@@ -16,7 +16,7 @@ from dem.setting.part import Duration, Part, Speed
 class RemoveContainer(Part, Phase):
     """Take the container's wall away and let the pile rest on its floor, which has no end. Motors hold.
 
-    Smarticles are not held back from then on: how far they go is measured, not refused. A later phase that shakes the
+    Smarticles are not held back from then on: how far they go is measured. A later phase that shakes the
     container shakes the floor, and those that have rolled away with it.
     """
 

@@ -1,4 +1,4 @@
-"""Actuated phases: presets and what they are short for, who moves, where it begins, target angles over time."""
+"""Actuated phases: presets, which smarticles move, where they begin, target angles over time."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
     assert wave().amplitude_deg * ratio == pytest.approx(5 * 0.7)  # times w in radians: the arc
 
 
-# -- who moves, from where, when -----------------------------------------------------------------------------------
+# -- which smarticles move, from where, when -----------------------------------------------------------------------------------
 
 
 def test_inactive_smarticles_keep_their_last_target(active: Active) -> None:

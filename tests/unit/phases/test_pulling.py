@@ -43,7 +43,7 @@ def test_a_hook_that_is_not_held_arrives(limit: float | None) -> None:
     assert "warning" not in pulling.memory
 
 
-def test_a_hook_that_is_held_stops_at_the_first_look_with_a_mean_above_its_limit() -> None:
+def test_a_held_hook_stops_at_the_first_check_with_a_mean_above_its_limit() -> None:
     engine, raised, _ = pull(10.0, force_limit_N=0.02)
     # A look's mean is that of the force half a look before.
     reached = 0.02 / 10.0 / SPEED + CHECK_INTERVAL / 2
@@ -52,7 +52,7 @@ def test_a_hook_that_is_held_stops_at_the_first_look_with_a_mean_above_its_limit
     assert engine.time == pytest.approx(raised / SPEED + HELD_SECONDS, abs=2 * DT)
 
 
-def test_what_a_pull_remembers_is_enough_to_go_on() -> None:
+def test_what_a_pull_remembers_is_enough_to_resume() -> None:
     straight, raised, _ = pull(10.0, force_limit_N=0.02, duration_s=ARRIVAL)
     again, too, _ = pull(10.0, anew=True, force_limit_N=0.02, duration_s=ARRIVAL)
     assert (again.steps, too) == (straight.steps, raised)

@@ -1,4 +1,4 @@
-"""Another run's smarticles taken over: how a scene names them, what is refused, and what the stage tells an engine."""
+"""Another run's smarticles taken over: how a scene names them, what is rejected, and what the stage does to an engine."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def scene_of(run: Path | str, more: dict[str, Any] | None = None, **changes: Any
     return parse_scene(data_of(run, more, **changes), source="bad.yaml")
 
 
-def refused(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> str:
+def rejected(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> str:
     with pytest.raises(InputError) as caught:
         scene_of(run, more, **changes)
     line = str(caught.value)
@@ -165,7 +165,7 @@ def test_a_directory_is_seen_from_the_scene_s_file(pour: Path, tmp_path: Path, m
     )
 
 
-def test_a_run_goes_on_from_its_checkpoint_without_its_source(
+def test_a_run_is_resumed_from_its_checkpoint_without_its_source(
     pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = scene_of(pour)
@@ -186,23 +186,23 @@ def test_a_run_goes_on_from_its_checkpoint_without_its_source(
     assert np.array_equal(*ends)
 
 
-# -- what is refused ---------------------------------------------------------------------------------------------------
+# -- what is rejected ---------------------------------------------------------------------------------------------------
 
 
 def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     frames = read_frames(pour)
-    assert refused(tmp_path / "none").startswith("phases.0.run: cannot read run directory")
+    assert rejected(tmp_path / "none").startswith("phases.0.run: cannot read run directory")
     (tmp_path / "sweep").mkdir()
     (tmp_path / "sweep" / "sweep.json").write_text("{}")
-    assert "it is a sweep; give one of its runs" in refused(tmp_path / "sweep")
-    assert refused(pour, {"frame": 99}) == (
+    assert "it is a sweep; give one of its runs" in rejected(tmp_path / "sweep")
+    assert rejected(pour, {"frame": 99}) == (
         f"phases.0.frame: 99, but the frames of {pour} are 0 … {len(frames) - 1}; use one of them, or last"
     )
     for bad, told in (("first", "'first'"), (-1, "-1"), (1.5, "1.5"), (True, "true"), (None, "null")):
-        assert told in (line := refused(pour, {"frame": bad})), bad
+        assert told in (line := rejected(pour, {"frame": bad})), bad
         assert line.startswith("phases.0")
-    assert refused(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
-    assert refused(pour, {"run": ""}).startswith("phases.0.run: ")
+    assert rejected(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
+    assert rejected(pour, {"run": ""}).startswith("phases.0.run: ")
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     ],
 )
 def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) -> None:
-    told = refused(pour, **changes)
+    told = rejected(pour, **changes)
     assert told.startswith(line)
     assert "; " in told
 

@@ -1,4 +1,4 @@
-"""What a run tells the person and other processes while it goes on."""
+"""Progress of a run, on the terminal and for other processes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def last_line(text: str) -> str:
     return text.rsplit("\r\x1b[K", 1)[-1]
 
 
-def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
+def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 270, show=False)
     bar.begin(index=2, phase="shake", start=3.0, now=3.0, end=8.0)
     wall.now += 5
@@ -47,7 +47,7 @@ def test_file_says_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_checkpoint_is_told_at_once(tmp_path: Path, wall: Wall) -> None:
+def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
     def told() -> tuple[float, float | None]:
         data = json.loads((tmp_path / "progress.json").read_text())
         return data["time_s"], data.get("checkpoint_s")

@@ -112,7 +112,7 @@ def test_a_run_writes_what_every_run_writes(kind: KindDouble, tmp_path: Path, na
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_run_that_is_gone_on_with_gives_the_same_bits(
+def test_a_resumed_run_gives_the_same_bits(
     kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, name: str
 ) -> None:
     scene = scene_of(name)
@@ -138,7 +138,7 @@ def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:
     assert len(kind.built) == 1
 
 
-def test_another_scene_or_another_version_does_not_go_on(
+def test_another_scene_or_another_version_is_not_resumed(
     kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     interrupted(2)
@@ -225,9 +225,7 @@ def test_a_directory_that_holds_something_is_left_as_it_is(
     assert not kind.built
 
 
-def test_a_disk_that_cannot_be_written_is_told_before_anything_runs(
-    kind: KindDouble, mount_disk: Callable[[str], Path]
-) -> None:
+def test_a_read_only_disk_is_rejected_before_anything_runs(kind: KindDouble, mount_disk: Callable[[str], Path]) -> None:
     folder = mount_disk("64m")
     run(scene_of("rested"), folder / "run")
     (folder / "run" / "done.json").unlink()

@@ -207,7 +207,7 @@ CHAINS: Bad = [
 WAY_OUT = re.compile(r"; \S|\bexpected \S|° … ")
 
 
-def refused(good: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
+def rejected(good: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
     with pytest.raises(InputError) as caught:
         parse_scene(changed(good, changes), source="bad.yaml")
     return str(caught.value).removeprefix("bad.yaml: ")
@@ -226,7 +226,7 @@ def test_they_are_good_before_the_change(good: dict[str, Any]) -> None:
 def test_one_line_with_key_value_and_way_out(
     good: dict[str, Any], changes: dict[str, Any], key: str, value: str
 ) -> None:
-    line = refused(good, changes)
+    line = rejected(good, changes)
     assert len(line.splitlines()) == 1
     assert line.startswith(f"{key}: " if key else value)
     told = line.removeprefix(f"{key}: ")
@@ -236,10 +236,10 @@ def test_one_line_with_key_value_and_way_out(
 
 
 def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
-    line = refused(SMALL, {"hooks": {"length_m": 11.7}})
+    line = rejected(SMALL, {"hooks": {"length_m": 11.7}})
     assert line.startswith("hooks.length_m: 11.7 means 11.7 m")
     assert line.count("11.7 means") == 1
     # Told twice where the file says it twice.
-    both = refused(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
+    both = rejected(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
     assert both.count("11.7 means") == 2
     assert "; also hooks.lower_length_m: 11.7 means" in both

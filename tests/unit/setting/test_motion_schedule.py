@@ -189,7 +189,7 @@ def test_from_the_second_time_on_a_sequence_is_periodic(data: dict[str, Any], st
         (sine(duration_s="4"), "duration_s: got the text '4', expected a number; leave out the quotes"),
     ],
 )
-def test_refused(data: dict[str, Any], message: str) -> None:
+def test_rejected(data: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError) as caught:
         ADAPTER.validate_python(data)
     errors = caught.value.errors()
