@@ -76,7 +76,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
     assert wave().amplitude_deg * ratio == pytest.approx(5 * 0.7)  # times w in radians: the arc
 
 
-# -- which smarticles move, from where, when -----------------------------------------------------------------------------------
+# -- which smarticles move, from where, when -------------------------------------------------------------------------
 
 
 def test_inactive_smarticles_keep_their_last_target(active: Active) -> None:

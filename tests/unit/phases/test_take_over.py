@@ -1,4 +1,4 @@
-"""Another run's smarticles taken over: how a scene names them, what is rejected, and what the stage does to an engine."""
+"""Another run's smarticles taken over: how a scene names them, what is rejected, what the stage does to an engine."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def test_a_run_is_resumed_from_its_checkpoint_without_its_source(
     assert np.array_equal(*ends)
 
 
-# -- what is rejected ---------------------------------------------------------------------------------------------------
+# -- what is rejected --------------------------------------------------------------------------------------------------
 
 
 def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
