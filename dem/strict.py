@@ -182,7 +182,7 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
         shown_tag=shown(context.get("tag")),
         unit=f" {unit}" if unit else "",
         in_unit=f" in {unit}" if unit else "",
-        rounded=round(value) if number and math.isfinite(value) else "",
+        rounded=round(value) if isinstance(value, float) and math.isfinite(value) else "",
         length=length,
         items=items,
         least=least,

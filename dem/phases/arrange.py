@@ -58,10 +58,6 @@ class Arrange(Part, Phase):
     def known_duration(self) -> float:
         return 0.0
 
-    @property
-    def progress_duration(self) -> None:
-        return
-
     def proceed(self, stage: Stage, engine: Engine) -> float:
         engine.add(chain_of(stage.scene).poses())
         return 0.0

@@ -110,16 +110,6 @@ class Phase:
         return self.known_duration or 0.0
 
     @property
-    def duration_key(self) -> str:
-        """The key that sets its length, after a dot; empty where no single key does."""
-        return ".duration_s" if "duration_s" in getattr(type(self), "model_fields", {}) else ""
-
-    @property
-    def progress_duration(self) -> float | None:
-        """The time that its progress is measured against [s]; None where that is not time."""
-        return self.known_duration
-
-    @property
     def pushing_speed(self) -> float:
         """Speed at which it moves something through the pile or pulls at it [m/s]."""
         return 0.0

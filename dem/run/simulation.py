@@ -96,13 +96,13 @@ class Simulation:
             self._performed.append({**begun, "wall_s": -self.wall, "cpu_s": -self.cpu})
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
-        duration = phase.progress_duration
+        duration = phase.known_duration
         self.recorder.progress.begin(
             index=self._phase,
             phase=phase.type,
             start=entry["start_s"],
             now=self.engine.time,
-            end=None if duration is None else entry["start_s"] + duration,
+            end=entry["start_s"] + duration if duration else None,
         )
         self._advance()
         while wait := self._stage.proceed(self.engine):

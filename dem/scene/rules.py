@@ -142,10 +142,12 @@ def _of_recording(scene: SceneView) -> Iterator[str]:
         )
     for number, phase in enumerate(scene.phases):
         # The length of a pour is unknown, and laying out a chain takes no time.
-        duration = phase.progress_duration
-        if duration is not None and duration < series:
+        duration = phase.known_duration
+        if duration and duration < series:
+            # Some phases add their length up from several keys.
+            key = ".duration_s" if "duration_s" in getattr(type(phase), "model_fields", {}) else ""
             yield (
-                f"phases.{number}{phase.duration_key}: {duration:g} s is shorter than "
+                f"phases.{number}{key}: {duration:g} s is shorter than "
                 f"recording.series_interval_s = {series:g} s; lengthen the phase or sample more often"
             )
 
