@@ -1,14 +1,12 @@
-"""The bench that all cases are built on: scenes of one smarticle, looks as a run has them, what all engines share.
+"""Scenes of few smarticles, engines as a run builds them, and what all cases share.
 
-What a run never does is done by access (`validation.access`): only they reach behind the engine's interface.
-SI throughout. Velocities belong to the half step before the positions (leapfrog): a body that is to have v at t = 0
-under an acceleration a is pushed to v − a dt/2.
+SI throughout. Only `validation.access` reaches behind the engine's interface.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +26,7 @@ from dem.run.build import build_recorder
 from dem.run.recorder import Recorder
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
-from validation.engines import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
-
-__all__ = ["BALL_MASS", "BALL_RADIUS", "STIFFNESS"]
+from validation.access import BALL_MASS, STIFFNESS, EngineAccess
 
 Array = NDArray[np.float64]
 
@@ -39,30 +35,56 @@ FLAT = Rotation.identity()
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
 
+RELAX = {"type": "relax", "duration_s": 0.05}
+REST = {"type": "relax", "duration_s": 0.3}  # long enough for what was moved just before to stand or fall
+
 Targets = Callable[[float], ArrayLike]
 
 
+# -- scenes ------------------------------------------------------------------------------------------------------------
+
+
 def scene_of(data: Mapping[str, Any]) -> Scene:
-    """A scene from plain data."""
+    """Return a scene from plain data."""
     return parse_scene(data, source="case")
 
 
-def scene(access: EngineAccess, *, fidelity: Any = "draft", phases: Iterable[str] = ("relax",), **parts: Any) -> Scene:
-    """One smarticle; `parts` are those of a scene file, such as `smarticle={"aspect_ratio": 0}`."""
-    listed = [{"type": "deposit"}, *({"type": kind} for kind in phases)]
-    given = {"schema_version": 1, "engine": access.name, "seed": 1, "count": 1}
-    return scene_of({**given, "fidelity": fidelity, "phases": listed, **parts})
+def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
+    """Return plain data of a scene that begins with a pour; by default six smarticles, draft."""
+    given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": "draft"}
+    return {**given, "phases": [{"type": "deposit", "per_layer": per_layer}, *phases], **keys}
+
+
+def scene(access: EngineAccess, *phases: Mapping[str, Any], **keys: Any) -> Scene:
+    """Return a scene of one smarticle, which rests after its pour unless other phases are given."""
+    return scene_of(scene_data(access, *(phases or (RELAX,)), count=1, **keys))
+
+
+def shape_change(seconds: float = 1.5, hold: float = 0.0) -> dict[str, Any]:
+    """Return a phase that straightens within `seconds` [s], stays so, and bends back within as many."""
+    return {"type": "shape-change", "opening_s": seconds, "straight_hold_s": hold, "closing_s": seconds}
+
+
+def turn(degrees: float, seconds: float) -> dict[str, Any]:
+    """Return a phase that turns both barbs to an angle [deg] within a time [s]."""
+    return {"type": "actuate", "barbs": {"type": "ramp", "to_deg": degrees, "duration_s": seconds}}
+
+
+def swing(seconds: float) -> dict[str, Any]:
+    """Return a phase that swings both barbs by 10° to either side of 80°."""
+    barbs = {"type": "triangle", "centre_deg": 80, "amplitude_deg": 10, "speed_rad_per_s": 5}
+    return {"type": "actuate", "barbs": barbs, "duration_s": seconds}
 
 
 def law_of(scene: Scene) -> ContactLaw:
-    """The contact law of a scene, the same on all engines."""
+    """Return the contact law of a scene, which all engines share."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """The contact law that a scene would have, its dashpots sized for the ball's own mass."""
+    """Return the contact law that a scene would have, its dashpots sized for the ball's own mass."""
     critical = 2 * damping_ratio(restitution) * math.sqrt(STIFFNESS * BALL_MASS)
     return ContactLaw(
         normal_stiffness=STIFFNESS,
@@ -75,22 +97,25 @@ def ball_law(
     )
 
 
+# -- engines -----------------------------------------------------------------------------------------------------------
+
+
 def add(engine: Engine, position: ArrayLike, rotation: Rotation = FLAT) -> None:
     """Add a body at rest."""
     engine.add(Poses(np.array([position], dtype=float), (rotation,)))
 
 
 def body_rotations(state: State) -> Array:
-    """(N, 3, 3) body frame to laboratory frame of welded smarticles."""
+    """Return rotations of welded smarticles from body frame to laboratory frame, (N, 3, 3)."""
     rotations: Array = state.link_rotations[:, 1] @ state.boxes.link_rotations[1].T
     return rotations
 
 
-def advance_watched(engine: Engine, steps: int, look: Callable[[], None]) -> None:
-    """Advance, and call `look` after each step."""
+def advance_watched(engine: Engine, steps: int, each: Callable[[], None]) -> None:
+    """Advance, and call `each` after each step."""
     for _ in range(steps):
         engine.advance(1)
-        look()
+        each()
 
 
 def drive(
@@ -102,26 +127,23 @@ def drive(
     each: Callable[[], None] | None = None,
     interval: float | None = None,
 ) -> Iterator[float]:
-    """Let the motors follow `targets(t)` [rad] from now on; gives the time since then after each control period.
+    """Let the motors follow `targets(t)` [rad] from now on; yield the time since then after each control period.
 
     `each` is called after each step.
     """
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
-    for look in range(1, round(duration / interval) + 1):
-        engine.motors.actuate(np.array(targets(look * interval), dtype=float).reshape(1, -1, 2), interval)
+    for update in range(1, round(duration / interval) + 1):
+        engine.motors.actuate(np.array(targets(update * interval), dtype=float).reshape(1, -1, 2), interval)
         if each is None:
             engine.advance(steps)
         else:
             advance_watched(engine, steps, each)
-        yield look * interval
-
-
-# -- as a run has it ---------------------------------------------------------------------------------------------------
+        yield update * interval
 
 
 def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
-    """Engine and recorder, watchdog included, as a run builds them; `dt` [s] by hand is not refused."""
+    """Build engine and recorder, watchdog included, as a run does; `dt` [s] may be above the stable step."""
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = engine_kind(scene.engine).build(scene, time_step(scene) if dt is None else dt)
@@ -129,8 +151,8 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 
-def look(engine: Engine, recorder: Recorder) -> str | None:
-    """What the recorder's next look says, contacts included; None: nothing."""
+def watchdog_error(engine: Engine, recorder: Recorder) -> str | None:
+    """Return the error of the recorder's next check, contacts included; None: it has none."""
     recorder.watch_every = 1
     try:
         recorder.record(engine, 0)
@@ -140,16 +162,16 @@ def look(engine: Engine, recorder: Recorder) -> str | None:
 
 
 def energy(engine: Engine) -> float:
-    """Kinetic, potential, and that of the springs of all contacts [J]."""
+    """Return kinetic and potential energy, and that of the springs of all contacts [J]."""
     state = engine.state()
     return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.ledger.elastic()[0]
 
 
 def fastest(engine: Engine) -> float:
-    """Speed of the fastest link [m/s]."""
+    """Return the speed of the fastest link [m/s]."""
     return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
 
 
 def lying(scene: Scene) -> float:
-    """Height [m] of the centre of mass of a smarticle that lies flat on the floor."""
+    """Return the height of the centre of mass of a smarticle that lies flat on the floor [m]."""
     return float(scene.particle.radius - scene.particle.centres[:, 2].min())

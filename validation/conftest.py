@@ -1,4 +1,4 @@
-"""Fixtures of the suites: engines in processes of their own, and the tables that `--results DIR` asks for."""
+"""Run engines in processes of their own, and write the tables that `--results DIR` asks for."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from dem.errors import RunError
 from dem.record.files import write_text
 from dem.run.run import _git_revision
 
+ON = [pytest.param("yade", marks=pytest.mark.engine), "links"]
 TIMEOUT = 3600  # s of wall time, for machines that are busy with long simulations
 
 os.environ["OMP_NUM_THREADS"] = "1"  # bits depend on the number of threads on YADE
@@ -25,7 +26,7 @@ os.environ["OMP_NUM_THREADS"] = "1"  # bits depend on the number of threads on Y
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add `--results DIR`."""
     parser.addoption(
-        "--results", type=Path, metavar="DIR", help="write the measured tables into DIR/ENGINE, go on with those there"
+        "--results", type=Path, metavar="DIR", help="write the measured tables into DIR/ENGINE, continue those there"
     )
 
 
@@ -35,7 +36,7 @@ def _version(engine: str) -> str:
 
 @pytest.fixture(scope="session")
 def yade() -> Iterator[ProcessPoolExecutor]:
-    """Give one process that has loaded YADE, which cannot share one with Matplotlib."""
+    """Start one process that has loaded YADE, which cannot share one with Matplotlib."""
     pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
     try:
         pool.submit(_version, "yade").result(TIMEOUT)
@@ -48,7 +49,7 @@ def yade() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture
 def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """Call a function where an engine is: YADE in its own process, links in this one."""
+    """Call a function in the process of an engine: YADE has its own, links run in this one."""
 
     def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         if engine == "links":
@@ -70,7 +71,7 @@ def call_alone() -> Callable[..., Any]:
 
 
 class Tables:
-    """The tables of a folder, each rewritten whole after each test; None: nothing is written."""
+    """Tables of a folder, each rewritten as a whole after each test; None: nothing is written."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
@@ -79,7 +80,7 @@ class Tables:
         """Write rows into DIR/ENGINE/NAME.csv and .md, in place of those with the same keys."""
         if self.folder is None or not rows:
             return
-        new, old = pd.DataFrame(rows).assign(commit=_git_revision()), self._read(engine, name)
+        new, old = pd.DataFrame(rows).assign(commit=_git_revision()), self.read(engine, name)
         if old is not None:
             mark = pd.MultiIndex.from_frame(new[list(keys)].astype(str))
             kept = old[~pd.MultiIndex.from_frame(old[list(keys)].astype(str)).isin(mark)]
@@ -93,19 +94,20 @@ class Tables:
 
     def skip_recorded(self, engine: str, name: str, **keys: Any) -> None:
         """Skip the test if its rows are in the table."""
-        table = self._read(engine, name)
+        table = self.read(engine, name)
         if table is not None and all(key in table for key in keys):
             same = pd.concat([table[key].astype(str) == str(value) for key, value in keys.items()], axis=1).all(axis=1)
             bad = "verdict" in table and (table.loc[same, "verdict"] == "BAD").any()
             if same.any() and not bad:
                 pytest.skip("recorded already")
 
-    def _read(self, engine: str, name: str) -> pd.DataFrame | None:
+    def read(self, engine: str, name: str) -> pd.DataFrame | None:
+        """Return a table as it is in the folder; None: there is none."""
         path = None if self.folder is None else self.folder / engine / f"{name}.csv"
         return pd.read_csv(path, keep_default_na=False) if path is not None and path.exists() else None
 
 
 @pytest.fixture(scope="session")
 def tables(request: pytest.FixtureRequest) -> Tables:
-    """Give the tables of `--results DIR`."""
+    """Return the tables of `--results DIR`."""
     return Tables(request.config.getoption("--results"))

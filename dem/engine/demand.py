@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
-from dem.physics.motor import MotorLaw
 from dem.setting.contact import Contact
 from dem.setting.container import Cylinder
 from dem.setting.fidelity import Fidelity
@@ -92,15 +91,3 @@ class Demand(Protocol):
 def contact_law_of(scene: Demand) -> ContactLaw:
     """Return the contact law of a scene, the same on all engines."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
-
-
-def motor_law_of(scene: Demand) -> MotorLaw:
-    """Return the law of a scene's motors, the same on all engines."""
-    motor = scene.motor
-    return MotorLaw(
-        torque_limit=scene.torque_limit,
-        speed_limit=motor.speed_limit_rad_per_s,
-        stiffness=motor.stiffness_N_m_per_rad,
-        law=motor.law,
-        damping=motor.damping_N_m_s_per_rad,
-    )

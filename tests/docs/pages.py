@@ -1,8 +1,8 @@
-"""The pages that a reader follows, and what they tell to type.
+"""Read the blocks of code of README and the documentation.
 
-Every block of a page has a language. `bash` is run as it stands; `python` is run as a script; `yaml`, `toml` and
-`jinja` begin with a comment that names a file, and are written to it; `text` is what a program says. A block that a
-test cannot run says why in the line above it: `<!-- not run: REASON -->`.
+Every block has a language. `bash` is run as it stands, `python` as a script. `yaml`, `toml` and `jinja` begin with a
+comment that names a file, and are written to it; `text` is output of a program. A block that a test cannot run has its
+reason in the line above it: `<!-- not run: REASON -->`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Block:
     Args:
         line: where it begins.
         language: after its fence; empty for a block that is only indented.
-        text: what it holds.
-        reason: why it is not run; None: it is.
+        text: its content.
+        reason: why it is not run; None: it is run.
     """
 
     line: int
@@ -43,7 +43,7 @@ class Block:
 
     @property
     def file(self) -> str | None:
-        """The name that its first line gives to a file."""
+        """File name in the first line; None: there is none."""
         named = _FILE.match(self.text)
         return named[1] if named else None
 
@@ -56,17 +56,17 @@ class Page:
 
     @property
     def name(self) -> str:
-        """For tests: where it is, seen from the repository."""
+        """Path relative to the repository."""
         return self.path.relative_to(REPOSITORY).as_posix()
 
     @cached_property
     def text(self) -> str:
-        """All of it."""
+        """Content of the file."""
         return self.path.read_text(encoding="utf-8")
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """Its blocks of code, in order; directives of Sphinx are none."""
+        """Blocks of code in order, without directives of Sphinx."""
         found, reason = [], None
         for token in MarkdownIt().parse(self.text):
             if token.type == "html_block":
@@ -81,10 +81,10 @@ class Page:
 
     @cached_property
     def made(self) -> tuple[Path, ...]:
-        """Committed pictures that its commands make, `docs/pictures/PAGE/NAME.png`."""
+        """Committed pictures that the commands of the page make, `docs/pictures/PAGE/NAME.png`."""
         return tuple(sorted((DOCS / "pictures" / self.path.stem).glob("*.png")))
 
 
 def pages() -> tuple[Page, ...]:
-    """README, and all pages of the documentation."""
+    """Return README and all pages of the documentation."""
     return tuple(Page(path) for path in (REPOSITORY / "README.md", *sorted(DOCS.rglob("*.md"))))

@@ -1,4 +1,4 @@
-"""What README, tutorial, how-tos and gallery tell to type works: all of it is run, page by page, in an empty folder.
+"""Run the commands of README, tutorial, how-tos and gallery, page by page, in an empty folder.
 
 RENEW_PICTURES=1 pytest tests/docs/test_commands_run.py      takes the pictures that the pages' commands made
 """
@@ -22,12 +22,12 @@ from smarticles.main import build_parser
 PAGES = {page.name: page for page in pages()}
 FOLLOWED = [name for name, page in PAGES.items() if any(block.language in RUN for block in page.blocks)]
 COLOURS = 128
-"""Of a committed picture: half as large as with all of them, and nobody sees it."""
+"""Colours of a committed picture: it is half as large as with all of them, and looks alike."""
 
 
 @pytest.fixture(scope="module")
 def words(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """An environment in which `smarticles` and `python` are those of this checkout."""
+    """Return an environment in which `smarticles` and `python` are those of this checkout."""
     folder = tmp_path_factory.mktemp("bin")
     for name, module in (("smarticles", "-m smarticles"), ("python", "")):
         script = folder / name
@@ -53,7 +53,7 @@ def _do(page: Page, block: Block, folder: Path, words: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize("name", FOLLOWED)
-def test_what_a_page_tells_to_type_works(name: str, tmp_path: Path, words: dict[str, str]) -> None:
+def test_commands_of_a_page_run(name: str, tmp_path: Path, words: dict[str, str]) -> None:
     page = PAGES[name]
     for block in page.blocks:
         if block.reason is None and block.language not in SHOWN:
@@ -63,7 +63,7 @@ def test_what_a_page_tells_to_type_works(name: str, tmp_path: Path, words: dict[
 
 
 def _compare(picture: Path, made: Path) -> None:
-    """A committed picture is the one that the commands make, up to what another processor makes of a pile."""
+    """Compare a committed picture with the one that the commands made; piles differ between processors."""
     with Image.open(made) as image:
         new = image.convert("RGB")
     if os.environ.get("RENEW_PICTURES"):
@@ -74,22 +74,21 @@ def _compare(picture: Path, made: Path) -> None:
     assert committed.size == new.size, picture
     (old, old_place), (now, now_place) = (_drawn(image) for image in (committed, new))
     assert now > 0.01, f"{made}: nothing on it"
-    # A pile that was shaken is another one on another processor, from the first contact on that rounds otherwise; how
-    # much of the picture it takes, and where, is not: a blank sheet, another view or another scene differ by more.
+    # A shaken pile differs between processors, from the first contact that rounds otherwise. Its share of the picture
+    # and its place do not: a blank sheet, another view or another scene differ by more.
     assert now == pytest.approx(old, rel=0.35), f"{picture}: not what the commands make"
     assert now_place == pytest.approx(old_place, abs=0.12), f"{picture}: not where the commands draw it"
 
 
 def _drawn(image: Image.Image) -> tuple[float, NDArray[np.float64]]:
-    """Share of a picture that is drawn on, and the middle of that as shares of width and height."""
+    """Return the share of a picture that is drawn on, and its middle as shares of width and height."""
     coarse = np.asarray(image.resize((64, 64), Image.Resampling.BOX), dtype=np.float64)
     paper = np.median(np.concatenate([coarse[0], coarse[-1], coarse[:, 0], coarse[:, -1]]), axis=0)
     drawn = np.abs(coarse - paper).max(axis=2) > 12
     return float(drawn.mean()), np.argwhere(drawn).mean(axis=0)[::-1] / 64 if drawn.any() else np.full(2, np.nan)
 
 
-def test_every_block_is_run_or_says_why_not() -> None:
-    """Nothing slips by: an unknown language, a block without one, a file without a name."""
+def test_every_block_is_run_or_has_its_reason() -> None:
     left = []
     for page in PAGES.values():
         for block in page.blocks:
@@ -98,7 +97,7 @@ def test_every_block_is_run_or_says_why_not() -> None:
             if block.reason is None:
                 assert block.language not in WRITTEN or block.file, f"{where}: begin with '# NAME.{block.language}'"
             else:
-                assert block.language not in SHOWN, f"{where}: is not run anyway"
+                assert block.language not in SHOWN, f"{where}: is never run, so that it needs no reason"
                 left.append(f"{where}: {block.reason}")
     print("\n".join(["not run:", *left]))  # what `pytest -rP` lists
     assert len(left) < 0.3 * sum(len(page.blocks) for page in PAGES.values()), "too much is left out"

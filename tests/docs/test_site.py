@@ -1,4 +1,4 @@
-"""The documentation builds without a warning, and a built page asks nothing of a network."""
+"""The documentation builds without a warning, and its pages need no network."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RESULTS = REPOSITORY / "results"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The built pages."""
+    """Build the pages."""
     folder = tmp_path_factory.mktemp("site")
     words = [sys.executable, "-m", "sphinx", "-E", "-W", "--keep-going", "-q", "-b", "html", str(DOCS), str(folder)]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, env={**os.environ})
@@ -35,7 +35,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class _Loaded(HTMLParser):
-    """What a browser fetches by itself to show a page."""
+    """Addresses that a browser loads by itself to show a page."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ def _pages(site: Path) -> dict[str, _Loaded]:
     return found
 
 
-def test_pages_load_only_what_lies_beside_them(site: Path) -> None:
+def test_pages_load_only_local_files(site: Path) -> None:
     pages = _pages(site)
     assert len(pages) > 20
     for name, page in pages.items():
@@ -82,8 +82,7 @@ def test_equations_are_mathml(site: Path) -> None:
     assert "MathJax" not in text
 
 
-def test_the_reference_has_all_that_the_code_has(site: Path) -> None:
-    """Names of keys, datasets, fields, columns and options, as the code knows them."""
+def test_reference_has_all_keys_datasets_fields_columns_and_commands(site: Path) -> None:
     pages = {name: " ".join("".join(page.text).split()) for name, page in _pages(site).items()}
     schema = json_schema()
     keys = {key for part in (schema, *schema["$defs"].values()) for key in part["properties"]}
@@ -99,7 +98,7 @@ def test_the_reference_has_all_that_the_code_has(site: Path) -> None:
     assert "[m/s²]" not in pages["reference/scene.html"]  # units have a column of their own
 
 
-def test_every_folder_of_results_is_told_in_one_line(site: Path) -> None:
+def test_every_folder_of_results_is_listed_with_its_finding(site: Path) -> None:
     text = "".join(_pages(site)["results.html"].text)
     folders = [folder.name for folder in RESULTS.iterdir() if folder.is_dir()]
     assert len(folders) > 10
@@ -110,7 +109,7 @@ def test_every_folder_of_results_is_told_in_one_line(site: Path) -> None:
         )
 
 
-def test_frames_have_the_fields_that_are_told() -> None:
+def test_frames_have_the_documented_fields() -> None:
     one = np.zeros((1, 4, 3))
     links = np.zeros((1, 3, 3))
     count = np.zeros(1, dtype=np.int64)
@@ -120,7 +119,7 @@ def test_frames_have_the_fields_that_are_told() -> None:
     assert all(f'"{name}":' in source for name in MOTOR_FIELDS)
 
 
-def test_the_search_index_is_there(site: Path) -> None:
+def test_search_index_is_there(site: Path) -> None:
     text = (site / "searchindex.js").read_text(encoding="utf-8")
     index = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
     assert len(index["docnames"]) > 20

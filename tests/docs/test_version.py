@@ -35,14 +35,14 @@ def test_one_version_everywhere() -> None:
     assert said.split() == ["smarticles", version]
 
 
-def test_the_day_of_the_release_is_told_once() -> None:
+def test_day_of_the_release_is_the_same_everywhere() -> None:
     changes = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
     day = re.search(r"^## \d+\.\d+\.\d+ \((.+)\)$", changes, re.MULTILINE)
     assert day is not None, "the newest section of CHANGELOG.md: '## VERSION (YYYY-MM-DD)'"
     assert day[1] == _citation()["date-released"] == datetime.date.fromisoformat(day[1]).isoformat()
 
 
-def test_the_citation_has_what_its_format_asks_for() -> None:
+def test_citation_follows_its_format() -> None:
     """Citation File Format 1.2.0: required keys, an entity as author, an SPDX licence."""
     citation = _citation()
     assert citation["cff-version"] == "1.2.0"

@@ -15,19 +15,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
-from dem.engine.demand import motor_law_of
 from dem.engine.yade.engine import YadeEngine
-from dem.engine.yade.kind import hinge_law
+from dem.engine.yade.kind import hinge_law, motor_law
 from dem.scene.scene import Scene
+from validation.access import bodies_of as bodies
 from validation.bench import drive
-from validation.yade_access import bodies_of as bodies
 
 TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 
 
 def build(scene: Scene, *, dt: float | None = None, radius: float = 0.5, **instead: Any) -> YadeEngine:
     """An engine for smarticles that are articulated."""
-    hinges = (hinge_law(scene), motor_law_of(scene))
+    hinges = (hinge_law(scene), motor_law(scene))
     return cases.build(scene, dt=dt, radius=radius, facets=16, hinges=hinges, **instead)
 
 

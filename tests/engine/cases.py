@@ -24,8 +24,8 @@ from dem.run.run import run_scene
 from dem.run.sampler import Sampler
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
+from validation.access import YadeAccess
 from validation.bench import add, advance_watched, body_rotations, scene_of
-from validation.yade_access import YadeAccess
 
 
 def build(

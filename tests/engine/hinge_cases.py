@@ -20,8 +20,8 @@ from articulated_cases import (
 from dem.engine.demand import contact_law_of
 from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.stable_step import hinged_stable_time_step
+from validation.access import bodies_of as bodies
 from validation.bench import Targets, drive
-from validation.yade_access import bodies_of as bodies
 
 
 def gait(

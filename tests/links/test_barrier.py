@@ -13,7 +13,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
-from dem.engine.links.contact.barrier import FINEST, LAST, LINEAR, Step, resolve, stretch, ticks_for
+from dem.engine.links.contact import barrier
+from dem.engine.links.contact.barrier import FINEST, LAST, LINEAR, Step
 from dem.engine.links.stepping import MOST
 from dem.errors import RunError
 from dem.record.series import read_series
@@ -21,7 +22,9 @@ from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
 
 ROOM = 1e-3
-_stretch = stretch.py_func  # type: ignore[attr-defined]
+resolve, stretch, ticks_for = (
+    builds.callable_from_python(part) for part in (barrier.resolve, barrier.stretch, barrier.ticks_for)
+)
 
 
 def thin(width: float = 0.5e-3) -> Particle:
@@ -35,12 +38,12 @@ def thin(width: float = 0.5e-3) -> Particle:
 
 def test_ordinary_contacts_are_linear_to_the_bit() -> None:
     for depth in (0.0, 1e-6, 0.1 * ROOM, LINEAR * ROOM):
-        assert _stretch(depth, ROOM) == (depth, 1.0, 1.0)
+        assert stretch(depth, ROOM) == (depth, 1.0, 1.0)
 
 
 def test_it_has_two_continuous_derivatives_and_grows_without_bound() -> None:
     depths = np.linspace(0.2, LINEAR + 0.97 * LAST * (1 - LINEAR), 4001) * ROOM
-    u, slope, hardening = np.array([_stretch(depth, ROOM) for depth in depths]).T
+    u, slope, hardening = np.array([stretch(depth, ROOM) for depth in depths]).T
     step = depths[1] - depths[0]
     np.testing.assert_allclose(np.gradient(u, step)[1:-1], slope[1:-1], rtol=1e-3)
     curvature = np.gradient(slope, step)
@@ -48,15 +51,15 @@ def test_it_has_two_continuous_derivatives_and_grows_without_bound() -> None:
     assert abs(np.diff(curvature[depths < 0.3 * ROOM])).max() < 0.01 / ROOM  # no jump where it begins
     assert (np.diff(slope) >= 0).all()
     last = LINEAR + LAST * (1 - LINEAR)
-    assert _stretch(last * ROOM, ROOM)[0] > 15 * ROOM
-    assert _stretch(1.5 * ROOM, ROOM)[0] > _stretch(last * ROOM, ROOM)[0]
+    assert stretch(last * ROOM, ROOM)[0] > 15 * ROOM
+    assert stretch(1.5 * ROOM, ROOM)[0] > stretch(last * ROOM, ROOM)[0]
 
 
 def test_sub_steps_begin_at_multiples_of_their_length_and_fill_the_step() -> None:
     needs = itertools.cycle([3.0, 1.0, 900.0, 1.2, 5e4, 1.0])
     tick = count = 0
     while tick < FINEST:
-        ticks = ticks_for.py_func(next(needs), tick)  # type: ignore[attr-defined]
+        ticks = ticks_for(next(needs), tick)
         assert tick % ticks == 0
         tick, count = tick + ticks, count + 1
     assert tick == FINEST
@@ -67,9 +70,9 @@ def test_contacts_ask_for_sub_steps_only_beyond_the_linear_range() -> None:
     need = np.ones(1)
     step = Step(1e-4, 1e-4, need)
     for depth, closing in ((0.1 * ROOM, 0.5), (0.24 * ROOM, -3.0)):
-        resolve.py_func(step, depth, ROOM, closing)  # type: ignore[attr-defined]
+        resolve(step, depth, ROOM, closing)
         assert need[0] == 1.0
-    resolve.py_func(step, 0.6 * ROOM, ROOM, 0.0)  # type: ignore[attr-defined]
+    resolve(step, 0.6 * ROOM, ROOM, 0.0)
     assert 2.0 < need[0] < FINEST
 
 

@@ -45,12 +45,13 @@ def test_a_scene_compiles_what_it_calls_for_only() -> None:
     made.add(builds.at([0, 0, 1.0]))
     made.advance(1)
     welded = [s for s in advance.signatures if s not in before] or list(before)
-    names = advance.py_func.__code__.co_varnames[: advance.py_func.__code__.co_argcount]
-    plain = [
-        s
-        for s in welded
-        if all(s[names.index(n)] is types.none for n in ("motors", "hooks", "rims", "channel", "cords", "ledger"))
-    ]
+    plain = []
+    for signature in welded:
+        system = dict(zip(signature[2].fields, signature[2].types, strict=True))
+        boundaries = dict(zip(system["boundaries"].fields, system["boundaries"].types, strict=True))
+        lacking = [system[name] for name in ("motors", "cords", "ledger")]
+        lacking += [boundaries[name] for name in ("channel", "hooks", "rims")]
+        plain += [signature] if all(one is types.none for one in lacking) else []
     assert plain
     # Nothing of a hook, a rim, a string or the ledger is in its code. Compiled anew: cached code cannot be looked at.
     fresh = numba.njit(**OPTIONS)(advance.py_func)

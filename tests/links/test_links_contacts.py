@@ -302,6 +302,29 @@ def test_what_contacts_remember_survives_a_new_list() -> None:
 
     before = memory()
     assert len(before) > 10
-    skins = world.skins
-    build(world.shape, world.bodies, world.pairs, world.cells, skins[1], skins[3], skins[4], skins[5], skins[6])
+    builds.callable_from_python(build)(world.shape, world.bodies, world.pairs, world.cells, world.skins)
     assert memory() == before
+
+
+def test_a_contact_that_begins_and_ends_within_steps_keeps_its_energy() -> None:
+    """Bars that bounce off the floor, their heights a share of a step's way apart.
+
+    With the whole spring's force in the first and last step, 1.3 % of what is dissipated is missing at this time step.
+    """
+    bar, count = builds.particle(aspect=0.0), 40
+    zeta, mass = damping_ratio(0.6), bar.boxes.mass
+    law = replace(builds.LAW, wall_damping=2 * zeta * math.sqrt(2 * 500.0 * mass) / 2, friction=0.0, wall_friction=0.0)
+    dt = 0.4 * math.sqrt(mass / (2 * 500.0))
+    speed = 0.5
+    made = builds.engine(law=law, dt=dt, made_of=bar, keep_ledger=True)
+    heights = RADIUS + 5 * speed * dt + np.linspace(0, 1, count, endpoint=False) * speed * dt
+    places = np.stack([np.linspace(-0.8, 0.8, count), np.zeros(count), heights], axis=1)
+    made.add(builds.at(places, [Rotation.from_euler("z", 90, degrees=True)] * count), speed=speed)
+    before = made.state().kinetic_energy
+    made.advance(60)
+    after = made.state()
+    assert (after.velocities[:, 2] > 0).all()
+    assert made.ledger.elastic()[0] == 0.0
+    lost = before - after.kinetic_energy
+    assert lost > 0.5 * before
+    assert made.ledger.dissipated == pytest.approx(lost, rel=6e-3)

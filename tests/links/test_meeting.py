@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 
+import builds
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine.links.contact.boundaries import nearest_to_circle
-from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS, meet, meets_elsewhere
-from dem.engine.links.contact.nearest import nearest_on_segments
+from dem.engine.links import vectors
+from dem.engine.links.contact import boundaries, meeting
+from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS
 
 D, KN = 1.127e-3, 500.0
+between, lines, nearest, nearest_to_circle, meet, meets_elsewhere = (
+    builds.callable_from_python(part)
+    for part in (
+        vectors.between, vectors.lines, vectors.nearest, boundaries.nearest_to_circle, meeting.meet,
+        meeting.meets_elsewhere,
+    )
+)  # fmt: skip
 
 
 def segment(rng: np.random.Generator, scale: float = 1e-2) -> np.ndarray:
@@ -20,9 +28,8 @@ def segment(rng: np.random.Generator, scale: float = 1e-2) -> np.ndarray:
 
 
 def distance(p: np.ndarray, q: np.ndarray) -> float:
-    w = p[:3] - q[:3]
-    s, t = nearest_on_segments(p[3:] @ p[3:], p[3:] @ q[3:], q[3:] @ q[3:], p[3:] @ w, q[3:] @ w)
-    return float(np.linalg.norm(w + s * p[3:] - t * q[3:]))
+    both = lines(p, q, 1 / (p[3:] @ p[3:]), 1 / (q[3:] @ q[3:]))
+    return float(np.linalg.norm(between(both, *nearest(both))))
 
 
 def test_nearest_points_against_brute_force() -> None:
@@ -55,7 +62,7 @@ def test_nearest_point_to_a_circle_against_brute_force() -> None:
 def look(p: np.ndarray, q: np.ndarray, bend: tuple[bool, bool]) -> tuple[float, np.ndarray, np.ndarray, int]:
     """Energy, force on the first, torque on the first about the origin, and the number of contacts."""
     out = np.zeros((ROWS, COLUMNS))
-    found = meet.py_func(p, q, D, KN, *bend, out)
+    found = meet(p, q, D, KN, *bend, out)
     if not found:
         return 0.0, np.zeros(3), np.zeros(3), 0
     force, torque, points = np.zeros(3), np.zeros(3), 0
@@ -173,10 +180,8 @@ def test_what_is_left_out_of_a_lone_contact_is_nothing() -> None:
         rows = meet(p, q, D, KN, *bends, out)
         if not rows:
             continue
-        u, v, w = p[3:], q[3:], p[:3] - q[:3]
-        # Sums in the order in which kernels add them up.
-        (a, b, c), (d, e) = (sum(x * y) for x, y in ((u, u), (u, v), (v, v))), (sum(u * w), sum(v * w))
-        alone = meets_elsewhere(p, q, D * D, *bends, a, b, c, d, e, 1 / a, 1 / c) == 0
+        both = lines(p, q, 1 / sum(p[3:] ** 2), 1 / sum(q[3:] ** 2))  # added up in the order of kernels
+        alone = meets_elsewhere(both, D * D, *bends) == 0
         assert alone == (rows == 1 and not out[1:POINTS, 8].any()), (k, bends)
         kinds[alone] += 1
     assert min(kinds.values()) > 500

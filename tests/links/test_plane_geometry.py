@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from dem.engine.links.arrays import PLANE
-from dem.engine.links.motion.planar import lagrange_force, lay_out, momenta, rates, spin_of
+from dem.engine.links.motion import planar
+from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shape import shape_of
 
 ANGLES = [(math.pi / 2, math.pi / 2), (0.3, 1.2), (-0.2, 0.1), (1.7, 0.0)]
+lagrange_force, momenta, rates, spin_of = (
+    builds.callable_from_python(part) for part in (planar.lagrange_force, planar.momenta, planar.rates, planar.spin_of)
+)
 SHAPE = shape_of(builds.particle())
 
 
 def row_of(alpha1: float, alpha2: float) -> np.ndarray:
     row = np.zeros(PLANE)
-    lay_out.py_func(SHAPE, alpha1, alpha2, row)
+    lay_out(SHAPE, alpha1, alpha2, row)
     return row
 
 
@@ -54,7 +58,7 @@ def test_momentum_is_that_of_the_links(angles: tuple[float, float]) -> None:
     for _ in range(5):
         spin, rate = rng.normal(size=3) * 20, rng.normal(size=2) * 6
         _, momentum = kinetic(np.array(angles), rate, spin)
-        found = spin_of.py_func(row, *momentum, row[18] * rate[0] + row[19] * rate[1])
+        found = spin_of(row, *momentum, row[18] * rate[0] + row[19] * rate[1])
         assert np.allclose(found, spin, rtol=1e-7)
 
 
@@ -64,12 +68,12 @@ def test_momenta_of_the_angles_are_derivatives_of_the_energy(angles: tuple[float
     alpha, row = np.array(angles), row_of(*angles)
     spin, rate, step = rng.normal(size=3) * 20, rng.normal(size=2) * 6, 1e-3
     normal = row[16] * spin[2] + row[18] * rate[0] + row[19] * rate[1]
-    p = momenta.py_func(row, normal, *rate)
+    p = momenta(row, normal, *rate)
     for k in range(2):
         shift = step * np.eye(2)[k]
         slope = (kinetic(alpha, rate + shift, spin)[0] - kinetic(alpha, rate - shift, spin)[0]) / (2 * step)
         assert p[k] == pytest.approx(slope, rel=1e-6)
         shift = 1e-5 * np.eye(2)[k]
         slope = (kinetic(alpha + shift, rate, spin)[0] - kinetic(alpha - shift, rate, spin)[0]) / 2e-5
-        assert lagrange_force.py_func(SHAPE, row, k, *spin, *rate) == pytest.approx(slope, rel=1e-5)
-    assert np.allclose(rates.py_func(row, normal, *p), rate, rtol=1e-12)
+        assert lagrange_force(SHAPE, row, k, *spin, *rate) == pytest.approx(slope, rel=1e-5)
+    assert np.allclose(rates(row, normal, *p), rate, rtol=1e-12)

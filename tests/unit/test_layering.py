@@ -1,4 +1,4 @@
-"""The walls between packages and modules: the contracts of `.importlinter`, and what those cannot say."""
+"""Imports between packages: the contracts of `.importlinter`, and what those cannot express."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_contract(contract: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
 
 
-def test_what_is_looked_at_is_what_is_here() -> None:
+def test_packages_are_those_of_this_checkout() -> None:
     assert {Path(sys.modules[name].__path__[0]) for name in PACKAGES if name in sys.modules} <= {
         ROOT / name for name in PACKAGES
     }

@@ -1,4 +1,4 @@
-"""The pinned packages are those that the project asks for; `make lock` writes them."""
+"""The pinned packages are those that the project needs; `make lock` writes them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def canonical(name: str) -> str:
 
 
 def asked_for(name: str) -> set[str]:
-    """Names in a file of what is wanted."""
+    """Return the names in a file of wanted packages."""
     lines = (REPOSITORY / f"{name}.in").read_text(encoding="utf-8").splitlines()
     return {canonical(re.split(r"[<>=!~ \[;]", line)[0]) for line in lines if line and not line.startswith("#")}
 
 
 def pinned(name: str) -> list[str]:
-    """Names in a file of pins, in its order."""
+    """Return the names in a file of pins, in its order."""
     head, *lines = (REPOSITORY / f"{name}.txt").read_text(encoding="utf-8").splitlines()
     assert head.startswith(f"# Made by 'make lock' from {name}.in;")
     for line in lines:
@@ -32,7 +32,7 @@ def pinned(name: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_all_that_is_wanted_is_pinned_once(name: str) -> None:
+def test_wanted_packages_are_pinned_once(name: str) -> None:
     found = pinned(name)
     assert len(found) > 5
     assert asked_for(name) <= set(found)

@@ -1,4 +1,4 @@
-"""How deep smarticles are in each other, against answers that are known."""
+"""Overlaps of smarticles against known answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A wheel of what is here, installed far away: five packages with all their data, and commands that work from it."""
+"""A wheel of this checkout, installed elsewhere: five packages with their data, and commands that work from it."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ def call(*command: str | Path, cwd: Path, **variables: str) -> str:
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """Files of the repository, changed ones included, ignored ones not."""
+    """List the files of the repository, changed ones included, ignored ones not."""
     listed = call("git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", cwd=ROOT).split("\0")
     return sorted(name for name in listed if name and (ROOT / name).exists())
 
 
 @pytest.fixture(scope="module")
 def wheel(sources: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built from a copy in which nothing was ever built."""
+    """Build the wheel from a fresh copy."""
     clone, out = tmp_path_factory.mktemp("clone"), tmp_path_factory.mktemp("wheel")
     for name in sources:
         (clone / name).parent.mkdir(parents=True, exist_ok=True)
@@ -59,7 +59,7 @@ def wheel(sources: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def smarticles(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
-    """The command of an environment with the wheel, and the libraries of this one; the repository is not in it."""
+    """Return the command of an environment with the wheel and the libraries of this one, without the repository."""
     place = tmp_path_factory.mktemp("far") / "environment"
     call(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", place, cwd=place.parent)
     python = place / "bin" / "python"

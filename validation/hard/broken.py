@@ -1,4 +1,4 @@
-"""Simulations broken on purpose: the watchdog says so, and which smarticles are concerned."""
+"""Simulations broken on purpose: the watchdog reports it, and which smarticles are concerned."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from dem.plan.steps import stable_step
 from dem.record.names import FAILED
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
-from validation.bench import add, fastest, look, lying, watched
-from validation.check import Check, below, says
-from validation.engines import EngineAccess
+from validation.access import EngineAccess
+from validation.bench import RELAX, add, fastest, lying, scene_data, shape_change, swing, watchdog_error, watched
+from validation.cases import Check, below, hard, nothing, says
 from validation.hard.runs import whole
-from validation.hard.scenes import RELAX, scene, shape_change, swing
 
 NO_NUMBER = "1 smarticle(s) (1): positions or velocities are no numbers, the simulation has blown up; lower fidelity"
 LEFT = "1 smarticle(s) (1): left through the wall or the floor; raise fidelity.stiffness_N_per_m"
@@ -37,45 +36,60 @@ PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Three smarticles at rest on the floor; then the second one is spoilt, and the next look says so."""
-    described, engine, recorder = watched(scene(access, shape_change(1.5), count=3), out)
+    """Lay three smarticles on the floor; then spoil the second one, which the next check must report."""
+    described, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that none falls on another.
     for k in range(3):
         add(engine, (0, 0, lying(described) + 1e-5 + 3 * k * described.particle.radius))
     engine.advance(10)
     if articulated:
         engine.motors.articulate()
-    before = look(engine, recorder)
+    before = watchdog_error(engine, recorder)
     access.spoil(engine, what)
-    unhinged = articulated and access.pin_stiffness(described) == math.inf
+    rigid = access.pin_stiffness(described) == math.inf
     try:
-        # Nothing of it has to come along with the next steps where there are no hinges.
-        engine.advance(0 if unhinged and what in PLACES else steps)
-        said = look(engine, recorder)
+        # Nothing of it has to come along with the next steps where hinges cannot part.
+        engine.advance(0 if articulated and rigid and what in PLACES else steps)
+        said = watchdog_error(engine, recorder)
     except RunError as error:
         said = str(error)
     # One link that is put out of the container tears its hinge first.
-    torn = articulated and not unhinged and what in PLACES
+    torn = articulated and not rigid and what in PLACES
     expected = "1 smarticle(s) (1): " if torn else SPOILT[what]
-    if what == "overlap" and access.pin_stiffness(described) == math.inf:
-        # On links they have pushed each other apart by the next check; then their energy tells of it.
+    if what == "overlap" and rigid:
+        # On links they have pushed each other apart by the next check; then their energy shows it.
         expected = " smarticle(s) (0, 1"
-    return [Check("the look before says", before or "nothing", "nothing", before is None), says(said, expected)]
+    return [nothing("the check before reports", before), says(said, expected)]
+
+
+for _what in SPOILT:
+    for _hinged in (False, True):
+        if (_what, _hinged) in {("hinge", False), ("overlap", True)}:
+            continue  # a weld has no hinge to tear; one link put elsewhere tears its hinge first
+        # A hinge's nodes come along with the next step, and its bond is checked in the one after.
+        _steps = 3 if _what == "overlap" else 2 if _hinged and _what in (*PLACES, "hinge") else 0
+        _size = {"what": _what, "articulated": _hinged, "steps": _steps}
+        _absent = {"links": "hinges cannot part, there is none to tear"} if _what == "hinge" else {}
+        _name = f"spoilt: {_what}, {'articulated' if _hinged else 'welded'}"
+        hard(_name, _size, absent=_absent)(spoil)
+        if _what in ("velocity", "spin"):
+            hard(f"{_name}, some steps before", {**_size, "steps": 5})(spoil)
 
 
 def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recorder]:
-    """Smarticles in a low stack that has come to rest, and a recorder that has seen it."""
-    described, engine, recorder = watched(scene(access, count=count), out)
+    """Return smarticles in a low stack that has come to rest, and a recorder that has checked it."""
+    described, engine, recorder = watched(scene_data(access, count=count), out)
     for k in range(count):
         add(engine, (0, 0, lying(described) * (2 * k + 1) + 1e-5))
     for _ in range(10):
         engine.advance(round(0.02 / engine.time_step))
-        assert look(engine, recorder) is None
+        assert watchdog_error(engine, recorder) is None
     return engine, recorder
 
 
+@hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """A pile at rest, in which the dashpots of all contacts are made to drive instead: energy grows out of nothing."""
+    """Make the dashpots of all contacts of a pile at rest drive instead: energy grows out of nothing."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))
@@ -83,45 +97,30 @@ def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list
     while not said and engine.time < begun + 5.0:
         engine.advance(round(recorder.interval / engine.time_step))
         fast = fastest(engine)
-        said = look(engine, recorder)
+        said = watchdog_error(engine, recorder)
     return [
         says(said, "an energy that has risen by", "more than gravity, motors and springs explain", "lower fidelity"),
         below("greatest speed then, over the limit of speed [1]", fast / recorder.watchdog.speed, 0.5),
     ]
 
 
+@hard("spoilt: pile that is kicked", {"count": 4, "speed": 0.3})
 def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list[Check]:
-    """A pile at rest, all of it suddenly moving upwards, far below the limit of speed."""
+    """Make a whole pile at rest suddenly move upwards, far below the limit of speed."""
     engine, recorder = _resting(access, out, count)
     for k in range(count):
         access.push(engine, k, velocity=(0, 0, speed))
     return [
-        says(look(engine, recorder), f"{count} smarticle(s) (0, 1", "an energy that has risen by"),
+        says(watchdog_error(engine, recorder), f"{count} smarticle(s) (0, 1", "an energy that has risen by"),
         below("speed over the limit of speed [1]", speed / recorder.watchdog.speed, 0.2),
     ]
 
 
+@hard("spoilt: contacts too soft", {"stiffness": 0.5})
 def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
-    """Contacts so soft that the floor does not hold what falls on it: a scene may ask for it."""
-    data = scene(access, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
-    run = whole(data, out)
+    """Ask for contacts so soft that the floor does not hold what falls on it: a scene may."""
+    run = whole(scene_data(access, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness}), out)
     return [says(run.text, "at t = ", "raise fidelity.stiffness_N_per_m")]
-
-
-def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
-    """A time step above the stable one, slipped past the check: the run fails, and names its last checkpoint."""
-    fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
-    data = scene(access, swing(seconds), count=count, fidelity=fidelity, recording={"checkpoint_interval_s": 0.02})
-    run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
-    return [
-        Check(
-            "kind of error",
-            run.error[0] if run.error else "none",
-            "RunError",
-            bool(run.error and run.error[0] == "RunError"),
-        ),
-        says(run.text, "(last good checkpoint: "),
-    ]
 
 
 def _too_long(described: Scene, factor: float) -> float:
@@ -130,15 +129,32 @@ def _too_long(described: Scene, factor: float) -> float:
     return step
 
 
-def late(access: EngineAccess, out: Path) -> list[Check]:
-    """A run that goes wrong after a while: the error has the time of the checkpoint before, and the file too."""
-    data = scene(access, {"type": "relax", "duration_s": 0.4}, recording={"checkpoint_interval_s": 0.1})
+@hard("spoilt: time step 2 of the stable one", {"factor": 2.0, "count": 6, "seconds": 0.3}, {"count": 40})
+# Welded smarticles chatter and never settle, which takes as long as the pour may wait.
+@hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
+def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
+    """Run at a step above the stable one, past the check: the run fails, and names its last checkpoint."""
+    fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
+    recording = {"checkpoint_interval_s": 0.02}
+    data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
+    run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
+    kind = run.error[0] if run.error else "none"
+    return [
+        Check("kind of error", kind, "RunError", kind == "RunError"),
+        says(run.text, "(last good checkpoint: "),
+    ]
 
-    def spoil(engine: Engine) -> None:
+
+@hard("spoilt: late in a run", {})
+def late(access: EngineAccess, out: Path) -> list[Check]:
+    """Break a run after a while: the error has the time of the checkpoint before, and the file too."""
+    relax, recording = {"type": "relax", "duration_s": 0.4}, {"checkpoint_interval_s": 0.1}
+
+    def throw(engine: Engine) -> None:
         if engine.time > 0.55:
             access.push(engine, 2, velocity=(0, 0, 100))
 
-    run = whole(data, out, spoil=spoil)
+    run = whole(scene_data(access, relax, recording=recording), out, spoil=throw)
     text = (out / FAILED).read_text(encoding="utf-8") if (out / FAILED).exists() else None
     return [
         says(run.text, "1 smarticle(s) (2): a speed above", "(last good checkpoint: t = 0.5000 s)"),
@@ -147,7 +163,7 @@ def late(access: EngineAccess, out: Path) -> list[Check]:
 
 
 def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
-    """What the looks of the watchdog take of the processor time of a whole run.
+    """Measure what the checks of the watchdog take of the processor time of a whole run.
 
     Compiled code is loaded once in a run, however long that is: of a share of a short one it would be most.
     """
@@ -156,11 +172,16 @@ def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity
         "shaken": {"type": "shake", "frequency_hz": 30, "peak_acceleration_g": 2},
         "swinging": {"type": "internal-oscillation", "theta_deg": 10},
     }
-    data = scene(access, {**phases[activity], "duration_s": seconds}, count=count, per_layer=10, fidelity=fidelity)
-    run = whole(data, out, note=False)
-    ended = Check("ends", run.text or "done", "done", run.error is None)
+    phase = {**phases[activity], "duration_s": seconds}
+    run = whole(scene_data(access, phase, count=count, per_layer=10, fidelity=fidelity), out, note=False)
     return [
-        ended,
-        below("share of the processor time, but for the first look [1]", run.cost, 0.01),
-        below("processor time of the first look [s]", run.first_look, 0.2),
+        Check("ends", run.text or "done", "done", run.error is None),
+        below("share of the processor time, but for the first check [1]", run.cost, 0.01),
+        below("processor time of the first check [s]", run.first_check, 0.2),
     ]
+
+
+for _fidelity in ("draft", "standard"):
+    for _activity in ("at rest", "shaken", "swinging")[: 3 if _fidelity == "draft" else 2]:
+        _run = {"fidelity": _fidelity, "count": 100, "activity": _activity, "seconds": 1.0}
+        hard(f"cost of the watchdog, {_activity}, {_fidelity}", None, _run)(cost)

@@ -1,7 +1,7 @@
-"""Kill runs at random moments and resume them: the bits of the run that was never killed.
+"""Kill runs at random moments and resume them: they give the bits of the run that was never killed.
 
 SIGKILL meets a run after a random share of the processor time that the whole run took, loading and closing included.
-Processor time, since it is the same however busy the machine is.
+Processor time does not depend on how busy the machine is.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any
 
 from dem.errors import RunError
 from dem.record.files import write_text
-from validation.engines import engine_access
-from validation.hard.scenes import scene, swing
+from validation.access import engine_access
+from validation.bench import scene_data, swing
 
 EVERY_S = 0.04  # of simulated time between checkpoints of a run from its pour on; of frames, half as much
 LONGER = 1.1  # moments are drawn from the whole run's processor time and a little more, to meet the end as well
@@ -33,11 +33,11 @@ def scene_to_kill(engine: str, seed: int) -> dict[str, Any]:
     """Return a scene: pour, rest, shake, swing, with a checkpoint every few hundred steps."""
     recording = {"checkpoint_interval_s": EVERY_S, "frame_interval_s": EVERY_S / 2}
     phases = ({"type": "relax", "duration_s": 0.05}, {"type": "shake", "duration_s": 0.2}, swing(0.2))
-    return scene(engine_access(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
+    return scene_data(engine_access(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
 
 
 def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
-    """Run a scene in a process of its own, or go on with it."""
+    """Start a run of a scene in a process of its own, or resume it."""
     command = [sys.executable, "-m", "smarticles", "run", str(path), "--out", str(out)]
     if (out / "run.json").exists():
         command.append("--resume")
@@ -46,7 +46,7 @@ def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
 
 
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
-    """Wait for its end; the processor time that it took [s]."""
+    """Wait for the end of a process; return the processor time that it took [s]."""
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in {0, -signal.SIGKILL}:
@@ -56,15 +56,14 @@ def finish(process: subprocess.Popen[bytes], what: str) -> float:
 
 
 def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> bool:
-    """Kill a process once it has taken so much processor time; whether it was still at work."""
+    """Kill a process once it has taken so much processor time; return whether it was still at work."""
     ticks = os.sysconf("SC_CLK_TCK")
     while True:
         try:
             spent = Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
         except FileNotFoundError:
             break
-        # Of an ended process that nobody has waited for, the state is Z.
-        if spent[0] == "Z":
+        if spent[0] == "Z":  # it has ended
             break
         if (int(spent[11]) + int(spent[12])) / ticks >= seconds:
             process.kill()
@@ -75,13 +74,13 @@ def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> b
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """What a run leaves for others: series, frames and their lists, by name."""
+    """Read what a run leaves: series, frames and their lists, by name."""
     files = [out / "series.h5", *out.glob("*.pvd"), *(out / "frames").iterdir()]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
 
 def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, Any]:
-    """What became of a run that was killed and has ended since."""
+    """Compare a run that was killed and has ended since with the whole one; return a row of the table."""
     log = (out / "log.txt").read_text(encoding="utf-8")
     from_where = re.search(r"resumed from (?:the checkpoint of t = ([\d.]+) s|the start)", log)
     one, other = results(whole), results(out)
@@ -100,7 +99,7 @@ def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, 
 
 
 def _phase_of(out: Path) -> str:
-    """In which phase the run is, by its log; before the first: start."""
+    """Return the phase of a run, by its log; before the first: start."""
     log = out / "log.txt"
     begun = re.findall(r"phase \d+ (\S+) (begins|ended)", log.read_text(encoding="utf-8")) if log.exists() else []
     if not begun:
@@ -110,7 +109,7 @@ def _phase_of(out: Path) -> str:
 
 
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
-    """Kill runs of one scene at random moments, and compare each with the whole one; rows of the table."""
+    """Kill runs of one scene at random moments, and compare each with the whole one; return rows of the table."""
     rng, path, whole = random.Random(1000 * seed + 1), folder / f"{seed}.yaml", folder / f"whole-{seed}"
     write_text(path, json.dumps(scene_to_kill(engine, seed)))
     # Twice: the first compiles what is not in the cache yet.

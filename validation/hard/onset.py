@@ -1,9 +1,9 @@
-"""Where steps above the stable one begin to chatter and to blow up.
+"""Find where steps above the stable one begin to chatter and to blow up.
 
-A scene refuses such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
+A scene rejects such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
 four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
 from nowhere, or the engine ends in numbers that are none. Every scene is run with several seeds, which move where and
-how high smarticles begin. A scene and seed that is in the table already is skipped.
+how high smarticles begin.
 """
 
 from __future__ import annotations
@@ -23,17 +23,20 @@ from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
 from dem.scene.scene import Scene
-from validation.bench import lying, scene_of, watched
-from validation.engines import EngineAccess, engine_access
-from validation.hard.scenes import scene, shape_change
+from validation.access import EngineAccess, engine_access
+from validation.bench import lying, scene_data, scene_of, shape_change, watched
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
 SETTLE, WATCH = 0.25, 0.05  # s
 # m/s, root mean square. A stack at rest has 1e-6 at most; what still rolls or topples at half the stable step is not
-# at rest, and tells nothing of chatter.
+# at rest, and shows nothing of chatter.
 QUIET, CHATTER = 1e-4, 1e-3
-WHAT = ("chatter", "blow-up")
 BLOW_UP = 1.0  # energy from nowhere over that of lifting all smarticles by one sphere diameter
+FACTOR, SPEED, RISE = (
+    "factor [1]",
+    "speed at rest, root mean square [m/s]",
+    "energy from nowhere over lifting by d [1]",
+)
 
 
 @dataclass(frozen=True)
@@ -42,31 +45,32 @@ class Setting:
 
     Args:
         placed: "stack": flat, all alike; "crossed": flat, every other one turned; "pile": at random.
-        articulated: hinged links, their motors holding, or welded.
         ratio: l/w.
         fidelity: draft, standard or reference.
         keys: further keys of the scene.
         count: smarticles.
+        articulated: hinged links, their motors holding, or welded.
     """
 
     placed: str
-    articulated: bool
-    ratio: float
-    fidelity: str
+    ratio: float = 0.7
+    fidelity: str = "draft"
     keys: str = ""
     count: int = 6
+    articulated: bool = False
 
     @property
     def name(self) -> str:
-        """Name in tables and figures."""
+        """Name in tables."""
         kind = "articulated" if self.articulated else "welded"
         where = f", {self.keys}" if self.keys else ""
         return f"{kind} {self.placed}{where}, l/w = {self.ratio:g}, {self.fidelity}"
 
     def data(self, access: EngineAccess) -> dict[str, Any]:
-        """The scene; nothing of it is run but its engine."""
-        phases = [shape_change(1.5)] if self.articulated else []
-        data = scene(access, *phases, count=self.count, fidelity=self.fidelity, smarticle={"aspect_ratio": self.ratio})
+        """Return plain data of the scene; nothing of it is run but its engine."""
+        phases = [shape_change()] if self.articulated else []
+        smarticle = {"aspect_ratio": self.ratio}
+        data = scene_data(access, *phases, count=self.count, fidelity=self.fidelity, smarticle=smarticle)
         if self.keys == "at the wall":
             data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
         if self.keys == "on hooks":
@@ -77,22 +81,22 @@ class Setting:
 SETTINGS: Mapping[str, Setting] = {
     setting.name: setting
     for setting in (
-        *(Setting("stack", articulated=False, ratio=ratio, fidelity="draft") for ratio in (0.05, 0.4, 0.7, 1.0, 2.0)),
-        *(Setting("stack", articulated=False, ratio=0.7, fidelity=name) for name in ("standard", "reference")),
-        Setting("crossed", articulated=False, ratio=0.7, fidelity="draft"),
-        Setting("stack", articulated=False, ratio=0.7, fidelity="draft", keys="on hooks", count=3),
-        *(Setting("pile", articulated=False, ratio=ratio, fidelity="draft") for ratio in (0.7, 2.0)),
-        Setting("pile", articulated=False, ratio=0.7, fidelity="draft", keys="at the wall", count=4),
-        *(Setting("stack", articulated=True, ratio=ratio, fidelity="draft") for ratio in (0.4, 0.7, 1.0)),
-        Setting("stack", articulated=True, ratio=0.7, fidelity="standard"),
-        Setting("pile", articulated=True, ratio=0.7, fidelity="draft", count=4),
-        Setting("pile", articulated=True, ratio=0.7, fidelity="draft", keys="at the wall", count=3),
+        *(Setting("stack", ratio) for ratio in (0.05, 0.4, 0.7, 1.0, 2.0)),
+        *(Setting("stack", fidelity=name) for name in ("standard", "reference")),
+        Setting("crossed"),
+        Setting("stack", keys="on hooks", count=3),
+        *(Setting("pile", ratio) for ratio in (0.7, 2.0)),
+        Setting("pile", keys="at the wall", count=4),
+        *(Setting("stack", ratio, articulated=True) for ratio in (0.4, 0.7, 1.0)),
+        Setting("stack", fidelity="standard", articulated=True),
+        Setting("pile", count=4, articulated=True),
+        Setting("pile", keys="at the wall", count=3, articulated=True),
     )
 }
 
 
 def poses(setting: Setting, described: Scene, seed: int) -> Poses:
-    """Where smarticles begin."""
+    """Return where smarticles begin."""
     rng, particle = np.random.default_rng(seed), described.particle
     if setting.placed == "pile":
         narrow, reach = setting.keys == "at the wall", particle.reach
@@ -110,9 +114,8 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
             for k in range(layers)
         ]
         return Poses(np.concatenate([p.positions for p in placed]), tuple(r for p in placed for r in p.rotations))
-    bottom = 0.0
-    if described.hooks is not None:
-        bottom = described.hooks.upper_height_m + described.hooks.side_m / 2
+    hooks = described.hooks
+    bottom = 0.0 if hooks is None else hooks.upper_height_m + hooks.side_m / 2
     heights = bottom + lying(described) * (2 * np.arange(setting.count) + 1)
     heights += np.cumsum(rng.uniform(1e-5, 4e-5, setting.count))
     turns = rng.uniform(-0.01, 0.01, setting.count)
@@ -123,7 +126,7 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
 
 
 def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
-    """Let smarticles go at a factor of the stable step, and look at them; one row of the table."""
+    """Let smarticles go at a factor of the stable step; return a row of the table."""
     data = setting.data(access)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
@@ -131,14 +134,15 @@ def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> 
     engine.add(poses(setting, described, seed))
     if setting.articulated:
         engine.motors.articulate()
-    lift = setting.count * described.smarticle.boxes.mass * engine.gravity * described.sphere_diameter
-    speeds, lowest, rise = [], math.inf, 0.0
+    mass = setting.count * described.smarticle.boxes.mass
+    lift = mass * engine.gravity * described.sphere_diameter
+    squares, lowest, rise = [], math.inf, 0.0
     try:
-        for time, kinetic, total in _looks(engine, described):
+        for time, kinetic, total in _energies(engine, described):
             lowest = min(lowest, total)
             rise = max(rise, (total - lowest) / lift)
             if time > SETTLE:
-                speeds.append(2 * kinetic / (setting.count * described.smarticle.boxes.mass))
+                squares.append(2 * kinetic / mass)
             if not rise <= BLOW_UP:
                 break
     except RunError:
@@ -147,19 +151,19 @@ def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> 
         "scene": setting.name,
         "seed": seed,
         "stable step [s]": stable,
-        "factor [1]": factor,
-        "speed at rest, root mean square [m/s]": math.sqrt(np.mean(speeds)) if speeds else math.nan,
-        "energy from nowhere over lifting by d [1]": rise if math.isfinite(rise) else math.inf,
+        FACTOR: factor,
+        SPEED: math.sqrt(np.mean(squares)) if squares else math.nan,
+        RISE: rise if math.isfinite(rise) else math.inf,
     }
 
 
-def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
-    """Let time pass; time [s], kinetic energy [J] and all energy but the motors' [J] about every millisecond."""
+def _energies(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
+    """Advance by about a millisecond each time; yield time [s], kinetic and all energy but the motors' [J]."""
     dt = engine.time_step
     interval = dt * max(1, round(described.fidelity.control_interval_s / dt))
-    held, looks = engine.state().angles, max(1, round(1e-3 / interval))
+    held, updates = engine.state().angles, max(1, round(1e-3 / interval))
     while engine.time < SETTLE + WATCH:
-        for _ in range(looks):
+        for _ in range(updates):
             if engine.motors.articulated:
                 engine.motors.actuate(held[None], interval)
             engine.advance(round(interval / dt))
@@ -169,37 +173,33 @@ def _looks(engine: Engine, described: Scene) -> Iterator[tuple[float, float, flo
 
 
 def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
-    """All factors of a scene and seed, up to the second that blows up."""
+    """Run all factors of a scene and seed, up to the second that blows up."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
         rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))
-        if sum(row["energy from nowhere over lifting by d [1]"] > BLOW_UP for row in rows) == 2:
+        if sum(row[RISE] > BLOW_UP for row in rows) == 2:
             break
     return rows
 
 
-def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Per scene: the lowest factors that chatter and that blow up, least and most over the seeds.
+def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
+    """Return the lowest factors of a scene that chatter and that blow up, least and most over its seeds.
 
-    inf: none did; NaN: what is not at rest at half the stable step cannot tell. Neither can smarticles that lie across
-    each other or at random, which are still rocking now and then at every step.
+    inf: none did; NaN: what is not at rest at half the stable step cannot show it. Neither can smarticles that lie
+    across each other or at random, which are still rocking now and then at every step.
     """
-    rows = []
-    for name, of_scene in runs.groupby("scene", sort=False):
-        row: dict[str, Any] = {"scene": name, "stable step [s]": of_scene["stable step [s]"].iloc[0]}
-        row["seeds"] = of_scene["seed"].nunique()
-        speed, factor = of_scene["speed at rest, root mean square [m/s]"], of_scene["factor [1]"]
-        blown = of_scene["energy from nowhere over lifting by d [1]"] > BLOW_UP
-        row["speed at rest at 0.9 or less, most [m/s]"] = speed[factor <= 0.9].max()
-        row["energy from nowhere at 0.9 or less over lifting by d, most [1]"] = of_scene.loc[
-            factor <= 0.9, "energy from nowhere over lifting by d [1]"
-        ].max()
-        rests = SETTINGS[name].placed == "stack" and not (speed[factor == min(FACTORS)] > QUIET).any()
-        for what, found in (("chatter", blown | (speed > CHATTER)), ("blow-up", blown)):
-            first = [of_seed["factor [1]"].min() for _, of_seed in of_scene[found].groupby("seed")]
-            first += [math.inf] * (row["seeds"] - len(first))
-            told = what == "blow-up" or rests
-            row[f"{what} from, least [1]"] = min(first) if told else math.nan
-            row[f"{what} from, most [1]"] = max(first) if told else math.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+    factor, speed, rise = (pd.to_numeric(runs[column], errors="coerce") for column in (FACTOR, SPEED, RISE))
+    small, blown = factor <= 0.9, rise > BLOW_UP
+    rests = SETTINGS[name].placed == "stack" and not (speed[factor == min(FACTORS)] > QUIET).any()
+    row: dict[str, Any] = {
+        "scene": name,
+        "stable step [s]": runs["stable step [s]"].iloc[0],
+        "seeds": runs["seed"].nunique(),
+        "speed at rest at 0.9 or less, most [m/s]": speed[small].max(),
+        "energy from nowhere at 0.9 or less over lifting by d, most [1]": rise[small].max(),
+    }
+    for what, found, shown in (("chatter", blown | (speed > CHATTER), rests), ("blow-up", blown, True)):
+        first = factor.where(found, math.inf).groupby(runs["seed"]).min()
+        row[f"{what} from, least [1]"] = first.min() if shown else math.nan
+        row[f"{what} from, most [1]"] = first.max() if shown else math.nan
+    return row

@@ -1,4 +1,4 @@
-"""Whole runs of a scene, watched: how they ended, their series, and how near they came to the watchdog's limits."""
+"""Run a scene under a watchdog that notes how near it came to its limits; series and end of the run."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from dem.record.progress import ProgressWriter
 from dem.run import build, run
 from dem.run.recorder import Recorder
 from dem.run.watchdog import Watchdog
-from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
-from validation.check import Check, below, near
+from validation.bench import scene_of
+from validation.cases import Check, below, near
 
 
 @dataclass(kw_only=True)
 class Noting(Watchdog):
-    """The same watchdog, which notes how near smarticles came to its limits.
+    """A watchdog that notes how near smarticles came to its limits.
 
     Args:
         nearest: largest share of each limit.
@@ -39,54 +39,25 @@ class Noting(Watchdog):
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
 
     def content(self, glance: Glance, **options: Any) -> bool:
-        """See `Watchdog`; it is to look closely every time."""
+        """Return False: every check is a close one."""
         return False
 
     def check(self, state: State, **options: Any) -> None:
-        """See `Watchdog`."""
-        if state.count:
-            self._note("speed", np.linalg.norm(state.link_velocities, axis=-1).max() / self.speed)
+        """Note gaps, then check."""
         if (gaps := options.get("gaps")) is not None:
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
     def check_depths(self, overlaps: Overlaps, **options: Any) -> None:
-        """See `Watchdog`."""
+        """Note the depth, then check."""
         self._note("depth", overlaps.deepest / self.depth)
         super().check_depths(overlaps, **options)
 
     def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
-        """See `Watchdog`."""
+        """Note the rise of energy, then check."""
         if np.isfinite(energy - self._ceiling):
             self._note("energy", (energy - self._ceiling) / self.energy)
         super().check_energy(state, energy=energy, **options)
-
-
-@dataclass
-class Timing(Recorder):
-    """The same recorder, which times the watchdog's looks, and spoils what it looks at.
-
-    Args:
-        looks: processor time of each [s].
-        spoil: done to the engine before each record; None: nothing is.
-    """
-
-    looks: list[float] = field(default_factory=list)
-    spoil: Callable[[Engine], None] | None = None
-
-    def record(self, engine: Engine, phase: int) -> None:
-        """See `Recorder`."""
-        if self.spoil is not None:
-            self.spoil(engine)
-        super().record(engine, phase)
-
-    def watch(self, engine: Engine, state: State | None = None) -> None:
-        """See `Recorder`."""
-        begun = time.process_time()
-        try:
-            super().watch(engine, state)
-        finally:
-            self.looks.append(time.process_time() - begun)
 
 
 @dataclass
@@ -98,8 +69,8 @@ class Watched:
         error: kind and text of the error that it ended in; None: it was done.
         series: by name.
         nearest: largest share of each limit of the watchdog that was reached.
-        cost: share of the processor time that the watchdog took, but for its first look [1].
-        first_look: processor time of that, in which compiled code is loaded [s].
+        cost: share of the processor time that the watchdog took, but for its first check [1].
+        first_check: processor time of that, in which compiled code is loaded [s].
     """
 
     scene: Scene | None
@@ -107,11 +78,11 @@ class Watched:
     series: dict[str, np.ndarray] = field(default_factory=dict)
     nearest: dict[str, float] = field(default_factory=dict)
     cost: float = 0.0
-    first_look: float = 0.0
+    first_check: float = 0.0
 
     @property
     def weight(self) -> float:
-        """Of all smarticles [N]."""
+        """Weight of all smarticles [N]."""
         assert self.scene is not None
         return self.scene.count * self.scene.smarticle.boxes.mass * self.scene.gravity_m_per_s2
 
@@ -121,12 +92,12 @@ class Watched:
         return None if self.error is None else self.error[1]
 
     def during(self, phase: int) -> np.ndarray:
-        """Which samples belong to a phase."""
+        """Return which samples belong to a phase."""
         during: np.ndarray = self.series["phase"] == phase
         return during
 
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
-        """What holds of every run that ended right."""
+        """Check what holds of every run that ended well; `rest`: largest speed at the end [m/s]."""
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
             return checks
@@ -134,24 +105,26 @@ class Watched:
         names = ("kinetic_energy_J", "com_height_m", "max_speed_m_per_s", "container_force_N")
         # Nothing is there at the first sample.
         broken = sum(int((~np.isfinite(self.series[name][1:])).sum()) for name in names)
-        height = float(self.series["com_height_m"][-1])
+        height, half = float(self.series["com_height_m"][-1]), self.scene.cylinder.height / 2
+        rise = self.nearest.get("energy", 0.0)
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any look [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
-            near(
-                "height of the centre of mass at the end [m]",
-                height,
-                self.scene.cylinder.height / 2,
-                self.scene.cylinder.height / 2,
-            ),
-            below("energy from nowhere over the watchdog's limit [1]", self.nearest.get("energy", 0.0), 0.5),
+            below("deepest contact at any check [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            near("height of the centre of mass at the end [m]", height, half, half),
+            below("energy from nowhere over the watchdog's limit [1]", rise, 0.5),
         ]
         if rest is not None:
             checks.append(below("speed at the end [m/s]", float(self.series["max_speed_m_per_s"][-1]), rest))
         if "gap" in self.nearest:
-            gap = build.GAP_LIMIT * self.nearest["gap"]
-            checks.append(below("largest joint gap [d]", gap, 0.02))
+            checks.append(below("largest joint gap [d]", build.GAP_LIMIT * self.nearest["gap"], 0.02))
         return checks
+
+    def weight_on_floor(self, error: float) -> list[Check]:
+        """Check that the container carries the weight at the end."""
+        if self.error is not None:
+            return []
+        force = float(self.series["container_force_N"][-5:, 2].mean())
+        return [near("mean force on the container over the weight [1]", -force / self.weight, 1.0, error)]
 
 
 def whole(
@@ -162,23 +135,45 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene into a run directory."""
-    built: list[tuple[Timing, Noting | None]] = []
+    """Run a scene into a run directory.
+
+    Args:
+        data: plain data of the scene.
+        out: the run directory.
+        note: whether the watchdog checks closely every time and notes how near its limits are.
+        steps: time step of each phase [s].
+        spoil: done to the engine before each record.
+    """
+    nearest: dict[str, float] = {}
+    checks: list[float] = []  # processor time of each of the watchdog's [s]
 
     def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-        timing = Timing(**vars(build.build_recorder(scene, out, progress)), spoil=spoil)
-        noting = Noting(**vars(timing.watchdog)) if note else None
-        timing.watchdog = noting or timing.watchdog
-        built.append((timing, noting))
-        return timing
+        made = build.build_recorder(scene, out, progress)
+        if note:
+            made.watchdog = Noting(**vars(made.watchdog), nearest=nearest)
+        record, watch = made.record, made.watch
+
+        def spoil_and_record(engine: Engine, phase: int) -> None:
+            if spoil is not None:
+                spoil(engine)
+            record(engine, phase)
+
+        def watch_timed(engine: Engine, state: State | None = None) -> None:
+            begun = time.process_time()
+            try:
+                watch(engine, state)
+            finally:
+                checks.append(time.process_time() - begun)
+
+        made.record, made.watch = spoil_and_record, watch_timed  # type: ignore[method-assign]
+        return made
 
     scene, error = None, None
+    builders = build.Builders(steps=steps, recorder=recorder)
     begun = time.process_time()
     try:
-        scene = parse_scene(data, source="case")
-        run.run_scene(
-            scene, out, command="stability", progress=False, builders=build.Builders(steps=steps, recorder=recorder)
-        )
+        scene = scene_of(data)
+        run.run_scene(scene, out, command="stability", progress=False, builders=builders)
     except (InputError, RunError) as caught:
         error = type(caught).__name__, str(caught)
     total = time.process_time() - begun
@@ -186,6 +181,10 @@ def whole(
     if (out / "series.h5").exists():
         with h5py.File(out / "series.h5") as file:
             series = {name: dataset[()] for name, dataset in file.items()}
-    nearest = {limit: share for _, noting in built if noting for limit, share in noting.nearest.items()}
-    looks = [look for timing, _ in built for look in timing.looks] or [0.0]
-    return Watched(scene, error, series, nearest, sum(looks[1:]) / total, looks[0])
+    return Watched(scene, error, series, nearest, sum(checks[1:]) / total, checks[0] if checks else 0.0)
+
+
+def timed(run: Callable[..., list[Check]], *arguments: Any, **options: Any) -> tuple[list[Check], float]:
+    """Return the checks of a case and the wall time that they took [s]."""
+    begun = time.monotonic()
+    return run(*arguments, **options), time.monotonic() - begun

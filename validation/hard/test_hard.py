@@ -1,4 +1,4 @@
-"""Hard cases end right, or in an error that names the cause; kills keep every bit; where instability begins."""
+"""Hard cases end well, or with an error that names the cause; kills keep every bit; where instability begins."""
 
 from __future__ import annotations
 
@@ -9,18 +9,47 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from validation.conftest import Tables
-from validation.hard.cases import CASES, Size, checked
+from validation.access import engine_access
+from validation.cases import HARD
+from validation.conftest import ON, Tables
+from validation.hard import broken, edges, violence
 from validation.hard.kills import SAME, kills
-from validation.hard.onset import SETTINGS, climb, onsets
+from validation.hard.onset import SETTINGS, climb, onset
+from validation.hard.runs import timed
+
+assert all((broken, edges, violence))  # imported to register their cases
 
 Call = Callable[..., Any]
-ON = [pytest.param("yade", marks=pytest.mark.engine), "links"]
 
 
-def rows_of(name: str, size: Size, checks: list[Any], wall: float) -> list[dict[str, Any]]:
-    """Return the rows of the table of cases."""
-    return [
+@pytest.mark.filterwarnings("ignore")  # of scenes that ask for trouble
+@pytest.mark.parametrize("engine", ON)
+@pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
+@pytest.mark.parametrize(("name", "run", "short", "long", "absent"), HARD)
+def test_hard_case(
+    call: Call,
+    call_alone: Call,
+    tables: Tables,
+    *,
+    tmp_path: Path,
+    name: str,
+    run: Call,
+    short: dict[str, Any] | None,
+    long: dict[str, Any],
+    absent: dict[str, str],
+    size: str,
+    engine: str,
+) -> None:
+    if engine in absent:
+        pytest.skip(f"not applicable: {absent[engine]}")
+    if short is None and size == "short":
+        pytest.skip("only in its long form")
+    tables.skip_recorded(engine, "cases", case=name, form=size)
+    options = {**(short or {}), **(long if size == "long" else {})}
+    arguments = (timed, run, engine_access(engine), tmp_path / "run")
+    # The long form measures memory and time, and runs alone in a fresh process.
+    checks, wall = call_alone(*arguments, **options) if size == "long" else call(engine, *arguments, **options)
+    rows = [
         {
             "case": name,
             "form": size,
@@ -32,24 +61,7 @@ def rows_of(name: str, size: Size, checks: list[Any], wall: float) -> list[dict[
         }
         for check in checks
     ]
-
-
-@pytest.mark.filterwarnings("ignore")  # of scenes that ask for trouble
-@pytest.mark.parametrize("engine", ON)
-@pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", CASES)
-def test_hard_case(
-    call: Call, call_alone: Call, tables: Tables, *, tmp_path: Path, name: str, size: Size, engine: str
-) -> None:
-    if reason := CASES[name].absent.get(engine):
-        pytest.skip(f"not applicable: {reason}")
-    if CASES[name].short is None and size == "short":
-        pytest.skip("only in its long form")
-    tables.skip_recorded(engine, "cases", case=name, form=size)
-    arguments = (checked, name, engine, size, tmp_path / "run")
-    # The long form measures memory and time, and runs alone in a fresh process.
-    checks, wall = call_alone(*arguments) if size == "long" else call(engine, *arguments)
-    tables.write(engine, "cases", rows_of(name, size, checks, wall), ["case", "form"])
+    tables.write(engine, "cases", rows, ["case", "form"])
     assert checks
     assert not [check for check in checks if not check.good]
 
@@ -72,6 +84,8 @@ def test_stable_step_is_below_the_onset(call_alone: Call, tables: Tables, name: 
     tables.skip_recorded(engine, "onset_runs", scene=name, seed=seed)
     rows = call_alone(climb, engine, name, seed)
     tables.write(engine, "onset_runs", rows, ["scene", "seed"])
-    found = onsets(pd.DataFrame(rows)).iloc[0]
+    recorded = tables.read(engine, "onset_runs")
+    found = onset(name, pd.DataFrame(rows) if recorded is None else recorded[recorded["scene"] == name])
+    tables.write(engine, "onset", [found], ["scene"])
     # The named fidelities use 0.9 of the stable step: blow-up begins above it.
     assert found["blow-up from, least [1]"] > 0.9

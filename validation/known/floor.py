@@ -1,4 +1,4 @@
-"""On the floor under gravity: sliding, rolling, standing on each other."""
+"""On the floor: sliding, rolling, standing on each other, falling flat."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from scipy.spatial.transform import Rotation
 from dem.body.forces import FLOOR, ContactForces
 from dem.body.particle import Particle
 from dem.engine.interface import Engine
-from dem.physics.contact import ContactLaw
+from dem.physics.contact import ContactLaw, restitution_of, typical_effective_mass
 from dem.plan.steps import time_step
-from validation.bench import FLAT, Array, G, add, ball_law, law_of, scene
-from validation.case import COARSE, LEAPFROG, case, ladder, on_both
-from validation.check import Answer
-from validation.engines import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
+from dem.scene.scene import Scene
+from validation.access import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
+from validation.bench import Array, G, add, ball_law, law_of, lying, scene
+from validation.cases import COARSE, LEAPFROG, Answer, case, ladder
+from validation.known.theory import falling_on_springs
 
 FRICTION = 0.4
 
 
 def lowest(access: EngineAccess, particle: Particle) -> Array:
-    """(n, 2) where a body that lies flat touches the floor, from its centre of mass [m]."""
+    """Return where a body that lies flat touches the floor, from its centre of mass, (n, 2) [m]."""
     ends = access.ends(particle)
     found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
     return found
 
 
 def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> Engine:
-    """A body lying on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
+    """Lay a body on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
     engine = access.build(particle, law, dt=dt, gravity=G)
     sunk = particle.boxes.mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
     add(engine, (0, -0.03, particle.radius - float(particle.centres[:, 2].min()) - sunk))
@@ -42,41 +43,30 @@ def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: fl
 
 
 def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
-    """A round body thrown along the floor: friction slows it and makes it spin until it rolls."""
+    """Throw a round body along the floor: friction slows it and makes it spin until it rolls."""
     friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
     lever = particle.radius - access.arm_share * mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
-    share = inertia / (mass * lever**2)
-    rolling = speed / (1 + share)
+    rolling = speed / (1 + inertia / (mass * lever**2))
     begins = (speed - rolling) / (friction * G)
     engine = resting(access, particle, law, dt=dt, speed=speed)
-    times, speeds, slips = [], [], []
+    rows = []
     for _ in range(400):
         engine.advance(max(1, round(2 * begins / 400 / dt)))
         state = engine.state()
-        times.append(engine.time)
-        speeds.append(state.velocities[0, 1])
-        slips.append(state.velocities[0, 1] + state.link_spins[0, 1, 0] * lever)
-    time, speeds_, slip = np.array(times), np.array(speeds), np.array(slips)
-    sliding = time < 0.9 * begins
+        along = state.velocities[0, 1]
+        rows.append((engine.time, along, along + state.link_spins[0, 1, 0] * lever))
+    time, speeds, slip = np.array(rows).T
+    sliding, late = time < 0.9 * begins, time > 1.3 * begins
     # Slip falls along a straight line while the body slides: where that meets zero, rolling begins.
     line = np.polyfit(time[sliding], slip[sliding], 1)
-    late = time > 1.3 * begins
+    slowed, slips = -np.polyfit(time[sliding], speeds[sliding], 1)[0], np.abs(slip[late]).max()
+    winding = "Coulomb's force from the first step on: rounding, and what the winding of the spring takes"
+    unwinding = "the tangential spring unwinds where sliding ends, and dies away"
     return [
-        Answer(
-            "deceleration while it slides [m/s²]",
-            friction * G,
-            -float(np.polyfit(time[sliding], speeds_[sliding], 1)[0]),
-            1e-4,
-        ).because("Coulomb's force from the first step on: rounding, and what the winding of the spring takes"),
-        Answer("time when rolling begins [s]", begins, -float(line[1] / line[0]), 1e-4).because(
-            "Coulomb's force from the first step on: rounding, and what the winding of the spring takes"
-        ),
-        Answer("speed when it rolls [m/s]", rolling, float(speeds_[late].mean()), 1e-4).because(
-            "the tangential spring unwinds where sliding ends, and dies away"
-        ),
-        Answer("slip when it rolls [m/s]", 0.0, float(np.abs(slip[late]).max()), 1e-4, scale=speed).because(
-            "the tangential spring unwinds where sliding ends, and dies away"
-        ),
+        Answer("deceleration while it slides [m/s²]", friction * G, slowed, 1e-4, winding),
+        Answer("time when rolling begins [s]", begins, -line[1] / line[0], 1e-4, winding),
+        Answer("speed when it rolls [m/s]", rolling, speeds[late].mean(), 1e-4, unwinding),
+        Answer("slip when it rolls [m/s]", 0.0, slips, 1e-4, unwinding, scale=speed),
     ]
 
 
@@ -96,58 +86,41 @@ def bar_rolls(access: EngineAccess) -> list[Answer]:
     return roll(access, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
-@case(
-    "sliding to a stop",
-    "a U lying flat is pushed along its axis of symmetry",
-    "Coulomb: μg, v²/2μg",
-    aspect_ratio=0.7,
-    friction=0.4,
-)
-def slide(access: EngineAccess, *, aspect_ratio: float, friction: float) -> list[Answer]:
+@case("sliding to a stop", "a U lying flat is pushed along its axis of symmetry", "Coulomb: μg, v²/2μg")
+def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 0.4) -> list[Answer]:
     speed = 0.3
     one = scene(access, smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
     engine = resting(access, one.particle, law_of(one), dt=time_step(one), speed=speed)
-    stops = speed / (friction * G)
-    times, ways, speeds = [0.0], [-0.03], [speed]
+    stops, way = speed / (friction * G), speed**2 / (2 * friction * G)
+    rows = [(0.0, -0.03, speed)]
     while engine.time < 1.5 * stops:
         engine.advance(max(1, round(2e-3 / engine.time_step)))
         state = engine.state()
-        times.append(engine.time)
-        ways.append(state.positions[0, 1])
-        speeds.append(state.velocities[0, 1])
-    sliding = np.array(times) < 0.8 * stops
-    reason = "friction at the height of the floor makes it rock on its stiff contacts; seen every 2 ms"
+        rows.append((engine.time, state.positions[0, 1], state.velocities[0, 1]))
+    times, ways, speeds = np.array(rows).T
+    sliding, across = times < 0.8 * stops, state.positions[0, 0]
+    slowed = -np.polyfit(times[sliding], speeds[sliding], 1)[0]
+    rocks = "friction at the height of the floor makes it rock on its stiff contacts; seen every 2 ms"
+    sticks = "it sticks; the tangential springs' vibration dies away"
     return [
-        Answer(
-            "deceleration [m/s²]",
-            friction * G,
-            -float(np.polyfit(np.array(times)[sliding], np.array(speeds)[sliding], 1)[0]),
-            5e-3,
-        ).because(reason),
-        Answer("way until it stops [m]", speed**2 / (2 * friction * G), float(ways[-1] - ways[0]), 5e-3).because(
-            reason
-        ),
-        Answer("speed after it stopped [m/s]", 0.0, float(speeds[-1]), 3e-4, scale=speed).because(
-            "it sticks; the tangential springs' vibration dies away"
-        ),
-        Answer("way across [m]", 0.0, float(state.positions[0, 0]), 1e-7, scale=speed**2 / (2 * friction * G)).because(
-            "symmetry, but for rounding"
-        ),
+        Answer("deceleration [m/s²]", friction * G, slowed, 5e-3, rocks),
+        Answer("way until it stops [m]", way, ways[-1] - ways[0], 5e-3, rocks),
+        Answer("speed after it stopped [m/s]", 0.0, speeds[-1], 3e-4, sticks, scale=speed),
+        Answer("way across [m]", 0.0, across, 1e-7, "symmetry, but for rounding", scale=way),
     ]
 
 
 @ladder(
     "sliding to rolling",
     "a ball thrown along the floor, without a tangential dashpot",
-    "way after 0.1 s",
-    "m",
+    "way after 0.1 s [m]",
     0.1,
     COARSE,
-    on_both(2, "the force of friction does not jump where sliding ends: second order"),
+    (2, "the force of friction does not jump where sliding ends: second order"),
     phases=2,
 )
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
-    """Error of the way of a ball that slides and then rolls, after 0.1 s [m], against a four times finer step.
+    """Return the error of the way of a ball that slides and then rolls, after 0.1 s [m], against a 4 times finer step.
 
     Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
     acts only at steps that resolve the winding, a few µs.
@@ -177,7 +150,7 @@ def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5
 def two_high(
     access: EngineAccess, law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool
 ) -> Engine:
-    """Two balls on each other on the floor, let go as deep as they will be pressed, or just touching."""
+    """Stack two balls on the floor, let go as deep as they will be pressed, or just touching."""
     press = BALL_MASS * G / STIFFNESS * sunk
     engine = access.build(access.ball(), law, dt=dt, gravity=G)
     add(engine, (0, 0, BALL_RADIUS - 2 * press), access.ball_turn)
@@ -192,48 +165,39 @@ def stack_at_rest(access: EngineAccess) -> list[Answer]:
     engine = two_high(access, ball_law(restitution=0.2), dt=2e-5, sunk=False)
     engine.advance(5000)
     low, high = engine.state().positions[:, 2]
+    weight, force = BALL_MASS * G, access.floor_force(engine)[2]
     reason = "what is left of the vibration after 0.1 s, 40 periods of it"
-    weight = BALL_MASS * G
     return [
-        Answer("overlap with the floor [m]", 2 * weight / STIFFNESS, float(BALL_RADIUS - low), 1e-6, reason=reason),
-        Answer("overlap of the two [m]", weight / STIFFNESS, float(2 * BALL_RADIUS - (high - low)), 1e-6).because(
-            reason
-        ),
-        Answer("force on the floor [N]", -2 * weight, float(access.floor_force(engine)[2]), 1e-6, reason=reason),
+        Answer("overlap with the floor [m]", 2 * weight / STIFFNESS, BALL_RADIUS - low, 1e-6, reason),
+        Answer("overlap of the two [m]", weight / STIFFNESS, 2 * BALL_RADIUS - (high - low), 1e-6, reason),
+        Answer("force on the floor [N]", -2 * weight, force, 1e-6, reason),
     ]
-
-
-def stack_motion(access: EngineAccess, dt: float, *, time: float) -> tuple[Array, Array]:
-    """Two elastic balls on each other vibrate without parting.
-
-    Returns:
-        (2,) heights of both above where they rest, in the engine and in theory: a chain of two masses [m].
-    """
-    shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
-    squares, modes = eigh(shape, BALL_MASS * np.eye(2))
-    thrown = np.array([2e-3, -1e-3])  # m/s; overlaps stay above zero
-    # At rest all forces balance, so half a step before t = 0 velocities are the same to first order; not to second.
-    frequencies = np.sqrt(squares)
-    share = modes.T @ (BALL_MASS * thrown)
-    before = modes @ (share * np.cos(frequencies * dt / 2))
-    engine = two_high(access, ball_law(), dt=dt, velocities=before, sunk=True)
-    rest = engine.state().positions[:, 2]
-    engine.advance(round(time / dt))
-    return engine.state().positions[:, 2] - rest, modes @ (share * np.sin(frequencies * time) / frequencies)
 
 
 @ladder(
     "stack, elastic",
     "two balls on each other vibrate without parting",
-    "heights after 20 ms",
-    "m",
+    "heights after 20 ms [m]",
     2e-3 * 0.36e-3,
     COARSE,
-    on_both(2, LEAPFROG),
+    (2, LEAPFROG),
 )
 def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    found = [stack_motion(access, dt, time=0.02048) for dt in steps]
-    return [float(np.linalg.norm(one - exact)) for one, exact in found]
+    """Return the errors of both heights above where they rest, against a chain of two masses [m]."""
+    shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    squares, modes = eigh(shape, BALL_MASS * np.eye(2))
+    thrown, time = np.array([2e-3, -1e-3]), 0.02048  # m/s, s; overlaps stay above zero
+    frequencies, share = np.sqrt(squares), modes.T @ (BALL_MASS * thrown)
+    exact = modes @ (share * np.sin(frequencies * time) / frequencies)
+    errors = []
+    for dt in steps:
+        # Forces balance at rest, so half a step before t = 0 velocities are equal to first order; not to second.
+        before = modes @ (share * np.cos(frequencies * dt / 2))
+        engine = two_high(access, ball_law(), dt=dt, velocities=before, sunk=True)
+        rest = engine.state().positions[:, 2]
+        engine.advance(round(time / dt))
+        errors.append(float(np.linalg.norm(engine.state().positions[:, 2] - rest - exact)))
+    return errors
 
 
 SETTLED = 0.4  # s
@@ -241,38 +205,32 @@ REASON = "what is left of the vibration after 0.4 s"
 
 
 def _level(found: ContactForces, level: int, each: int) -> Array:
-    """(contacts, 3) forces on a level of `each` bodies from below [N]."""
+    """Return the forces on a level of `each` bodies from below, (contacts, 3) [N]."""
     bodies = found.smarticles // each
     if level:
-        below = (bodies == (level - 1, level)).all(axis=1)
-        upwards: Array = -found.forces[below]
+        upwards: Array = -found.forces[(bodies == (level - 1, level)).all(axis=1)]
     else:
         upwards = found.forces[found.boundaries == FLOOR]
     return upwards
 
 
 def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) -> list[Answer]:
-    """What the contacts below each level carry; of `contacts` alike each its share."""
+    """Return what the contacts below each level carry; of `contacts` alike each its share."""
     found = engine.contact_forces()
     weight = each * engine.particle.boxes.mass * G
     answers = []
     for level in range(levels):
         forces = _level(found, level, each)
         upwards, across = forces[:, 2].tolist(), float(np.linalg.norm(forces[:, :2].sum(axis=0)))
-        bears, below = (levels - level) * weight, f"level {level - 1}" if level else "the floor"
-        told = [("sum of the forces", sum(upwards), bears)]
+        bears = (levels - level) * weight
+        where = f"level {level} on {f'level {level - 1}' if level else 'the floor'} [N]"
+        carried = [("sum of the forces", sum(upwards), bears)]
         if level and contacts is not None:
-            told += [("least force of a contact", min(upwards, default=math.nan), bears / contacts)]
-            told += [("largest force of a contact", max(upwards, default=math.nan), bears / contacts)]
-        answers += [
-            Answer(f"{what}, level {level} on {below} [N]", theory, measured, 1e-5, reason=REASON)
-            for what, measured, theory in told
-        ]
-        answers.append(
-            Answer(f"sum across, level {level} on {below} [N]", 0.0, across, 1e-5, scale=bears).because(
-                f"nothing pulls sideways; {REASON}"
-            )
-        )
+            carried += [("least force of a contact", min(upwards, default=math.nan), bears / contacts)]
+            carried += [("largest force of a contact", max(upwards, default=math.nan), bears / contacts)]
+        answers += [Answer(f"{what}, {where}", theory, measured, 1e-5, REASON) for what, measured, theory in carried]
+        sideways = f"nothing pulls sideways; {REASON}"
+        answers.append(Answer(f"sum across, {where}", 0.0, across, 1e-5, sideways, scale=bears))
     return answers
 
 
@@ -302,8 +260,103 @@ def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
 def flat_smarticles(access: EngineAccess, *, levels: int = 4) -> list[Answer]:
     one = scene(access, fidelity="standard")
     engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
-    high = float(np.ptp(one.particle.centres[:, 2])) + 2 * one.particle.radius
     for level in range(levels):
-        add(engine, (0.0, 0.0, (level + 0.5) * high), FLAT)
+        add(engine, (0.0, 0.0, (2 * level + 1) * lying(one)))
     engine.advance(round(SETTLED / engine.time_step))
     return _answers(engine, levels, 1, contacts=None)
+
+
+# -- flat impacts ------------------------------------------------------------------------------------------------------
+
+# A clump that meets the floor with n spheres is n times stiffer, and damped by n dashpots that were sized for one.
+
+ROW = "a smarticle meets the floor with a whole row of spheres"
+SPRINGS = "n springs and dashpots side by side, that never pull; integrated with the tilt"
+
+THROWN = 0.1  # m/s
+ROWS_AND_PITCHES = tuple((rows, pitch) for rows in (1, 2) for pitch in (1.3, 1.0, 0.5, 0.25))
+STRANDS = ((1, 0.0), (2, 0.0))  # of whole links, which have no pitch
+
+
+def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
+    """Return the restitution [1] and time in contact [s] of a flat throw."""
+    engine = access.build(one.particle, law_of(one), dt=dt)
+    add(engine, (0, 0, lying(one) + 3.3 * THROWN * dt))
+    access.push(engine, 0, velocity=(0, 0, -THROWN))
+    first = last = 0
+    while not last or engine.steps < 2 * last - first + 50:
+        engine.advance(1)
+        if access.floor_force(engine)[2]:
+            first, last = first or engine.steps, engine.steps
+    energy = one.smarticle.boxes.mass * THROWN**2 / 2
+    return math.sqrt(engine.state().kinetic_energy / energy), (last - first + 1) * dt
+
+
+def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
+    """Return how deep the centre of mass of a smarticle that lies flat has sunk [m]."""
+    engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
+    add(engine, (0, 0, lying(one)))
+    engine.advance(round(time / dt))
+    return lying(one) - float(engine.state().positions[0, 2])
+
+
+def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
+    """Return how deep it sinks on springs under points (n, 2) [m], of which it is not above the middle."""
+    lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)
+    return float(np.linalg.solve(stiffness * lift.T @ lift, [weight, 0.0, 0.0])[0])
+
+
+def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: float = 0.7) -> dict[str, float]:
+    """Throw a smarticle flat at the floor, and lay it there; a row of the table `clumps`."""
+    fidelity = {"base": "standard", "rows": rows} | ({"pitch": pitch} if pitch else {})
+    one = scene(access, fidelity=fidelity, contact={"restitution": restitution})
+    law, boxes, points = law_of(one), one.smarticle.boxes, lowest(access, one.particle)
+    stiffness, damping, mass, count = law.normal_stiffness, law.wall_damping, boxes.mass, len(points)
+    springs = {"stiffness": stiffness, "damping": damping, "mass": mass}
+    after, lasts = falling_on_springs(points, **springs, inertia=boxes.inertia[:2], speed=THROWN)
+    energy = float((np.array([mass, *boxes.inertia[:2]]) * after**2).sum() / (mass * THROWN**2))
+    period = 2 * math.pi * math.sqrt(mass / (count * stiffness))
+    measured, contact = _thrown(access, one, period / 800)
+    return {
+        "rows": rows,
+        "pitch": pitch,  # over the spheres' diameter; 0 where links are whole
+        "spheres": len(one.particle.centres),
+        "contacts": count,  # spheres that touch the floor
+        "nominal": restitution,  # restitution that the scene asks for [1]
+        # Restitution on all springs and dashpots side by side without tilting [1]; with tilting it is the root of
+        # energy after over energy before.
+        "parallel": restitution_of(count * damping / (2 * math.sqrt(count * stiffness * mass))),
+        "theory": math.sqrt(energy),
+        "measured": measured,
+        "at_scene_step": _thrown(access, one, time_step(one))[0],  # a scene has few steps in a flat contact
+        "theory_contact": lasts,  # from first touch to the end of the last contact [s]
+        "measured_contact": contact,
+        # Of one sphere of a tip, at the typical effective mass, elastic [s].
+        "single_contact": math.pi * math.sqrt(typical_effective_mass(one.particle) / stiffness),
+        # Depth of the centre of mass under the own weight [m], once the vibration has died away: a damping time is a
+        # fraction of a period.
+        "theory_sunk": _sunk_theory(points, stiffness=stiffness, weight=mass * G),
+        "measured_sunk": _sunk(access, one, period / 60, time=40 * period),
+        "step": time_step(one),  # [s]
+    }
+
+
+@case("flat impact, spheres of draft", ROW, SPRINGS, rows=1, pitch=1.3)
+@case("flat impact, spheres of reference", ROW, SPRINGS, rows=2, pitch=1.0)
+def flat_checks(access: EngineAccess, *, rows: int, pitch: float) -> list[Answer]:
+    found = flat_impact(access, rows=rows, pitch=pitch)
+    begins = "contact begins within a step, 1/400 of an undamped one; the sum over n contacts is that of one"
+    ends = "the last of the contacts ends slowly, as its force comes down to zero"
+    vibrates = "what is left of the vibration after 40 periods"
+    energies, sunk = "restitution, root of the energies [1]", "depth under its own weight [m]"
+    return [
+        Answer(energies, found["theory"], found["measured"], 0.02, begins),
+        Answer("time in contact [s]", found["theory_contact"], found["measured_contact"], 0.05, ends),
+        Answer(sunk, found["theory_sunk"], found["measured_sunk"], 1e-3, vibrates),
+    ]
+
+
+def flat_impacts(access: EngineAccess) -> list[dict[str, float]]:
+    """Return rows over the number of points that touch: of spheres, or of strands where links are whole."""
+    settings = ROWS_AND_PITCHES if access.name == "yade" else STRANDS
+    return [flat_impact(access, rows=rows, pitch=pitch) for rows, pitch in settings]

@@ -8,22 +8,21 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from validation.bench import Array, G, add, body_rotations, law_of, scene
-from validation.case import COARSE, MIDDLE, case, ladder, on_both
-from validation.check import Answer
-from validation.engines import EngineAccess
+from validation.access import EngineAccess
+from validation.bench import TILTED, Array, G, add, body_rotations, law_of, scene
+from validation.cases import COARSE, MIDDLE, Answer, case, ladder
 from validation.known.theory import free_rotation
 
 MIDPOINT = "the implicit midpoint rule: second order"
 TURNS = "YADE's exactAsphericalRot takes the frame of the step's beginning for its middle: first order"
+EULER = "Euler's equations, integrated to 1e-12"
 
-START = Rotation.from_rotvec([0.4, 0.2, -0.7])
 SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose three moments differ
 ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly about the axis of the middle moment
 
 
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
-    """A smarticle thrown upwards in free fall.
+    """Throw a smarticle upwards.
 
     Returns:
         (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
@@ -31,11 +30,11 @@ def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred:
     """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
-    add(engine, (0, 0, 0.1), START)
+    add(engine, (0, 0, 0.1), TILTED)
     access.push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
     state = engine.state()
-    turned = (Rotation.from_matrix(body_rotations(state)[0]) * START.inv()).magnitude()
+    turned = (Rotation.from_matrix(body_rotations(state)[0]) * TILTED.inv()).magnitude()
     return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
 
@@ -43,39 +42,33 @@ def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred:
 def free_fall(access: EngineAccess) -> list[Answer]:
     dt, time, throw = 5e-5, 0.1, 0.3
     way, velocity, turned = fall(access, dt, time=time, throw=throw, centred=True)
+    rise, across = throw * time - G * time**2 / 2, np.hypot(*way[:2])
     reason = "rounding of 2000 additions: leapfrog is exact under a constant force"
     return [
-        Answer("rise after 0.1 s [m]", throw * time - G * time**2 / 2, float(way[2]), 1e-11, reason=reason),
-        Answer("velocity half a step before [m/s]", throw - G * (time - dt / 2), velocity, 1e-11, reason=reason),
-        Answer(
-            "way across [m]", 0.0, float(np.hypot(*way[:2])), 1e-11, scale=abs(throw * time - G * time**2 / 2)
-        ).because("nothing acts across"),
-        Answer("turn [rad]", 0.0, turned, 1e-11, reason="nothing turns it", scale=1.0),
+        Answer("rise after 0.1 s [m]", rise, way[2], 1e-11, reason),
+        Answer("velocity half a step before [m/s]", throw - G * (time - dt / 2), velocity, 1e-11, reason),
+        Answer("way across [m]", 0.0, across, 1e-11, "nothing acts across", scale=abs(rise)),
+        Answer("turn [rad]", 0.0, turned, 1e-11, "nothing turns it", scale=1.0),
     ]
 
 
 @ladder(
     "let go from rest",
     "a smarticle falls, let go as the pour does it",
-    "height after 0.1 s",
-    "m",
+    "height after 0.1 s [m]",
     9.81 * 0.096**2 / 2,
     COARSE,
-    on_both(1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"),
+    (1, "bodies are let go with the velocity of half a step before: a shift in time by half a step, no more"),
 )
 def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     return [abs(fall(access, dt, time=0.096, throw=0.0, centred=False)[0][2] + G * 0.096**2 / 2) for dt in steps]
 
 
 def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """A smarticle spins freely.
-
-    Returns:
-        Rotations at these times, and the mean angular velocities in the step before (n, 3) [rad/s].
-    """
+    """Let a smarticle spin freely; return its rotations, and the mean spins in the step before (n, 3) [rad/s]."""
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt)
-    add(engine, (0, 0, 0.1), START)
+    add(engine, (0, 0, 0.1), TILTED)
     access.push(engine, 0, spin=spin)
     rows, spins = [], []
     for time in times:
@@ -87,147 +80,107 @@ def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array
     return Rotation.concatenate(rows), np.array(spins)
 
 
-def _misfit(found: Rotation, exact: Rotation) -> Array:
-    """(n, 3) rotation vectors from the exact orientations to those found [rad]."""
-    vectors: Array = (found * exact.inv()).as_rotvec()
-    return vectors
+def _exact(access: EngineAccess, spin: Array, times: Array) -> Rotation:
+    inertia = scene(access).smarticle.boxes.inertia
+    return free_rotation(inertia=inertia, start=TILTED, spin=spin, times=times)[0]
 
 
-@case(
-    "torque-free spin",
-    "a U about no axis in particular; its three moments differ",
-    "Euler's equations, integrated to 1e-12",
-)
+@case("torque-free spin", "a U about no axis in particular; its three moments differ", EULER)
 def torque_free_spin(access: EngineAccess) -> list[Answer]:
     inertia = scene(access).smarticle.boxes.inertia
     times, coarse = np.linspace(0.02, 0.2, 10), 2e-5
-    exact, _ = free_rotation(inertia=inertia, start=START, spin=SPIN, times=times)
-    momentum = START.apply(inertia * START.inv().apply(SPIN))
-    energy = momentum @ SPIN / 2
+    exact = _exact(access, SPIN, times)
+    momentum = TILTED.apply(inertia * TILTED.inv().apply(SPIN))
+    energy, turned = momentum @ SPIN / 2, float(np.linalg.norm(SPIN)) * times[-1]
     misfits, energies, momenta = [], [], []
     for dt in (coarse, coarse / 2):
         rotations, spins = spin_rotations(access, dt, spin=SPIN, times=times)
-        misfits.append(_misfit(rotations, exact))
+        misfits.append((rotations * exact.inv()).as_rotvec())
         # The spin is that of the middle of the step: so is the frame it is seen in.
         middle = Rotation.from_rotvec(-spins * dt / 2) * rotations
         body = middle.inv().apply(spins)
         energies.append(float((inertia * body[-1] ** 2).sum() / 2))
         momenta.append(middle.apply(inertia * body)[-1])
-    turned = float(np.linalg.norm(SPIN)) * times[-1]
+    extrapolated, at_coarse = (np.linalg.norm(m, axis=1).max() for m in (2 * misfits[1] - misfits[0], misfits[0]))
+    grown = 0.25 * float(SPIN @ SPIN) * coarse * times[-1]
+    change, size = (float(np.linalg.norm(m)) for m in (2 * momenta[1] - momenta[0] - momentum, momentum))
     limit = "what is left of second order after extrapolation from 20 and 10 µs; the step's own error is of first order"
+    first = "YADE's rotation is of first order: some ω dt of the angle turned"
+    grows = "grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a second"
     return [
-        Answer(
-            "orientation after 1.4 turns, dt → 0 [rad]",
-            0.0,
-            float(np.linalg.norm(2 * misfits[1] - misfits[0], axis=1).max()),
-            2e-5,
-            scale=turned,
-        ).because(limit),
-        Answer(
-            "orientation after 1.4 turns, dt = 20 µs [rad]",
-            0.0,
-            float(np.linalg.norm(misfits[0], axis=1).max()),
-            2e-3,
-            scale=turned,
-        ).because("YADE's rotation is of first order: some ω dt of the angle turned"),
-        Answer("kinetic energy, dt → 0 [J]", energy, 2 * energies[1] - energies[0], 1e-5, reason=limit),
-        Answer(
-            "kinetic energy after 0.2 s, dt = 20 µs [J]",
-            energy,
-            energies[0],
-            0.25 * float(SPIN @ SPIN) * coarse * times[-1],
-        ).because(
-            "grows by some 0.2 ω² dt per second: first order; contacts dissipate half of it a hundred times a second"
-        ),
-        Answer(
-            "angular momentum, change of the vector, dt → 0 [kg m²/s]",
-            0.0,
-            float(np.linalg.norm(2 * momenta[1] - momenta[0] - momentum)),
-            1e-5,
-            scale=float(np.linalg.norm(momentum)),
-        ).because(limit),
+        Answer("orientation after 1.4 turns, dt → 0 [rad]", 0.0, extrapolated, 2e-5, limit, scale=turned),
+        Answer("orientation after 1.4 turns, dt = 20 µs [rad]", 0.0, at_coarse, 2e-3, first, scale=turned),
+        Answer("kinetic energy, dt → 0 [J]", energy, 2 * energies[1] - energies[0], 1e-5, limit),
+        Answer("kinetic energy after 0.2 s, dt = 20 µs [J]", energy, energies[0], grown, grows),
+        Answer("angular momentum, change of the vector, dt → 0 [kg m²/s]", 0.0, change, 1e-5, limit, scale=size),
     ]
+
+
+PRINCIPAL = TILTED.apply([0.0, 0.0, 43.0])  # rad/s, about the normal of the plane
+IN_PLANE = {"yade": (2, "about a principal axis the frame does not matter: second order"), "links": (2, MIDPOINT)}
+ANY_AXIS = {"yade": (1, TURNS), "links": (2, MIDPOINT)}
 
 
 @ladder(
     "spin",
     "a smarticle spins about no axis in particular",
-    "orientation after 1.4 turns",
-    "rad",
+    "orientation after 1.4 turns [rad]",
     8.6,
     COARSE,
-    {"yade": (1, TURNS), "links": (2, MIDPOINT)},
+    ANY_AXIS,
+    spin=SPIN,
+    time=0.2,
 )
-def spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    times = np.array([0.2])
-    exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=SPIN, times=times)
-    return [
-        float(np.linalg.norm(_misfit(spin_rotations(access, dt, spin=SPIN, times=times)[0], exact))) for dt in steps
-    ]
-
-
 @ladder(
     "spin in the plane",
     "a smarticle spins about the normal of its plane",
-    "orientation after 1.3 turns",
-    "rad",
+    "orientation after 1.3 turns [rad]",
     8.3,
     (3.2e-4, 1.6e-4, 8e-5, 4e-5),
-    {"yade": (2, "about a principal axis the frame does not matter: second order"), "links": (2, MIDPOINT)},
+    IN_PLANE,
+    spin=PRINCIPAL,
+    time=0.192,
 )
-def planar_spin_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    times, spin = np.array([0.192]), START.apply([0.0, 0.0, 43.0])
-    exact, _ = free_rotation(inertia=scene(access).smarticle.boxes.inertia, start=START, spin=spin, times=times)
-    return [
-        float(np.linalg.norm(_misfit(spin_rotations(access, dt, spin=spin, times=times)[0], exact))) for dt in steps
-    ]
+def spin_errors(access: EngineAccess, steps: Sequence[float], *, spin: Array, time: float) -> list[float]:
+    times = np.array([time])
+    exact = _exact(access, spin, times).inv()
+    return [float((spin_rotations(access, dt, spin=spin, times=times)[0] * exact).magnitude()[0]) for dt in steps]
 
 
-FLIPS = np.linspace(2e-3, 0.5, 250)  # s; times that a U about its middle axis is looked at
+FLIPS = np.linspace(2e-3, 0.5, 250)  # s; when a U about its middle axis is measured
 
 
 def _between_flips(access: EngineAccess, rotations: Rotation) -> float:
-    """Time between the first two flips [s]."""
-    # Angular momentum stands still, so its part along the body's y axis tells how the body turns under it.
-    momentum = START.apply(scene(access).smarticle.boxes.inertia * ABOUT_MIDDLE)
+    """Return the time between the first two flips [s]."""
+    # Angular momentum stands still, so its part along the body's y axis shows how the body turns under it.
+    momentum = TILTED.apply(scene(access).smarticle.boxes.inertia * ABOUT_MIDDLE)
     roots = CubicSpline(FLIPS, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
     return float(roots[1] - roots[0])
 
 
 def _flip_times(access: EngineAccess, steps: Sequence[float]) -> tuple[list[float], float]:
-    """Times between the first two flips [s] at time steps [s], and in theory."""
-    inertia, spin = scene(access).smarticle.boxes.inertia, START.apply(ABOUT_MIDDLE)
-    exact, _ = free_rotation(inertia=inertia, start=START, spin=spin, times=FLIPS)
+    """Return the times between the first two flips [s] at time steps [s], and in theory."""
+    spin = TILTED.apply(ABOUT_MIDDLE)
     found = [_between_flips(access, spin_rotations(access, dt, spin=spin, times=FLIPS)[0]) for dt in steps]
-    return found, _between_flips(access, exact)
+    return found, _between_flips(access, _exact(access, spin, FLIPS))
 
 
-@case(
-    "middle axis",
-    "a U about the axis of its middle moment flips over and over",
-    "Euler's equations, integrated to 1e-12",
-)
+@case("middle axis", "a U about the axis of its middle moment flips over and over", EULER)
 def flips(access: EngineAccess) -> list[Answer]:
     (coarse, fine), exact = _flip_times(access, (2e-5, 1e-5))
+    limit = "what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %"
+    grows = (
+        "first order: energy grows by 0.2 ω² dt per second, and the time goes with the logarithm of what little energy "
+        "parts this motion from one that never flips"
+    )
     return [
-        Answer("time between two flips, dt → 0 [s]", exact, 2 * fine - coarse, 3e-3).because(
-            "what is left of second order after extrapolation from 20 and 10 µs, off by 2.7 and 1.4 %"
-        ),
-        Answer("time between two flips, dt = 20 µs [s]", exact, coarse, 0.05).because(
-            "first order: energy grows by 0.2 ω² dt per second, and the time goes with the logarithm of what "
-            "little energy parts this motion from one that never flips"
-        ),
+        Answer("time between two flips, dt → 0 [s]", exact, 2 * fine - coarse, 3e-3, limit),
+        Answer("time between two flips, dt = 20 µs [s]", exact, coarse, 0.05, grows),
     ]
 
 
 @ladder(
-    "flips",
-    "a smarticle about the axis of its middle moment",
-    "time between two flips",
-    "s",
-    0.208,
-    MIDDLE,
-    {"yade": (1, TURNS), "links": (2, MIDPOINT)},
+    "flips", "a smarticle about the axis of its middle moment", "time between two flips [s]", 0.208, MIDDLE, ANY_AXIS
 )
 def flip_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     found, exact = _flip_times(access, steps)

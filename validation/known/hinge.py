@@ -10,13 +10,15 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from dem.engine.interface import Engine
+from dem.engine.yade.kind import hinge_law
 from dem.scene.scene import Scene
-from validation.bench import Array, G, add, drive, scene
-from validation.case import FINE, LEAPFROG, case, ladder
-from validation.check import Answer
-from validation.engines import EngineAccess
+from validation.access import EngineAccess
+from validation.bench import Array, G, add, drive, scene, shape_change
+from validation.cases import FINE, LEAPFROG, Answer, case, ladder
 
 MODE = "eigenfrequency of links, shafts and pins; √(k/I) but for the pins"
+NO_PINS = {"links": "hinges have no pins that give way: links are one body with two angles"}
+NO_TILT = {"links": "shafts do not tilt: both barbs stay in the plane of the middle link"}
 
 STRONG = 1.0  # N m; a limit that no torque here comes near
 VIBRATION = "the shaft has no damping: what a window over the vibration leaves of it"
@@ -30,31 +32,24 @@ def hinged(
     angles: Sequence[float] = (90, 90),
     **motor: float | str,
 ) -> Scene:
-    """A scene of one smarticle whose shafts will be springs; angles in deg, `motor` as in a scene file."""
-    return scene(
-        access,
-        fidelity=fidelity,
-        phases=("shape-change",),
-        smarticle={"aspect_ratio": aspect_ratio, "angles_deg": list(angles)},
-        motor=access.spring_shafts() | motor,
-    )
+    """Return a scene of one smarticle whose shafts will be springs; angles in deg, `motor` as in a scene file."""
+    smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
+    return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=access.spring_shafts | motor)
 
 
-def upright(
-    access: EngineAccess, one: Scene, *, gravity: float, height: float = 0.05, dt: float | None = None
-) -> Engine:
-    """One articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
+def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | None = None) -> Engine:
+    """Hang one articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
     engine = access.build_hinged(one, gravity=gravity, dt=dt)
-    middle = Rotation.from_matrix(one.smarticle.boxes.link_rotations[1].T)
-    turned = Rotation.from_euler("x", -90, degrees=True) * middle
-    add(engine, np.array([0, 0, height]) - turned.apply(one.smarticle.boxes.link_centres[1]), turned)
+    boxes = one.smarticle.boxes
+    turned = Rotation.from_euler("x", -90, degrees=True) * Rotation.from_matrix(boxes.link_rotations[1].T)
+    add(engine, np.array([0, 0, 0.05]) - turned.apply(boxes.link_centres[1]), turned)
     engine.motors.articulate()
     access.hold(engine)
     return engine
 
 
 def _barb(one: Scene) -> tuple[float, float, float]:
-    """Mass [kg], moment of inertia about the own centre across the plane [kg m²], and lever to the hinge [m]."""
+    """Return mass [kg], moment of inertia about the own centre across the plane [kg m²], lever to the hinge [m]."""
     boxes = one.smarticle.boxes
     return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
 
@@ -63,33 +58,29 @@ def _barb(one: Scene) -> tuple[float, float, float]:
     "hinge pulled",
     "a straight smarticle is pulled at both ends by a hundred weights",
     "gap F/k of the pin",
-    absent={"links": "hinges have no pins that give way: links are one body with two angles"},
-    aspect_ratio=0.7,
-    fidelity="standard",
-    largest=0.01,
+    absent=NO_PINS,
 )
-def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: float) -> list[Answer]:
-    """A straight smarticle is pulled at both ends, along itself, by a hundred weights; the force grows, then stays."""
+def pull(
+    access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard", largest: float = 0.01
+) -> list[Answer]:
+    """Pull a straight smarticle at both ends, along itself, by a hundred weights; the force grows, then stays."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
     engine.motors.articulate()
-    straight = engine.state().angles
-    along = engine.state().link_rotations[0, 1, :, 0]
+    straight, along = engine.state().angles, engine.state().link_rotations[0, 1, :, 0]
     force, gaps = 100 * one.smarticle.boxes.mass * G, []
     for time in drive(engine, one, duration, lambda _: straight):
         grown = min(1.0, 2 * time / duration) * force * along
         for link, sign in ((0, -1), (2, 1)):
             access.force(engine, 0, link, sign * grown)
         gaps.append(engine.motors.gaps().max())
-    theory = force / access.pin_stiffness(one)
+    theory, mean = force / access.pin_stiffness(one), np.mean(gaps[-20:])
+    swings = "the links' masses swing on the pin for a while, by per cents"
+    promised = f"at most {100 * largest:g} % of a sphere's diameter, as the fidelity promises"
     return [
-        Answer("gap of a hinge, mean [m]", theory, float(np.mean(gaps[-20:])), 0.01).because(
-            "the links' masses swing on the pin for a while, by per cents"
-        ),
-        Answer(
-            "gap of a hinge, largest [m]", theory, float(max(gaps)), largest * one.sphere_diameter / theory - 1
-        ).because(f"at most {100 * largest:g} % of a sphere's diameter, as the fidelity promises"),
+        Answer("gap of a hinge, mean [m]", theory, mean, 0.01, swings),
+        Answer("gap of a hinge, largest [m]", theory, max(gaps), largest * one.sphere_diameter / theory - 1, promised),
     ]
 
 
@@ -97,12 +88,10 @@ def pull(access: EngineAccess, *, aspect_ratio: float, fidelity: str, largest: f
     "barb hanging on its motor",
     "a straight smarticle, its middle link held, under gravity",
     "torque M = mgl/2, sag M/k, gap mg/k",
-    aspect_ratio=0.7,
-    fidelity="standard",
 )
-def droop(access: EngineAccess, *, aspect_ratio: float, fidelity: str) -> list[Answer]:
+def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard") -> list[Answer]:
     one = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0), torque_limit_N_m=STRONG)
-    # What bears a held link on links acts before the spring looks: (ω dt)²/4 of the sag, 2 % at the step of the scene.
+    # What bears a held link on links acts before the spring: (ω dt)²/4 of the sag, 2 % at the step of the scene.
     dt = None if access.name == "yade" else one.fidelity.control_interval_s / 20
     engine = upright(access, one, gravity=G, dt=dt)
     begun = engine.state().angles
@@ -111,28 +100,24 @@ def droop(access: EngineAccess, *, aspect_ratio: float, fidelity: str) -> list[A
         for _ in drive(engine, one, 0.2, lambda _: begun)
     ]
     # Barbs vibrate about where they hang. Hann's window takes the vibration out.
-    means = np.average(rows, axis=0, weights=np.hanning(len(rows))).reshape(3, 2).mean(axis=1)
+    torque, gap, sag = np.average(rows, axis=0, weights=np.hanning(len(rows))).reshape(3, 2).mean(axis=1)
     mass, _, lever = _barb(one)
-    moment, gap = mass * G * lever, mass * G / access.pin_stiffness(one)
+    moment, expected = mass * G * lever, mass * G / access.pin_stiffness(one)
+    parting, error = (VIBRATION, 0.01) if expected else ("rounding: hinges cannot part", 1e-12)
     return [
-        Answer("torque of a motor [N m]", -moment, float(means[0]), 0.01, reason=VIBRATION),
-        Answer("sag of a barb [rad]", moment / one.motor.stiffness_N_m_per_rad, float(means[2]), 0.01).because(
-            VIBRATION
-        ),
-        Answer("gap of a hinge [m]", gap, float(means[1]), 0.01 if gap else 1e-12, scale=gap or lever).because(
-            VIBRATION if gap else "rounding: hinges cannot part"
-        ),
+        Answer("torque of a motor [N m]", -moment, torque, 0.01, VIBRATION),
+        Answer("sag of a barb [rad]", moment / one.motor.stiffness_N_m_per_rad, sag, 0.01, VIBRATION),
+        Answer("gap of a hinge [m]", expected, gap, error, parting, scale=expected or lever),
     ]
 
 
 @case(
     "barb hanging out of plane",
-    "the same lying, after the barbs have turned through 105°",
+    "a smarticle lies, its middle link held, after the barbs have turned through 105°",
     "tilt M/k of the shaft",
-    absent={"links": "shafts do not tilt: both barbs stay in the plane of the middle link"},
-    sweeps=1,
+    absent=NO_TILT,
 )
-def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
+def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
     """Lying in the air, the middle link held, barbs sweep through 105° a number of times; then they hang out of plane.
 
     Bonds add up their moments step by step and turn them with half of the twist: a tilt that were left to them would be
@@ -152,18 +137,15 @@ def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
     for _ in drive(engine, one, 0.05, lambda _: last):
         normals = engine.state().link_rotations[0, :, :, 2]
         tilts.append(np.cross(normals[1], normals[[0, 2]]))
-    from dem.engine.yade.kind import hinge_law  # noqa: PLC0415 # shafts that tilt are YADE's
-
     mass, _, lever = _barb(one)
     along = engine.state().link_rotations[0, [0, 2], :, 0]
     expected = np.cross(along * lever, [0, 0, -mass * G]) / hinge_law(one).tilt_stiffness
     found = np.average(tilts, axis=0, weights=np.hanning(len(tilts)))
-    size = float(np.linalg.norm(expected[0]))
+    size, angle = float(np.linalg.norm(expected[0])), engine.state().angles[0].mean()
+    worst = size + float(np.abs(found - expected).max())
     return [
-        Answer("angle that was reached [rad]", goal, float(engine.state().angles[0].mean()), 0.03).because(VIBRATION),
-        Answer(
-            "tilt out of the plane, worst component [rad]", size, size + float(np.abs(found - expected).max()), 0.05
-        ).because(VIBRATION),
+        Answer("angle that was reached [rad]", goal, angle, 0.03, VIBRATION),
+        Answer("tilt out of the plane, worst component [rad]", size, worst, 0.05, VIBRATION),
     ]
 
 
@@ -171,14 +153,14 @@ def tilt(access: EngineAccess, *, sweeps: int) -> list[Answer]:
 
 
 def crossings(time: Array, value: Array) -> Array:
-    """Times when a value passes zero [s]."""
+    """Return the times when a value passes zero [s]."""
     (before,) = np.nonzero(np.diff(np.sign(value)))
     found: Array = time[before] - value[before] * np.diff(time)[before] / np.diff(value)[before]
     return found
 
 
-@case("pendulum", "barbs hang from a held middle link, let go at 6°", "2π√(I/mga)(1 + θ²/16)", aspect_ratio=0.7)
-def pendulum(access: EngineAccess, *, aspect_ratio: float) -> list[Answer]:
+@case("pendulum", "barbs hang from a held middle link, let go at 6°", "2π√(I/mga)(1 + θ²/16)")
+def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]:
     one = hinged(
         access, aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG
     )
@@ -191,86 +173,57 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float) -> list[Answer]:
     mass, own, lever = _barb(one)
     amplitude = math.radians(6)
     period = 2 * math.pi * math.sqrt((own + mass * lever**2) / (mass * G * lever)) * (1 + amplitude**2 / 16)
+    soft = "the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for"
+    swing = "the first swing, from where it was let go"
     checks = []
     for barb, sign in ((0, 1), (1, -1)):
         angle = sign * np.array(angles)[:, barb]
+        measured = 2 * float(np.diff(crossings(np.array(times), angle)).mean())
         checks += [
-            Answer(
-                f"period, barb {barb + 1} [s]",
-                period,
-                2 * float(np.diff(crossings(np.array(times), angle)).mean()),
-                2e-3,
-            ).because("the shaft's stiffness is a thousandth of the weight's at most; the amplitude is accounted for"),
-            Answer(f"amplitude, barb {barb + 1} [rad]", amplitude, float(np.abs(angle).max()), 0.01).because(
-                "the first swing, from where it was let go"
-            ),
+            Answer(f"period, barb {barb + 1} [s]", period, measured, 2e-3, soft),
+            Answer(f"amplitude, barb {barb + 1} [rad]", amplitude, np.abs(angle).max(), 0.01, swing),
         ]
     return checks
 
 
-def _free_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
-    """Mass and stiffness matrices of a free U whose barbs turn the same way, (5, 5).
-
-    Coordinates: the middle link along itself and its turn, the barbs' turn, and how far barb 1 has come off its hinge
-    along and across the middle link (barb 2: the same along, the opposite across); these two where pins give way.
-    """
-    boxes = one.smarticle.boxes
-    middle, own_middle = float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2])
-    mass, own, lever = _barb(one)
-    half = boxes.middle_length / 2
-    along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
-    across = np.array([0.0, half, 0.0, 0.0, -1.0])
-    masses = np.diag([middle, own_middle, 2 * own, 0.0, 0.0])
-    masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
-    twist = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
-    if pin == math.inf:
-        masses, twist, pins = masses[:3, :3], twist[:3], np.zeros(3)
-    else:
-        pins = np.array([0, 0, 0, 2 * pin, 2 * pin])
-    return masses, 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist) + np.diag(pins)
-
-
-def _held_matrices(one: Scene, pin: float) -> tuple[Array, Array]:
-    """The same of a barb on a held middle link, (2, 2): its turn, and how far it has come off the hinge across it."""
-    mass, own, lever = _barb(one)
-    shaft = one.motor.stiffness_N_m_per_rad
-    if pin == math.inf:
-        return np.array([[own + mass * lever**2]]), np.array([[shaft]])
-    return np.array([[own + mass * lever**2, mass * lever], [mass * lever, mass]]), np.diag([shaft, pin])
-
-
 def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
-    """Vibration of the barbs on their shafts, above the rigid motions and below the vibrations of the pins.
+    """Compute the vibration of barbs on their shafts, above the rigid motions and below the vibrations of the pins.
+
+    Coordinates of a U whose barbs turn alike: the middle link along itself and its turn, the barbs' turn, and how far
+    barb 1 has come off its hinge along and across the middle link (barb 2: as far along, the opposite across). Only
+    those are free that the pins and a held middle link leave.
 
     Returns:
-        Angular frequency [rad/s], and its shape in the coordinates of the matrices, all five or two of them, for a
-        twist of 1 rad.
+        Angular frequency [rad/s], and its shape (5,) for a twist of 1 rad.
     """
-    masses, stiffness = (_held_matrices if held else _free_matrices)(one, pin)
-    squares, shapes = eigh(stiffness, masses)
-    pins = 0 if pin == math.inf else 1 if held else 2
-    place = len(squares) - 1 - pins
-    shape = np.zeros(2 if held else 5)
-    shape[: len(squares)] = shapes[:, place]
-    return math.sqrt(squares[place]), shape / (shape[0] if held else shape[2] - shape[1])
+    boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
+    along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
+    across = np.array([0.0, boxes.middle_length / 2, 0.0, 0.0, -1.0])
+    masses = np.diag([float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2]), 2 * own, 0.0, 0.0])
+    masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
+    twist, parts = np.array([0.0, -1.0, 1.0, 0.0, 0.0]), pin < math.inf
+    stiffness = 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist)
+    stiffness += np.diag([0, 0, 0, 2 * pin, 2 * pin] if parts else np.zeros(5))
+    pins = [] if not parts else [3] if held else [3, 4]
+    free = [2, *pins] if held else [0, 1, 2, *pins]
+    squares, shapes = eigh(stiffness[np.ix_(free, free)], masses[np.ix_(free, free)])
+    place, shape = len(free) - 1 - len(pins), np.zeros(5)
+    shape[free] = shapes[:, place]
+    return math.sqrt(squares[place]), shape / (shape[2] - shape[1])
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """A U floats in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad."""
+    """Let a U float in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
     frequency, shape = shaft_mode(one, access.pin_stiffness(one), held=held)
-    rates = 0.01 * frequency * shape
     if held:
         access.hold(engine)
-        along, across, middle = -(_barb(one)[2] * rates[0] + rates[1]), 0.0, (0.0, 0.0)
-        turn = rates[0]
-    else:
-        lever, half = _barb(one)[2], one.smarticle.middle_length_m / 2
-        along, across = rates[0] - lever * rates[2] + rates[3], half * rates[1] - rates[4]
-        middle, turn = (rates[0], rates[1]), rates[2]
-    access.swing(engine, ((along, -across, turn), (middle[0], 0.0, middle[1]), (along, across, turn)))
+    middle, spin, turn, off, off_across = 0.01 * frequency * shape
+    along = middle - _barb(one)[2] * turn + off
+    across = one.smarticle.middle_length_m / 2 * spin - off_across
+    access.swing(engine, ((along, -across, turn), (middle, 0.0, spin), (along, across, turn)))
     return engine
 
 
@@ -285,22 +238,20 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
         pass
     turned = np.array(log)[:, 0] - begun[0, 0]
     time: Array = engine.time_step * np.arange(1, len(turned) + 1, dtype=np.float64)
-    frequency, _ = shaft_mode(one, access.pin_stiffness(one), held=held)
+    frequency = shaft_mode(one, access.pin_stiffness(one), held=held)[0] / (2 * math.pi)
+    measured = 0.5 / float(np.diff(crossings(time, turned)).mean())
+    damper = "the damper beside the pin, which theory leaves out, is a quarter as stiff"
+    pins = "the pins' own vibration, which is set going a little"
     return [
-        Answer(
-            "frequency [Hz]", frequency / (2 * math.pi), 0.5 / float(np.diff(crossings(time, turned)).mean()), 3e-3
-        ).because("the damper beside the pin, which theory leaves out, is a quarter as stiff"),
-        Answer("amplitude [rad]", 0.01, float(np.abs(turned).max()), 0.02).because(
-            "the pins' own vibration, which is set going a little"
-        ),
+        Answer("frequency [Hz]", frequency, measured, 3e-3, damper),
+        Answer("amplitude [rad]", 0.01, np.abs(turned).max(), 0.02, pins),
     ]
 
 
 @ladder(
     "barbs on their shafts",
     "an articulated smarticle in space, control period 0.2 ms",
-    "angle of a barb over 10 ms",
-    "rad",
+    "angle of a barb over 10 ms [rad]",
     0.01,
     FINE,
     {
@@ -309,7 +260,7 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     },
 )
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad]."""
+    """Return the error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad]."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import asdict
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.stats import linregress
 
-from validation.case import CASES, LADDERS, Case, Ladder
-from validation.check import Answer
-from validation.conftest import Tables
-from validation.engines import engine_access
-from validation.known import bouncing, clumps, floor, free, hinge, impact, kept
+from dem.physics.contact import damping_ratio, restitution_of
+from validation.access import engine_access
+from validation.cases import CASES, LADDERS, Answer
+from validation.conftest import ON, Tables
+from validation.known import floor, free, hinge, impact, kept
+from validation.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
-assert all((bouncing, free, kept))  # imported to register their cases
+assert all((free, kept))  # imported to register their cases
 
 Call = Callable[..., Any]
 
-ON = [pytest.param("yade", marks=pytest.mark.engine), "links"]
 BAND = 0.3  # an observed order is within this of the scheme's [1]: no order between first and second passes
 
 
@@ -31,26 +31,32 @@ def failed(answers: list[Answer]) -> list[Answer]:
     return [answer for answer in answers if not answer.good]
 
 
+def quantity_and_unit(what: str) -> dict[str, str]:
+    name, _, unit = what.rpartition(" [")
+    return {"quantity": name, "unit": unit.removesuffix("]")}
+
+
 @pytest.mark.parametrize("engine", ON)
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_known_answer(call: Call, tables: Tables, case: Case, engine: str) -> None:
-    if reason := case.absent.get(engine):
-        pytest.skip(f"not applicable: {reason}")
-    answers = call(engine, case.run, engine_access(engine))
+@pytest.mark.parametrize(("name", "run", "about", "theory", "absent"), CASES)
+def test_known_answer(
+    call: Call, tables: Tables, *, name: str, run: Call, about: str, theory: str, absent: dict[str, str], engine: str
+) -> None:
+    if engine in absent:
+        pytest.skip(f"not applicable: {absent[engine]}")
+    answers = call(engine, run, engine_access(engine))
     rows = [
         {
-            "case": case.name,
+            "case": name,
             "engine": engine,
-            "quantity": one.quantity,
-            "unit": one.unit,
+            **quantity_and_unit(one.what),
             "theory [unit]": one.theory,
             "measured [unit]": one.measured,
             "error [1]": one.error,
             "tolerance [1]": one.tolerance,
             "ok": one.good,
             "error relative to [unit]": one.scale or abs(one.theory),
-            "about": case.about,
-            "source": case.theory,
+            "about": about,
+            "source": theory,
             "reason of the tolerance": one.reason,
         }
         for one in answers
@@ -61,78 +67,120 @@ def test_known_answer(call: Call, tables: Tables, case: Case, engine: str) -> No
 
 @pytest.mark.parametrize("engine", ON)
 @pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
-@pytest.mark.parametrize("ladder", LADDERS.values(), ids=LADDERS)
-def test_order_is_the_schemes(call: Call, tables: Tables, ladder: Ladder, size: str, engine: str) -> None:
-    order, why = ladder.scheme[engine]
-    # Short: the second and the last step, a factor of four apart.
-    steps = ladder.steps[1::2] if size == "short" else ladder.steps
-    options = {"phases": ladder.phases} if size == "short" and ladder.phases else {}
-    errors = call(engine, ladder.errors, engine_access(engine), steps, **options)
+@pytest.mark.parametrize(("name", "errors_at", "about", "quantity", "motion", "steps", "scheme", "phases"), LADDERS)
+def test_order_is_the_schemes(
+    call: Call,
+    tables: Tables,
+    *,
+    name: str,
+    errors_at: Call,
+    about: str,
+    quantity: str,
+    motion: float,
+    steps: tuple[float, ...],
+    scheme: dict[str, tuple[int, str]],
+    phases: int | None,
+    size: str,
+    engine: str,
+) -> None:
+    order, why = scheme[engine]
+    if size == "short":
+        steps = steps[1::2]  # the second and the last, a factor of four apart
+    options = {"phases": phases} if size == "short" and phases else {}
+    errors = call(engine, errors_at, engine_access(engine), steps, **options)
     observed = float(linregress(np.log(steps), np.log(np.abs(errors))).slope)
     if size == "long":
-        same = {"ladder": ladder.name, "engine": engine, "quantity": ladder.quantity}
+        parts = quantity_and_unit(quantity)
+        same = {"ladder": name, "engine": engine, "quantity": parts["quantity"]}
         rows = [
-            {**same, "unit": ladder.unit, "time step [s]": step, "error [unit]": error}
+            {**same, "unit": parts["unit"], "time step [s]": step, "error [unit]": error}
             for step, error in zip(steps, errors, strict=True)
         ]
         tables.write(engine, "trajectories", rows, ["ladder"])
         row = {**same, "order of the scheme [1]": order, "order observed [1]": observed, "tolerance [1]": BAND}
-        tables.write(engine, "orders", [{**row, "about": ladder.about, "why": why}], ["ladder"])
+        tables.write(engine, "orders", [{**row, "about": about, "why": why}], ["ladder"])
     assert observed == pytest.approx(order, abs=BAND)
-    assert max(errors) < 0.1 * ladder.size or size == "long"  # the motion itself is resolved
+    assert max(errors) < 0.1 * motion or size == "long"  # the motion itself is resolved
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ON)
 def test_flat_impacts_over_the_number_of_points(call: Call, tables: Tables, engine: str) -> None:
-    impacts = call(engine, clumps.flat_impacts, engine_access(engine))
-    rows = [{"engine": engine, **asdict(one)} for one in impacts]
+    rows = [{"engine": engine, **row} for row in call(engine, floor.flat_impacts, engine_access(engine))]
     tables.write(engine, "clumps", rows, ["engine"])
     # n springs and dashpots side by side: the measured restitution is the integrated one, not the one asked for.
     assert [row["measured"] for row in rows] == pytest.approx([row["theory"] for row in rows], abs=0.02)
 
 
-# Other parameters of the same cases: name, function, options, engines.
-OTHER = [
+BOTH, YADE = ("yade", "links"), ("yade",)
+OTHER: list[tuple[Call, dict[str, Any], tuple[str, ...]]] = [
+    *((run, {"restitution": e}, BOTH) for run in (impact.bar_rebound, impact.bars_rebound) for e in (0.2, 0.9)),
+    *((impact.bar_rebound, {"restitution": e, "resized": True}, BOTH) for e in (0.05, 0.2, 0.8)),
+    *((floor.slide, {"aspect_ratio": aspect, "friction": mu}, BOTH) for aspect, mu in ((0.7, 0.2), (0.3, 0.4))),
     *(
-        (f"{run.__name__}, e = {e:g}", partial(run, restitution=e), "both")
-        for run in (impact.bar_rebound, impact.bars_rebound)
-        for e in (0.2, 0.9)
-    ),
-    *(
-        (f"typical mass, e = {e:g}", partial(impact.bar_rebound, restitution=e, resized=True), "both")
-        for e in (0.05, 0.2, 0.8)
-    ),
-    *(
-        (f"slide, l/w = {aspect:g}, mu = {mu:g}", partial(floor.slide, aspect_ratio=aspect, friction=mu), "both")
-        for aspect, mu in ((0.7, 0.2), (0.3, 0.4))
-    ),
-    *(
-        (
-            f"hinge pulled, {name}, l/w = {aspect:g}",
-            partial(hinge.pull, aspect_ratio=aspect, fidelity=name, largest=most),
-            "yade",
-        )
-        for name, most in (("standard", 0.01), ("draft", 0.03))
-        for aspect in (0.4, 0.7, 1.0)
-    ),
-    *(
-        (f"barb droops, {name}, l/w = {aspect:g}", partial(hinge.droop, aspect_ratio=aspect, fidelity=name), "both")
+        (hinge.droop, {"aspect_ratio": aspect, "fidelity": name}, BOTH)
         for name in ("draft", "standard")
         for aspect in (0.4, 1.0)
     ),
-    ("barb out of plane after three sweeps", partial(hinge.tilt, sweeps=3), "yade"),
-    *((f"pendulum, l/w = {aspect:g}", partial(hinge.pendulum, aspect_ratio=aspect), "both") for aspect in (0.4, 1.0)),
+    *((hinge.pendulum, {"aspect_ratio": aspect}, BOTH) for aspect in (0.4, 1.0)),
+    *(
+        (hinge.pull, {"aspect_ratio": aspect, "fidelity": name, "largest": largest}, YADE)
+        for name, largest in (("standard", 0.01), ("draft", 0.03))
+        for aspect in (0.4, 0.7, 1.0)
+    ),
+    (hinge.tilt, {"sweeps": 3}, YADE),
 ]
+"""Other parameters of the cases: function, options, engines."""
 
 
-@pytest.mark.parametrize(
-    ("run", "engine"),
-    [
-        pytest.param(run, engine, id=f"{name}-{engine}", marks=pytest.mark.engine if engine == "yade" else ())
-        for name, run, engines in OTHER
-        for engine in (("yade",) if engines == "yade" else ("yade", "links"))
-    ],
-)
-def test_other_parameters(call: Call, run: Callable[..., Any], engine: str) -> None:
-    assert failed(call(engine, run, engine_access(engine))) == []
+@pytest.mark.parametrize("engine", ON)
+@pytest.mark.parametrize(("run", "options", "engines"), OTHER, ids=[f"{run.__name__}-{keys}" for run, keys, _ in OTHER])
+def test_other_parameters(
+    call: Call, run: Call, options: dict[str, Any], engines: tuple[str, ...], engine: str
+) -> None:
+    if engine not in engines:
+        pytest.skip("not applicable")
+    assert failed(call(engine, run, engine_access(engine), **options)) == []
+
+
+# -- the theory itself, without an engine ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("measured", "ok"), [(1.009, True), (1.011, False), (0.0, False), (math.nan, False)])
+def test_answer_passes_within_its_tolerance_only(measured: float, ok: bool) -> None:
+    assert Answer("q [m]", 1.0, measured, 0.01).good is ok
+
+
+def test_error_is_relative_to_the_scale_where_theory_is_zero() -> None:
+    assert Answer("q [m]", 0.0, 0.02, 0.01, scale=2.0).error == 0.01
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
+def test_integrated_impact_is_schwagers_and_poeschels(restitution: float) -> None:
+    zeta = damping_ratio(restitution)
+    impact = dashpot_impact(stiffness=500.0, damping=2 * zeta * math.sqrt(500.0 * 2e-4), mass=2e-4)
+    assert impact.restitution == pytest.approx(restitution_of(zeta), rel=1e-6)
+    if restitution == 1:
+        assert impact.duration == pytest.approx(math.pi * math.sqrt(2e-4 / 500), rel=1e-6)
+
+
+def test_bounce_keeps_energy_where_nothing_damps() -> None:
+    way = {"gap": 1e-4, "speed": 0.2, "stiffness": 500.0, "damping": 0.0, "mass": 2.6e-4, "gravity": 9.81}
+    top = 1e-4 + 0.2**2 / (2 * 9.81)
+    heights = [bounced(time=time, **way) for time in np.linspace(0.02, 0.03, 400)]
+    assert max(heights) == pytest.approx(top, rel=1e-5)
+
+
+def test_free_rotation_about_a_principal_axis_is_uniform() -> None:
+    inertia, spin, times = np.array([1.0, 2.0, 3.0]), np.array([0, 0, 2.0]), np.array([0.5, 1.0])
+    rotations, spins = free_rotation(inertia=inertia, start=Rotation.identity(), spin=spin, times=times)
+    assert rotations.as_rotvec() == pytest.approx(np.array([[0, 0, 1.0], [0, 0, 2.0]]), abs=1e-9)
+    assert spins == pytest.approx(np.tile([0, 0, 2.0], (2, 1)))
+
+
+def test_springs_about_the_centre_are_one_spring_of_their_sum() -> None:
+    points, inertia = np.array([[1e-3, 0], [-1e-3, 0], [0, 2e-3], [0, -2e-3]]), np.array([1e-10, 1e-10])
+    after, lasts = falling_on_springs(points, stiffness=100.0, damping=0.02, mass=1e-4, inertia=inertia, speed=0.1)
+    one = dashpot_impact(stiffness=400.0, damping=0.08, mass=1e-4)
+    assert after == pytest.approx([0.1 * one.restitution, 0, 0], rel=2e-3, abs=1e-9)
+    assert lasts == pytest.approx(one.duration, rel=0.01)

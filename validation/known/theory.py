@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,52 +13,14 @@ from scipy.spatial.transform import Rotation
 from validation.bench import Array
 
 
-@dataclass(frozen=True)
-class Impact:
-    """A body on a spring and dashpot that never pulls, thrown at them.
+def _impact(
+    *, stiffness: float, damping: float, mass: float, gravity: float, speed: float, depth: float = 0.0
+) -> tuple[float, float, float]:
+    """Integrate m x'' = −k x − c x' − m g from first touch until the force would pull.
 
-    Args:
-        restitution: speed after over speed before [1].
-        duration: from first touch until the force is zero [s].
+    Returns:
+        Time in contact [s], height over first touch [m] and speed upwards [m/s] at its end.
     """
-
-    restitution: float
-    duration: float
-
-
-def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
-    """Impact of m x'' = −k x − c x' from first touch until the force would pull.
-
-    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007); integrated here.
-    """
-    omega = math.sqrt(stiffness / mass)
-    zeta = damping / (2 * mass * omega)
-
-    def pull(_: float, y: Array) -> float:
-        return float(y[0] + 2 * zeta * y[1])
-
-    pull.terminal, pull.direction = True, -1  # type: ignore[attr-defined]
-    solution = solve_ivp(
-        lambda _, y: [y[1], -y[0] - 2 * zeta * y[1]], (0, 10), [0.0, 1.0], events=pull, rtol=1e-10, atol=1e-12
-    )
-    return Impact(float(-solution.y_events[0][0][1]), float(solution.t_events[0][0]) / omega)
-
-
-def bounced(
-    *, gap: float, speed: float, time: float, stiffness: float, damping: float, mass: float, gravity: float
-) -> float:
-    """Height over that of first touch [m] of a body that falls on a spring and dashpot that never pulls, and bounces.
-
-    Args:
-        gap: free way at t = 0 [m].
-        speed: downwards at t = 0 [m/s].
-        time: after which the body has bounced once [s].
-        stiffness: [N/m].
-        damping: [N s/m].
-        mass: [kg].
-        gravity: [m/s²].
-    """
-    met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
 
     def push(y: Array) -> float:
         return float(-stiffness * y[0] - damping * y[1])
@@ -67,23 +29,56 @@ def bounced(
         return push(y)
 
     parts.terminal, parts.direction = True, -1  # type: ignore[attr-defined]
-    contact = solve_ivp(
+    solution = solve_ivp(
         lambda _, y: [y[1], push(y) / mass - gravity],
-        (met, time),
-        # A little below, so that an elastic contact does not end where it begins.
-        [-1e-12, -speed - gravity * met],
+        (0, 10 * math.sqrt(mass / stiffness)),
+        [-depth, -speed],
         method="DOP853",
         events=parts,
         rtol=1e-12,
         atol=1e-15,
     )
-    left, (height, velocity) = float(contact.t_events[0][0]), contact.y_events[0][0]
-    flight = time - left
-    return float(height + velocity * flight - gravity * flight**2 / 2)
+    height, velocity = solution.y_events[0][0]
+    return float(solution.t_events[0][0]), float(height), float(velocity)
+
+
+class Impact(NamedTuple):
+    """A body on a spring and dashpot that never pulls, thrown at them."""
+
+    restitution: float
+    """Speed after over speed before [1]."""
+    duration: float
+    """From first touch until the force is zero [s]."""
+
+
+def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
+    """Integrate an impact without gravity, whose answer depends on no speed.
+
+    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007); integrated here.
+    """
+    duration, _, velocity = _impact(stiffness=stiffness, damping=damping, mass=mass, gravity=0.0, speed=1.0)
+    return Impact(velocity, duration)
+
+
+def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs: float) -> float:
+    """Return the height of a body that bounced once on a spring and dashpot that never pulls, over first touch [m].
+
+    Args:
+        gap: free way at t = 0 [m].
+        speed: downwards at t = 0 [m/s].
+        time: after which the body has bounced once [s].
+        gravity: [m/s²].
+        springs: stiffness [N/m], damping [N s/m] and mass [kg].
+    """
+    met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
+    # A little below first touch, so that an elastic contact does not end where it begins.
+    contact, height, velocity = _impact(**springs, gravity=gravity, speed=speed + gravity * met, depth=1e-12)
+    flight = time - met - contact
+    return height + velocity * flight - gravity * flight**2 / 2
 
 
 def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Euler's equations of a rigid body without torque.
+    """Integrate Euler's equations of a rigid body without torque.
 
     Args:
         inertia: (3,) principal moments [kg m²].
@@ -108,7 +103,7 @@ def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array)
 def falling_on_springs(
     points: Array, *, stiffness: float, damping: float, mass: float, inertia: NDArray[np.float64], speed: float
 ) -> tuple[Array, float]:
-    """A flat rigid body that falls flat on springs and dashpots under its points; small tilts.
+    """Integrate the fall of a flat rigid body, lying flat, on springs and dashpots under its points; small tilts.
 
     Args:
         points: (n, 2) x and y of the contacts from the centre of mass [m].

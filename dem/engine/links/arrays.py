@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dem.engine.links.shape import Shape
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -13,7 +15,7 @@ Indices = NDArray[np.int32]
 PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
 BINS = 4  # of the search for neighbours, per link
-LEDGER = 12  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.put_down`
+LEDGER = 12  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`
 SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
 
 
@@ -221,6 +223,22 @@ class Rims(NamedTuple):
     radii: Array
 
 
+class Boundaries(NamedTuple):
+    """All boundaries. What a scene lacks is None, and kernels are compiled without it.
+
+    Args:
+        ground: floor and wall, and how all boundaries move.
+        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
+        hooks: None where there are none.
+        rims: None where the wall has no edges that links can reach.
+    """
+
+    ground: Ground
+    channel: Any
+    hooks: Any
+    rims: Any
+
+
 class Cords(NamedTuple):
     """Strings tied to links, k of them.
 
@@ -268,6 +286,7 @@ class Motoring(NamedTuple):
         period: the same in steps.
         targets: (looks, N, 2) angles at the ends of the periods to come according to the schedule [rad].
         due: (2,) the row of `targets` that the next look goes by, and the steps until then; -1: no look is due.
+        jump: (N, 2) by how much the prescribed rates have changed at a control update before the next kick [rad/s].
         over: (N,) how often in a row a barb of each smarticle was found at τ_max, one after the other, for ease.
     """
 
@@ -290,7 +309,58 @@ class Motoring(NamedTuple):
     period: int
     targets: Array
     due: NDArray[np.int64]
+    jump: Array
     over: NDArray[np.int64]
+
+
+class System(NamedTuple):
+    """One simulation, as kernels get it.
+
+    Args:
+        shape: what all smarticles have in common.
+        law: of their contacts.
+        wall_law: of their contacts with boundaries.
+        bodies: the smarticles.
+        pairs: which of their links are near each other.
+        kept: what contacts with boundaries remember.
+        boundaries: floor, wall, hooks, channel.
+        gravity: g, downwards [m/s²].
+        planar: whether all motion is confined to a horizontal plane.
+        skins: see `dem.engine.links.neighbours.lists.update_lists`.
+        motors: None while welded.
+        cords: None where no string is tied.
+        ledger: (n, LEDGER) forces that dissipate, see `dem.engine.links.contact.pairs.enter`; None where nothing asks.
+    """
+
+    shape: Shape
+    law: Law
+    wall_law: Law
+    bodies: Bodies
+    pairs: Pairs
+    kept: Kept
+    boundaries: Boundaries
+    gravity: float
+    planar: bool
+    skins: Array
+    motors: Any
+    cords: Any
+    ledger: Any
+
+
+class Scratch(NamedTuple):
+    """Arrays that are written before they are read.
+
+    Args:
+        cells: of the search for neighbours.
+        met: (ROWS, COLUMNS) of `dem.engine.links.contact.meeting.meet`.
+        contacts: (slots, COLUMNS) of `dem.engine.links.contact.boundaries.contacts_of_link`.
+        plane: (PLANE,) plane geometry of a smarticle.
+    """
+
+    cells: Cells
+    met: Array
+    contacts: Array
+    plane: Array
 
 
 def no_bodies(links: int) -> Bodies:

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.forces import ContactForces
+from dem.body.forces import ContactForces, contacts_of_points
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.interface import Saved
 from dem.engine.links.boundaries import LinksBoundaries, ground_for
+from dem.engine.links.contact import queries
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
-from dem.engine.links.forces import contact_forces
 from dem.engine.links.ledger import LinksLedger
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
@@ -183,14 +183,14 @@ class LinksEngine:
 
     def neighbours(self) -> NDArray[np.int64]:
         """See the interface."""
-        pairs = self._world.look().pairs
+        pairs = self._world.contacts().pairs
         # Two numbers as one: rows are sorted twenty times slower.
         both = np.unique(pairs[:, 0] * self.count + pairs[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
         """See the interface."""
-        return self._world.look().touches
+        return self._world.contacts().touches
 
     def overlaps(self, limit: float) -> Overlaps:
         """Return the contacts, those at boundaries with twice their overlap, since half of the room is left there.
@@ -198,7 +198,7 @@ class LinksEngine:
         Contacts that may have let links pass since the last check count as well. A smarticle that two boundaries hold
         counts as too deep from `HOLDS` on.
         """
-        found, world = self._world.look(), self._world
+        found, world = self._world.contacts(), self._world
         between = world.bodies.deepest.copy()
         world.bodies.deepest[:] = 0.0
         passed = ~(between <= PASSES * self.particle.chain.diameter)
@@ -210,12 +210,21 @@ class LinksEngine:
         return Overlaps(float(depths.max(initial=0.0)), deep, found.elastic_energy, held)
 
     def contact_forces(self) -> ContactForces:
-        """See the interface; those that the next step begins with."""
-        return contact_forces(self._world)
+        """Return the forces that the next step begins with."""
+        rows = self._world.forces()
+        first, second = rows[:, : queries.PRESSED].astype(np.int64).T
+        return contacts_of_points(
+            first,
+            second,
+            loads=rows[:, queries.PRESSED],
+            points=rows[:, queries.POINT : queries.FRICTION],
+            friction=rows[:, queries.FRICTION : queries.WHOLE],
+            forces=rows[:, queries.WHOLE :],
+        )
 
     def glance(self, state: State) -> Glance | None:
         """See the interface; hinges do not give way."""
-        found, bodies = self._world.glance(state.link_velocities), self._world.bodies
+        found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
         diameter = self.particle.chain.diameter
         if not (found[BETWEEN] <= PASSES * diameter and found[DEEPEST] <= HOLDS * diameter):
             return None

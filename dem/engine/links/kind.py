@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numba
 
-from dem.engine.demand import Demand, contact_law_of, motor_law_of
+from dem.engine.demand import Demand, contact_law_of
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.links.adds import ADDS, ORDER
@@ -14,6 +14,7 @@ from dem.engine.links.compiler import stamp
 from dem.engine.links.cost import seconds_per_second
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.stable_step import links_stable_time_step
+from dem.physics.motor import MotorLaw
 
 
 class LinksKind:
@@ -56,6 +57,7 @@ class LinksKind:
 
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
         """See the interface."""
+        motor = scene.motor
         return LinksEngine(
             particle=scene.particle,
             cylinder=scene.cylinder,
@@ -63,7 +65,15 @@ class LinksKind:
             gravity=scene.gravity_m_per_s2,
             time_step=time_step,
             shaken=scene.calls_for(EffectName.CONTAINER_MOTION),
-            motor_law=motor_law_of(scene) if scene.actuates else None,
+            motor_law=MotorLaw(
+                torque_limit=scene.torque_limit,
+                speed_limit=motor.speed_limit_rad_per_s,
+                stiffness=motor.stiffness_N_m_per_rad,
+                law=motor.law,
+                damping=motor.damping_N_m_s_per_rad,
+            )
+            if scene.actuates
+            else None,
             keep_ledger=scene.recording.dissipation_interval_s is not None,
             hooks=None if scene.hooks is None else scene.hooks.crosses,
             channel=scene.channel,

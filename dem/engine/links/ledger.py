@@ -37,7 +37,7 @@ class LinksLedger:
 
     def elastic(self) -> tuple[float, float]:
         """See the interface; hinges have no springs."""
-        return self._world.look().elastic_energy, 0.0
+        return self._world.contacts().elastic_energy, 0.0
 
     def take_in(self) -> None:
         """See the interface."""

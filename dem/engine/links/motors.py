@@ -140,6 +140,7 @@ class LinksMotors:
             period=0,
             targets=np.zeros((1, n, 2)),
             due=np.array([0, -1]),
+            jump=np.zeros((n, 2)),
             over=np.zeros(n, dtype=np.int64),
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ from dem.engine.links.arrays import (
     LEDGER,
     PLANE,
     Bodies,
+    Boundaries,
     Cells,
     Cords,
     Ground,
@@ -27,6 +28,8 @@ from dem.engine.links.arrays import (
     Motoring,
     Pairs,
     Rims,
+    Scratch,
+    System,
     cells_for,
     joined,
     no_bodies,
@@ -34,11 +37,18 @@ from dem.engine.links.arrays import (
 )
 from dem.engine.links.contact import boundaries, meeting
 from dem.engine.links.contact.boundaries import END_SLOTS, slots_for
-from dem.engine.links.contact.queries import glance, look_at_all
+from dem.engine.links.contact.queries import (
+    WIDTH,
+    Found,
+    find_extremes,
+    forces_of_boundaries,
+    forces_of_pairs,
+    query_all,
+)
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
-from dem.engine.links.stepping import PAST, TOTALS, Clock, Scratch, System, advance
+from dem.engine.links.stepping import PAST, TOTALS, Clock, advance
 from dem.errors import refuse
 from dem.physics.contact import ContactLaw
 from dem.setting.hooks import Bar
@@ -256,19 +266,18 @@ class World:
                 self.make_room(int(GROWTH * len(self.pairs.first)))
 
     def _call(self, steps: int) -> int:
-        made: int = advance(
-            steps, Clock(self.begin, self.made, self.time_step), self.system, self.scratch, self.totals,
-            self.hinged, self.channel, self.hooks, self.rims, self.cords, self.ledger,
-        )  # fmt: skip
+        clock = Clock(self.begin, self.made, self.time_step)
+        made: int = advance(steps, clock, self.system, self.scratch, self.totals)
         return made
 
     @property
     def system(self) -> System:
-        """What every simulation has, as kernels want it."""
+        """Everything that kernels read and change."""
         law, wall_law = self.laws
+        boundaries = Boundaries(self.ground, self.channel, self.hooks, self.rims)
         return System(
-            self.shape, law, wall_law, self.bodies, self.pairs, self.kept, self.ground, self.gravity, self.planar,
-            self.skins,
+            self.shape, law, wall_law, self.bodies, self.pairs, self.kept, boundaries, self.gravity, self.planar,
+            self.skins, self.hinged, self.cords, self.ledger,
         )  # fmt: skip
 
     @property
@@ -302,38 +311,45 @@ class World:
         find_links(bodies, self.articulated, places, frames, velocities, spins)
         return State(boxes, places, frames, velocities, spins)
 
-    def look(self) -> Contacts:
-        """All contacts at this instant; nothing of the simulation is changed.
+    def contacts(self) -> Contacts:
+        """Return all contacts at this instant; nothing of the simulation is changed.
 
-        The wide list tells who is near whom. It has room for what the last step has moved, but does not know of
-        smarticles that were added since.
+        The wide list has room for what the last step has moved, but does not have smarticles that were added since.
         """
-        bodies, n = self.posed(), self.count
-        touches, depths, held = np.zeros(n, np.int64), np.zeros(n), np.zeros((n, 6), np.bool_)
-        met = np.zeros((self.pairs.counts[0], 2), np.int32)
-        count, energy = look_at_all(
-            self.shape, bodies, self.pairs, self.ground, self.channel, self.hooks, self.rims, self.laws[0].stiffness,
-            self.laws[1].stiffness, met, touches, held, depths, self.meeting, self.scratch.contacts,
-        )  # fmt: skip
+        self.posed()
+        found = self._room()
+        count, energy = query_all(self.system, found)
         sheared = [self.pairs.slip[: self.pairs.counts[0]], self.kept.slip]
         energy += sum(float(slip[..., 3].sum()) for slip in sheared)
-        return Contacts(met[:count].astype(np.int64), touches, depths, held, energy)
+        return Contacts(found.met[:count].astype(np.int64), found.touches, found.depth, found.held, energy)
 
-    def glance(self, velocities: Array) -> list[float]:
-        """The extremes of all smarticles at the instant of the last `state`, see `queries.glance`.
+    def _room(self) -> Found:
+        n = self.count
+        return Found(
+            np.zeros((self.pairs.counts[0], 2), np.int32), np.zeros(n, np.int64), np.zeros((n, 6), np.bool_),
+            np.zeros(n), self.meeting, self.scratch.contacts,
+        )  # fmt: skip
+
+    def extremes(self, velocities: Array) -> list[float]:
+        """Return the extremes of all smarticles at the instant of the last `state`, see `queries.find_extremes`.
 
         Args:
             velocities: (N, 3, 3) of the links' centres, from that state [m/s].
         """
-        n, found = self.count, np.empty(7)
-        met = np.empty((self.pairs.counts[0], 2), np.int32)
-        glance(
-            self.shape, self.bodies, self.pairs, self.kept, self.ground, self.channel, self.hooks, self.rims,
-            self.laws[0].stiffness, self.laws[1].stiffness, velocities, met, np.zeros(n, np.int64),
-            np.zeros((n, 6), np.bool_), np.zeros(n), self.meeting, self.scratch.contacts, found,
-        )  # fmt: skip
-        extremes: list[float] = found.tolist()
-        return extremes
+        found = np.empty(7)
+        find_extremes(self.system, velocities, self._room(), found)
+        return [float(value) for value in found]
+
+    def forces(self) -> Array:
+        """Return the forces at all points of contact, (P, WIDTH) as `queries` has the columns."""
+        self.posed()
+        system, slip, contacts = self.system, np.zeros(4), self.scratch.contacts
+        return np.concatenate(
+            [
+                _rows(lambda rows: forces_of_pairs(system, self.meeting, slip, rows)),
+                _rows(lambda rows: forces_of_boundaries(system, self.meeting, contacts, slip, rows)),
+            ]
+        )
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
@@ -441,3 +457,11 @@ def longer(array: NDArray[Any], length: int) -> NDArray[Any]:
     """The array with zeros appended up to a length."""
     more = np.zeros((length - len(array), *array.shape[1:]), array.dtype)
     return np.concatenate([array, more])
+
+
+def _rows(write: Callable[[Array], int]) -> Array:
+    """Return what a kernel writes, with as much room as it needs."""
+    rows = np.zeros((256, WIDTH))
+    while (count := write(rows)) > len(rows):
+        rows = np.zeros((count, WIDTH))
+    return rows[:count]

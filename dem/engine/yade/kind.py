@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dem.engine.demand import Demand, contact_law_of, motor_law_of
+from dem.engine.demand import Demand, contact_law_of
 from dem.engine.doing import Doing
 from dem.engine.effect import Adds, EffectName
 from dem.engine.yade.construction import ADDS, in_order
@@ -13,6 +13,7 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
 from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
+from dem.physics.motor import MotorLaw
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
@@ -71,7 +72,7 @@ class YadeKind:
             time_step=time_step,
             shaken=scene.calls_for(EffectName.CONTAINER_MOTION),
             # No damper may relax more than all of its force in a step.
-            hinges=(replace(hinge_law(scene), damper_time=max(DAMPER_TIME, time_step)), motor_law_of(scene))
+            hinges=(replace(hinge_law(scene), damper_time=max(DAMPER_TIME, time_step)), motor_law(scene))
             if scene.actuates
             else None,
             track_work=scene.recording.energies,
@@ -92,4 +93,15 @@ def hinge_law(scene: Demand) -> HingeLaw:
         shaft_stiffness=motor.stiffness_N_m_per_rad,
         torque_cap=scene.torque_limit if motor.law in ("slip", "servo") else None,
         shaft_damping=motor.damping_N_m_s_per_rad,
+    )
+
+
+def motor_law(scene: Demand) -> MotorLaw:
+    """The motors of a scene that actuates."""
+    return MotorLaw(
+        torque_limit=scene.torque_limit,
+        speed_limit=scene.motor.speed_limit_rad_per_s,
+        stiffness=scene.motor.stiffness_N_m_per_rad,
+        law=scene.motor.law,
+        damping=scene.motor.damping_N_m_s_per_rad,
     )

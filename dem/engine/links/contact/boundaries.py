@@ -2,10 +2,10 @@
 
 `contacts_of_link` is the only place that knows their geometry. Forces, queries and recorded contacts read its rows.
 
-A plane, and the inside of a round wall, are met by a straight link with its ends: they tell all. Hinges count once, as
-ends of the middle link. A link meets a round edge with one point. The bars of hooks are swept segments, as links are,
-and meet them as other links do; the force along a link that slides off the end of a bar is left out, less than a
-hundredth of the normal one.
+A plane, and the inside of a round wall, are met by a straight link with its ends: no other point is nearer. Hinges
+count once, as ends of the middle link. A link meets a round edge with one point. The bars of hooks are swept segments,
+as links are, and meet them as other links do; the force along a link that slides off the end of a bar is left out, less
+than a hundredth of the normal one.
 """
 
 from __future__ import annotations
@@ -13,23 +13,41 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, WALL, Array, Bodies, Ground, Hooks, Kept, Law, Rims
+from dem.engine.links.arrays import (
+    CHANNEL,
+    FLOOR,
+    LOWER,
+    WALL,
+    Array,
+    Bodies,
+    Boundaries,
+    Ground,
+    Hooks,
+    Kept,
+    Law,
+    Rims,
+)  # fmt: skip
 from dem.engine.links.compiler import inlined, part
+from dem.engine.links.contact import meeting
 from dem.engine.links.contact.barrier import Step, resolve, stretch
-from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import POINTS, meet
-from dem.engine.links.contact.pairs import push, put_down
+from dem.engine.links.contact.pairs import enter, push, velocity_at
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import Vector, add, along, dot, put, scale, sub, vector
 
 # Columns of a row that `contacts_of_link` writes: place in what contacts remember; the boundary; overlap [m]; share of
 # a whole contact [1]; energy over kn/2 u² [1]; the point on the link's axis [m]; normal, from the boundary [1]; overlap
 # at which axes meet, or an axis and a surface [m].
-SLOT, PART, DEPTH, WEIGHT, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
+SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
 SURFACES = 3  # of an end of a link
 END_SLOTS = 2 * SURFACES
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SAMPLES, TURNS = 8, 32  # places along a link that are tried, and narrowings about the best: to 2e-7 of its length
+
+# Columns and places of `meeting`, which compiled code takes as constants from here.
+MET_PLACE, MET_NORMAL, MET_SHARE, MET_DISTANCE = meeting.PLACE, meeting.NORMAL, meeting.SHARE, meeting.DISTANCE
 
 
 def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
@@ -40,59 +58,60 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 
 @inlined
 def _note(
-    rows: Array, count: int, slot: int, part_of: int, depth: float, room: float,
-    x: float, y: float, z: float, nx: float, ny: float, nz: float,
-) -> int:  # fmt: skip
+    rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
+) -> int:
     """Write a whole contact at a point of an axis; the number of rows."""
     row = rows[count]
-    row[0], row[1], row[2], row[3], row[4] = slot, part_of, depth, 1.0, 1.0
-    row[5], row[6], row[7], row[8], row[9], row[10], row[11] = x, y, z, nx, ny, nz, room
+    row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
+    put(row, AXIS, point)
+    put(row, NORMAL, normal)
     return count + 1
 
 
 @inlined
 def contacts_of_link(
     shape: Shape, segments: Array, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, kind: int, rows: Array,
-    meeting: Array,
+    met: Array,
 ) -> int:  # fmt: skip
     """Find the contacts of a link with all boundaries.
 
     Args:
         shape: what all smarticles have in common.
         segments: (N S, 6) axes of the links [m].
-        ground: the boundaries and where they are.
+        ground: floor and wall, and where all boundaries are.
         channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
         hooks: None where there are none.
         rims: None where the wall has no edges that links can reach.
         p: the link.
         kind: 1 for a middle link; the others are barbs, whose starts are ends of the middle link.
         rows: (slots, COLUMNS) written, see `SLOT`.
-        meeting: scratch of `meet`.
+        met: scratch of `meet`.
 
     Returns:
         Rows that were written.
     """
     radius, count = shape.radius, 0
     for end in range(0 if kind == 1 else 1, 2):
-        x, y, z = segments[p, 0], segments[p, 1], segments[p, 2]
+        point = vector(segments[p], 0)
         if end == 1:
-            x, y, z = x + segments[p, 3], y + segments[p, 4], z + segments[p, 5]
+            point = add(point, vector(segments[p], 3))
+        x, y, z = point
         if channel is not None:
             for side in range(2):
                 inward = 1.0 if side == 0 else -1.0
                 depth = radius - channel[0] - inward * y
                 if depth > 0.0:
                     slot = SURFACES * end + side
-                    count = _note(rows, count, slot, CHANNEL + side, depth, radius, x, y, z, 0.0, inward, 0.0)
+                    count = _note(rows, count, slot, CHANNEL + side, depth, radius, point, (0.0, inward, 0.0))
         else:
             depth = radius - (z - ground.place[FLOOR])
             if depth > 0.0:
-                count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, x, y, z, 0.0, 0.0, 1.0)
+                count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, point, (0.0, 0.0, 1.0))
             inner = ground.radii[ground.radii.shape[0] - 1] - radius
             if ground.flags[0] != 0 and x * x + y * y > inner * inner:
-                count = _contacts_with_wall(radius, ground, SURFACES * end, x, y, z, rows, count)
+                count = _contacts_with_wall(radius, ground, SURFACES * end, point, rows, count)
     if hooks is not None:
-        count = _contacts_with_hooks(radius, segments, ground, hooks, p, rows, count, meeting)
+        count = _contacts_with_hooks(radius, segments, ground, hooks, p, rows, count, met)
     if rims is not None:
         first = END_SLOTS
         if hooks is not None:
@@ -102,10 +121,9 @@ def contacts_of_link(
 
 
 @inlined
-def _contacts_with_wall(
-    radius: float, ground: Ground, slot: int, x: float, y: float, z: float, rows: Array, count: int
-) -> int:
+def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Find the contacts of an end with wall and ceilings; the number of rows."""
+    x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
     if height > ground.top:
@@ -123,16 +141,16 @@ def _contacts_with_wall(
         if lifted and gap < 0.0:
             gap, sign = -gap, 1.0
         if gap < radius:
-            count = _note(rows, count, slot + 1, WALL, radius - gap, radius, x, y, z, sign * ex, sign * ey, 0.0)
+            count = _note(rows, count, slot + 1, WALL, radius - gap, radius, point, (sign * ex, sign * ey, 0.0))
         if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
             edge, above, away = 2, height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
             if away >= 0.0:
-                return _note(rows, count, slot + 2, WALL, radius + above, radius, x, y, z, 0.0, 0.0, -1.0)
+                return _note(rows, count, slot + 2, WALL, radius + above, radius, point, (0.0, 0.0, -1.0))
     if edge:
         distance = math.sqrt(away * away + above * above)
         if 0.0 < distance < radius:
-            nx, ny, nz = ex * away / distance, ey * away / distance, above / distance
-            count = _note(rows, count, slot + edge, WALL, radius - distance, radius, x, y, z, nx, ny, nz)
+            normal = ex * away / distance, ey * away / distance, above / distance
+            count = _note(rows, count, slot + edge, WALL, radius - distance, radius, point, normal)
     return count
 
 
@@ -151,17 +169,17 @@ def _contacts_with_rims(
             squared = _squared(segments[p], s, round_, height)
             if 0.0 < squared < radius * radius and 1e-6 < s < 1 - 1e-6:
                 distance = math.sqrt(squared)
-                x, y = segments[p, 0] + s * segments[p, 3], segments[p, 1] + s * segments[p, 4]
-                up, r = z + s * uz - height, math.sqrt(x * x + y * y)
+                x, y, z_at = along(vector(segments[p], 0), s, vector(segments[p], 3))
+                up, r = z_at - height, math.sqrt(x * x + y * y)
                 out, up = (r - round_) / (r * distance), up / distance
-                depth = radius - distance
-                count = _note(rows, count, first + rim, WALL, depth, radius, x, y, z + s * uz, out * x, out * y, up)
+                depth, normal = radius - distance, (out * x, out * y, up)
+                count = _note(rows, count, first + rim, WALL, depth, radius, (x, y, z_at), normal)
     return count
 
 
 @inlined
 def _contacts_with_hooks(
-    radius: float, segments: Array, ground: Ground, hooks: Hooks, p: int, rows: Array, count: int, meeting: Array
+    radius: float, segments: Array, ground: Ground, hooks: Hooks, p: int, rows: Array, count: int, met: Array
 ) -> int:
     """Find the contacts of a link with the bars of both hooks; the number of rows."""
     reach = radius + hooks.radius
@@ -179,33 +197,32 @@ def _contacts_with_hooks(
                 least = max(min(segments[p, d], segments[p, d] + segments[p, 3 + d]), min(bar[d], bar[d] + bar[3 + d]))
                 most = min(max(segments[p, d], segments[p, d] + segments[p, 3 + d]), max(bar[d], bar[d] + bar[3 + d]))
                 apart |= least - most > reach
-            if apart or meet(segments[p], bar, reach, 1.0, False, False, meeting) == 0:
+            if apart or meet(segments[p], bar, reach, 1.0, False, False, met) == 0:
                 continue
-            share = meeting[0, 8]
+            share = met[0, MET_SHARE]
             for point in range(POINTS):
-                row = meeting[point]
-                if row[8] > 0.0:
-                    half, slot = 0.5 * row[10], END_SLOTS + POINTS * (hook * hooks.bars.shape[1] + k) + point
-                    count = _note(
-                        rows, count, slot, LOWER + hook, reach - row[10], reach,
-                        row[0] + half * row[3], row[1] + half * row[4], row[2] + half * row[5], row[3], row[4], row[5],
-                    )  # fmt: skip
-                    # E = kn/2 u0² (2 - share) goes with the first point; where that has no weight, all are as deep.
+                row = met[point]
+                if row[MET_SHARE] > 0.0:
+                    half, slot = 0.5 * row[MET_DISTANCE], END_SLOTS + POINTS * (hook * hooks.bars.shape[1] + k) + point
+                    normal = vector(row, MET_NORMAL)
+                    place = along(vector(row, MET_PLACE), half, normal)
+                    depth = reach - row[MET_DISTANCE]
+                    count = _note(rows, count, slot, LOWER + hook, depth, reach, place, normal)
+                    # E = kn/2 u0² (2 - share) goes with the first point; where that has no share, all are as deep.
                     written = rows[count - 1]
-                    written[3] = row[8]
+                    written[SHARE] = row[MET_SHARE]
                     if share > 0.0:
-                        written[4] = 2.0 - share if point == 0 else 0.0
+                        written[FACTOR] = 2.0 - share if point == 0 else 0.0
     return count
 
 
 @part
 def contacts_with_boundaries(
-    shape: Shape, segments: Array, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array,
-    meeting: Array,
-) -> int:  # fmt: skip
-    """Find the contacts of a link where nobody is in a hurry; see `contacts_of_link`."""
+    shape: Shape, segments: Array, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
+) -> int:
+    """Find the contacts of a link, compiled apart: for queries, where speed does not matter."""
     kind = shape.kinds[p % shape.kinds.shape[0]]
-    return contacts_of_link(shape, segments, ground, channel, hooks, rims, p, kind, rows, meeting)
+    return contacts_of_link(shape, segments, ground, channel, hooks, rims, p, kind, rows, met)
 
 
 # -- forces ------------------------------------------------------------------------------------------------------
@@ -214,8 +231,8 @@ def contacts_with_boundaries(
 @inlined
 def place_and_motion(
     shape: Shape, bodies: Bodies, ground: Ground, i: int, row: int, contact: Array
-) -> tuple[float, float, float, float, float, float, float, float]:
-    """Where a contact is [m], the velocity of the link there [m/s], the boundary's [m/s] and the turn about the normal.
+) -> tuple[Vector, Vector, float, float]:
+    """Return where a contact is [m], the link's velocity there [m/s], the boundary's [m/s], the link's turn [rad/s].
 
     Args:
         shape: what all smarticles have in common.
@@ -225,23 +242,16 @@ def place_and_motion(
         row: of the link in `Bodies.motion`.
         contact: (COLUMNS,) see `SLOT`.
     """
-    motion, position = bodies.motion, bodies.position
-    arm = shape.radius - 0.5 * contact[2]
-    x, y, z = contact[5] - arm * contact[8], contact[6] - arm * contact[9], contact[7] - arm * contact[10]
-    rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
-    ax, ay, az = motion[row, 3], motion[row, 4], motion[row, 5]
-    vx = motion[row, 0] + ay * rz - az * ry
-    vy = motion[row, 1] + az * rx - ax * rz
-    vz = motion[row, 2] + ax * ry - ay * rx
-    part_of = int(contact[1])
+    normal, part_of = vector(contact, NORMAL), int(contact[PART])
+    place = sub(vector(contact, AXIS), scale(shape.radius - 0.5 * contact[DEPTH], normal))
     speed = ground.speed[part_of] if part_of < CHANNEL else 0.0
-    return x, y, z, vx, vy, vz, speed, ax * contact[8] + ay * contact[9] + az * contact[10]
+    return place, velocity_at(bodies, i, row, place), speed, dot(vector(bodies.motion[row], 3), normal)
 
 
 @part
 def push_boundaries(
-    shape: Shape, law: Law, bodies: Bodies, kept: Kept, ground: Ground, channel: Any, hooks: Any, rims: Any,
-    hinged: Any, ledger: Any, step: Step, rows: Array, meeting: Array,
+    shape: Shape, law: Law, bodies: Bodies, kept: Kept, boundaries: Boundaries, hinged: Any, ledger: Any, step: Step,
+    rows: Array, met: Array,
 ) -> float:  # fmt: skip
     """Add the forces of all boundaries on all links.
 
@@ -250,32 +260,32 @@ def push_boundaries(
         law: of contacts with boundaries.
         bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         kept: what contacts remember; brought up to date.
-        ground: the boundaries; `force` is written.
-        channel: see `contacts_of_link`.
-        hooks: see `contacts_of_link`.
-        rims: see `contacts_of_link`.
+        boundaries: their `force` is written.
         hinged: None while welded.
-        ledger: of forces that dissipate; None where nobody asks.
+        ledger: of forces that dissipate; None where nothing asks.
         step: lengths of time around these forces.
         rows: scratch of `contacts_of_link`.
-        meeting: scratch of `meet`.
+        met: scratch of `meet`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    segments, links, lost, link = bodies.segments, shape.kinds.shape[0], 0.0, -1
+    ground, segments, links, lost, link = boundaries.ground, bodies.segments, shape.kinds.shape[0], 0.0, -1
     each = links * shape.offsets.shape[0]
     for p in range(segments.shape[0]):
         link = link + 1 if link + 1 < links else 0
         kind = shape.kinds[link]
-        count = contacts_of_link(shape, segments, ground, channel, hooks, rims, p, kind, rows, meeting)
+        count = contacts_of_link(
+            shape, segments, ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, kind, rows, met
+        )
         if count == 0 and kept.contacts[p] == 0:
             continue
         i = p // each
         for k in range(count):
             contact = rows[k]
-            _rub(shape, law, bodies, kept, ground, hinged, ledger, step, p, i, kind, contact)
-            kept.used[p, int(contact[0])] |= 2
+            slot = int(contact[SLOT])
+            _rub(shape, law, bodies, ground, hinged, ledger, step, i, kind, contact, kept.slip[p, slot])
+            kept.used[p, slot] |= 2
         for slot in range(kept.used.shape[1]):
             if kept.used[p, slot] == 1:
                 lost += kept.slip[p, slot, 3]
@@ -288,31 +298,32 @@ def push_boundaries(
 
 @inlined
 def _rub(
-    shape: Shape, law: Law, bodies: Bodies, kept: Kept, ground: Ground, hinged: Any, ledger: Any, step: Step,
-    p: int, i: int, kind: int, contact: Array,
+    shape: Shape, law: Law, bodies: Bodies, ground: Ground, hinged: Any, ledger: Any, step: Step, i: int, kind: int,
+    contact: Array, slip: Array,
 ) -> None:  # fmt: skip
     """Let a boundary push a link at a contact."""
     row = i
     if hinged is not None:
         row = 3 * i + kind
-    depth, weight, room, nx, ny, nz = contact[2], contact[3], contact[11], contact[8], contact[9], contact[10]
-    part_of, slip = int(contact[1]), kept.slip[p, int(contact[0])]
-    x, y, z, vx, vy, vz, speed, turning = place_and_motion(shape, bodies, ground, i, row, contact)
+    depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
+    place, velocity, speed, turning = place_and_motion(shape, bodies, ground, i, row, contact)
+    relative = velocity[0], velocity[1], velocity[2] - speed
     u, slope, hardening = stretch(depth, room)
-    load, stored, twist = law.stiffness * u * slope * weight, slip[3], 0.5 * step.past * turning
-    fx, fy, fz = resist(law, load, weight, hardening, nx, ny, nz, vx, vy, vz - speed, twist, step.past, slip)
-    resolve(step, depth, room, (speed - vz) * nz - vx * nx - vy * ny)
+    closing = (speed - velocity[2]) * normal[2] - velocity[0] * normal[0] - velocity[1] * normal[1]
+    load = law.stiffness * u * slope * share * share_of_step(depth, closing, step.past)
+    stored, twist = slip[3], 0.5 * step.past * turning
+    force = resist(law, load, share, hardening, normal, relative, twist, step.past, slip)
+    resolve(step, depth, room, closing)
     # As a share of the room, which is not that of two links.
     bodies.deepest[i] = max(bodies.deepest[i], 2 * shape.radius * depth / room)
     if ledger is not None:
         # The boundary keeps its speed: of the mean of before and after, twice its half.
-        power = 0.5 * (fx * vx + fy * vy + fz * (vz - 2 * speed))
-        put_down(ledger, (row, -1), (i, -1), x, y, z, fx, fy, fz, power, slip[3] - stored)
-    fx, fy, fz = fx + load * nx, fy + load * ny, fz + load * nz
-    push(shape, bodies, i, kind, hinged, x, y, z, fx, fy, fz)
-    ground.force[part_of, 0] -= fx
-    ground.force[part_of, 1] -= fy
-    ground.force[part_of, 2] -= fz
+        power = 0.5 * dot(force, (velocity[0], velocity[1], velocity[2] - 2 * speed))
+        enter(ledger, (row, -1), (i, -1), place, force, power, slip[3] - stored)
+    force = along(force, load, normal)
+    push(bodies, i, kind, hinged, place, force)
+    part_of = int(contact[PART])
+    put(ground.force[part_of], 0, sub(vector(ground.force[part_of], 0), force))
 
 
 # -- a link and a circle -----------------------------------------------------------------------------------------
@@ -320,22 +331,22 @@ def _rub(
 
 @part
 def _squared(link: Array, s: float, radius: float, height: float) -> float:
-    """Squared distance [m²] of a point of a link's axis from a horizontal circle about the z-axis."""
-    x, y, z = link[0] + s * link[3], link[1] + s * link[4], link[2] + s * link[5]
+    """Return the squared distance of a point of a link's axis from a horizontal circle about the z-axis [m²]."""
+    x, y, z = along(vector(link, 0), s, vector(link, 3))
     out, up = math.sqrt(x * x + y * y) - radius, z - height
     return float(out * out + up * up)
 
 
 @part
 def nearest_to_circle(link: Array, radius: float, height: float) -> float:
-    """Parameter in [0, 1] of the point of a link's axis that is nearest to a horizontal circle about the z-axis.
+    """Return where along a link's axis, from 0 to 1, it is nearest to a horizontal circle about the z-axis.
 
     Args:
         link: (6,) start of the axis and vector to its end [m].
         radius: of the circle [m].
         height: of the circle [m].
     """
-    # A line can come near a circle twice: the best of some points tells about which.
+    # A line can come near a circle twice: the best of some points says about which.
     best, least = 0, math.inf
     for k in range(SAMPLES + 1):
         found = _squared(link, k / SAMPLES, radius, height)

@@ -8,8 +8,9 @@ from typing import Any
 from dem.engine.links.arrays import Bodies, Cords
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import Step
-from dem.engine.links.contact.pairs import push
+from dem.engine.links.contact.pairs import push, velocity_at
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import dot, put_more, scale, sub, vector
 
 
 @part
@@ -48,30 +49,23 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) ->
     Returns:
         Power of the strings on the links [W].
     """
-    power, motion, position = 0.0, bodies.motion, bodies.position
+    power = 0.0
     for k in range(cords.along.shape[0]):
         find_knot(shape, bodies, cords, k)
         i, kind = cords.owner[k, 0], cords.owner[k, 1]
         row = i
         if hinged is not None:
             row = 3 * i + kind
-        x, y, z = cords.knot[k, 0], cords.knot[k, 1], cords.knot[k, 2]
-        rx, ry, rz = x - position[i, 0], y - position[i, 1], z - position[i, 2]
-        vx = motion[row, 0] + motion[row, 4] * rz - motion[row, 5] * ry
-        vy = motion[row, 1] + motion[row, 5] * rx - motion[row, 3] * rz
-        vz = motion[row, 2] + motion[row, 3] * ry - motion[row, 4] * rx
-        ex, ey, ez = cords.anchor[k, 0] - x, cords.anchor[k, 1] - y, cords.anchor[k, 2] - z
-        length = math.sqrt(ex * ex + ey * ey + ez * ez)
-        ex, ey, ez = ex / length, ey / length, ez / length
-        rate = ex * (cords.speed[k] - vx) - ey * vy - ez * vz
+        knot = vector(cords.knot[k], 0)
+        velocity, way = velocity_at(bodies, i, row, knot), sub(vector(cords.anchor[k], 0), knot)
+        length = math.sqrt(dot(way, way))
+        x, y, z = way[0] / length, way[1] / length, way[2] / length
+        rate = x * (cords.speed[k] - velocity[0]) - y * velocity[1] - z * velocity[2]
         tension, stretch = 0.0, length - cords.law[0]
         if stretch > 0.0:
             tension = max(0.0, cords.law[1] * stretch + cords.law[2] * rate)
-        fx, fy, fz = tension * ex, tension * ey, tension * ez
-        push(shape, bodies, i, kind, hinged, x, y, z, fx, fy, fz)
-        weight = step.past / step.whole
-        cords.sums[k, 0] += weight * fx
-        cords.sums[k, 1] += weight * fy
-        cords.sums[k, 2] += weight * fz
-        power += fx * vx + fy * vy + fz * vz
+        force = scale(tension, (x, y, z))
+        push(bodies, i, kind, hinged, knot, force)
+        put_more(cords.sums[k], 0, scale(step.past / step.whole, force))
+        power += dot(force, velocity)
     return power

@@ -29,177 +29,159 @@ import math
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import stretch
-from dem.engine.links.contact.nearest import nearest
+from dem.engine.links.vectors import (
+    Lines,
+    Vector,
+    add,
+    along,
+    between,
+    clamp,
+    dot,
+    lines,
+    nearest,
+    put,
+    scale,
+    sub,
+    vector,
+)  # fmt: skip
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
 POINTS, BARE = 3, 6
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
-PX, NX, LOAD, CARRIED, WEIGHT, HARDENING, DISTANCE = 0, 3, 6, 7, 8, 9, 10
-COLUMNS = 11
-
-
-@inlined
-def _clamp(value: float) -> float:
-    return min(1.0, max(0.0, value))
+# Columns of a point: place [m], normal from the second link to the first [1], load of the spring [N], the part of it
+# that friction and dashpot go with [N], share of a whole contact [1] (0: there is no contact), hardening of the dashpot
+# [1], distance of the axes [m]. Of a bare force: place [m], force on the first link [N]. Of the energy: E [J], and the
+# greatest overlap [m].
+PLACE, NORMAL, LOAD, CARRIED, SHARE, HARDENING, DISTANCE, COLUMNS = 0, 3, 6, 7, 8, 9, 10, 11
+FORCE = 3
 
 
 @part
 def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool, out: Array) -> int:
-    """Points of contact of two links, and the springs there.
+    """Find the points of contact of two links, and the springs there.
 
     Args:
         p: (6,) start of the first link's axis and vector to its end [m].
-        q: (6,) the same of the second one.
+        q: (6,) start and vector of the second one [m].
         diameter: of both, or the sum of two radii [m].
         stiffness: kn [N/m].
         bend_p: whether the first link is a barb, which starts at a hinge.
-        bend_q: the same of the second one.
-        out: (ROWS, COLUMNS) written. Rows below POINTS: place [m], normal from the second to the first [1], load of the
-            spring [N], the part of it that friction and dashpot go with [N], share of a whole contact [1], hardening of
-            the dashpot [1], distance of the axes [m]; weight 0: none. Further rows: place [m], force on the first link
-            [N].
-            Row ENERGY: E [J], and the greatest overlap [m].
+        bend_q: whether the second one is.
+        out: (ROWS, COLUMNS) written.
 
     Returns:
         0 where the links are apart, otherwise 1 + the number of rows with bare forces.
     """
-    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    ux, uy, uz, vx, vy, vz = p[3], p[4], p[5], q[3], q[4], q[5]
-    a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
-    d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
-    inverse_a, inverse_c = 1 / a, 1 / c
-    s, t = nearest(a, b, c, d, e, inverse_a, inverse_c)
-    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    squared = x * x + y * y + z * z
+    u, v = vector(p, 3), vector(q, 3)
+    both = lines(p, q, 1 / dot(u, u), 1 / dot(v, v))
+    s, t = nearest(both)
+    gap = between(both, s, t)
+    squared = dot(gap, gap)
     if squared >= diameter * diameter:
         return 0
-    return 1 + meet_at(
-        p, q, diameter, stiffness, bend_p, bend_q, a, b, c, d, e, s, t, inverse_a, inverse_c,
-        x, y, z, math.sqrt(squared), out,
-    )  # fmt: skip
+    return 1 + meet_at(both, s, t, gap, math.sqrt(squared), diameter, stiffness, bend_p, bend_q, out)
 
 
 @inlined
 def meet_at(
-    p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool,
-    a: float, b: float, c: float, d: float, e: float, s: float, t: float,
-    inverse_a: float, inverse_c: float, x: float, y: float, z: float, distance: float, out: Array,
+    both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
+    bend_p: bool, bend_q: bool, out: Array,
 ) -> int:  # fmt: skip
-    """The same for links that touch, whose nearest points are known; the number of rows with bare forces.
+    """Write what `meet` does of links that touch, whose nearest points are known; the number of bare forces.
 
     Args:
-        p: as in `meet`.
-        q: as in `meet`.
-        diameter: as in `meet`.
-        stiffness: as in `meet`.
-        bend_p: as in `meet`.
-        bend_q: as in `meet`.
-        a: u·u, of vectors p + s u and q + t v along the links, see `nearest_on_segments`.
-        b: u·v.
-        c: v·v.
-        d: u·(p - q).
-        e: v·(p - q).
+        both: the links.
         s: of the nearest point of the first link.
-        t: of that of the second one.
-        inverse_a: 1 / (u·u).
-        inverse_c: 1 / (v·v).
-        x: from the second nearest point to the first [m].
-        y: the same.
-        z: the same.
+        t: of the nearest point of the second one.
+        gap: from the second nearest point to the first [m].
         distance: of the two [m].
-        out: as in `meet`.
+        diameter: of both, or the sum of two radii [m].
+        stiffness: kn [N/m].
+        bend_p: whether the first link is a barb.
+        bend_q: whether the second one is.
+        out: (ROWS, COLUMNS) written.
     """
     deepest = diameter - distance
     u, slope, hardening = stretch(deepest, diameter)
-    _note(out, 0, p, q, s, t, x, y, z, distance, stiffness * u * slope, 1.0, hardening)
-    out[1, WEIGHT] = out[2, WEIGHT] = 0.0
+    _note(out, 0, both, s, t, gap, distance, stiffness * u * slope, 1.0, hardening)
+    out[1, SHARE] = out[2, SHARE] = 0.0
     out[ENERGY, 0], out[ENERGY, 1] = 0.5 * stiffness * u * u, deepest
-    bare = _lie_along(p, q, a, b, d, e, inverse_a, inverse_c, deepest, u, slope, diameter, stiffness, out)
+    bare = _lie_along(both, deepest, u, slope, diameter, stiffness, out)
     if bend_p:
-        bare = _hinge(p, q, diameter, stiffness, True, _clamp(e * inverse_c), -1.0, bare, out)
+        bare = _hinge(both, diameter, stiffness, 0.0, clamp(both.e * both.inverse_c), -1.0, bare, out)
         if bend_q:
-            bare = _hinge(p, q, diameter, stiffness, True, 0.0, 1.0, bare, out)
+            bare = _hinge(both, diameter, stiffness, 0.0, 0.0, 1.0, bare, out)
     if bend_q:
-        bare = _hinge(p, q, diameter, stiffness, False, _clamp(-d * inverse_a), -1.0, bare, out)
+        bare = _hinge(both, diameter, stiffness, clamp(-both.d * both.inverse_a), 0.0, -1.0, bare, out)
     return bare
 
 
 @inlined
-def meets_elsewhere(
-    p: Array, q: Array, reach: float, bend_p: bool, bend_q: bool,
-    a: float, b: float, c: float, d: float, e: float, inverse_a: float, inverse_c: float,
-) -> int:  # fmt: skip
-    """Number of places besides the nearest points at which `meet_at` would find forces; 0 for most links that touch.
+def meets_elsewhere(both: Lines, reach: float, bend_p: bool, bend_q: bool) -> int:
+    """Count places besides the nearest points at which `meet_at` would find forces; 0 for most links that touch.
 
     Without a branch: what links do at their ends and hinges cannot be predicted, and a branch that is mispredicted
     takes as long as all of this. The numbers are those of `_lie_along` and `_hinge`, bit for bit.
 
     Args:
-        p: as in `meet_at`.
-        q: as in `meet_at`.
+        both: the links.
         reach: square of the diameter [m²].
-        bend_p: as in `meet_at`.
-        bend_q: as in `meet_at`.
-        a: as in `meet_at`.
-        b: as in `meet_at`.
-        c: as in `meet_at`.
-        d: as in `meet_at`.
-        e: as in `meet_at`.
-        inverse_a: as in `meet_at`.
-        inverse_c: as in `meet_at`.
+        bend_p: whether the first link is a barb.
+        bend_q: whether the second one is.
     """
-    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    start, end = -d * inverse_a, (b - d) * inverse_a
-    # Rounding keeps their order: b < 0 where the end is the lower one. Not -0, whose sign would tell.
+    b, d, e = both.b, both.d, both.e
+    start, end = -d * both.inverse_a, (b - d) * both.inverse_a
+    # Rounding keeps their order: b < 0 where the end is the lower one. Not -0, whose sign would count.
     lower, upper = min(start, end), max(start, end)
     lower_t = 0.5 - math.copysign(0.5, b + 0.0)
     upper_t = 1.0 - lower_t
-    of_start, of_end = _clamp(e * inverse_c), _clamp((b + e) * inverse_c)
+    of_start, of_end = clamp(e * both.inverse_c), clamp((b + e) * both.inverse_c)
     s1, t1 = 0.0 if lower <= 0.0 else lower, of_start if lower <= 0.0 else lower_t
     s2, t2 = 1.0 if upper >= 1.0 else upper, of_end if upper >= 1.0 else upper_t
-    first = _squared(wx + s1 * p[3] - t1 * q[3], wy + s1 * p[4] - t1 * q[4], wz + s1 * p[5] - t1 * q[5])
-    second = _squared(wx + s2 * p[3] - t2 * q[3], wy + s2 * p[4] - t2 * q[4], wz + s2 * p[5] - t2 * q[5])
-    along = (upper > 0.0) & (lower < 1.0) & (first < reach) & (second < reach)
+    first, second = _square(between(both, s1, t1)), _square(between(both, s2, t2))
+    lie = (upper > 0.0) & (lower < 1.0) & (first < reach) & (second < reach)
     # The hinge of the first link at the second one, that of the second at the first one, one hinge at the other.
-    of_p = _squared(wx - of_start * q[3], wy - of_start * q[4], wz - of_start * q[5])
-    s = _clamp(start)
-    of_q = _squared(p[0] + s * p[3] - q[0], p[1] + s * p[4] - q[1], p[2] + s * p[5] - q[2])
-    both = _squared(wx, wy, wz)
+    of_p = _square(sub(both.w, scale(of_start, both.v)))
+    of_q = _square(sub(along(both.p, clamp(start), both.u), both.q))
+    hinges = _square(both.w)
     return (
-        int(along) + int(bend_p & (of_p < reach)) + int(bend_q & (of_q < reach)) + int(bend_p & bend_q & (both < reach))
+        int(lie) + int(bend_p & (of_p < reach)) + int(bend_q & (of_q < reach)) + int(bend_p & bend_q & (hinges < reach))
     )
 
 
 @inlined
-def _squared(x: float, y: float, z: float) -> float:
-    return x * x + y * y + z * z
+def _square(a: Vector) -> float:
+    return dot(a, a)
+
+
+@inlined
+def _halfway(both: Lines, s: float, t: float) -> Vector:
+    """Return the point half way between p + s u and q + t v [m]."""
+    return scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
 
 
 @inlined
 def _note(
-    out: Array, k: int, p: Array, q: Array, s: float, t: float,
-    x: float, y: float, z: float, distance: float, load: float, weight: float, hardening: float,
+    out: Array, k: int, both: Lines, s: float, t: float, gap: Vector, distance: float, load: float, share: float,
+    hardening: float,
 ) -> None:  # fmt: skip
     """Write a point: half way between the two axes."""
     row = out[k]
-    row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
-    row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
-    row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
-    inverse = 1 / distance
-    row[3], row[4], row[5] = x * inverse, y * inverse, z * inverse
-    row[6] = row[7] = load
-    row[WEIGHT], row[HARDENING], row[DISTANCE] = weight, hardening, distance
+    put(row, PLACE, _halfway(both, s, t))
+    put(row, NORMAL, scale(1 / distance, gap))
+    row[LOAD] = row[CARRIED] = load
+    row[SHARE], row[HARDENING], row[DISTANCE] = share, hardening, distance
 
 
 @inlined
 def _lie_along(
-    p: Array, q: Array, a: float, b: float, d: float, e: float, inverse_a: float, inverse_c: float,
-    deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array,
-) -> int:  # fmt: skip
+    both: Lines, deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array
+) -> int:
     """Add what the two ends of the stretch carry over which links lie along each other; the number of bare forces."""
+    b, d, e = both.b, both.d, both.e
     # Where on the first link, in its lengths, are the second one's ends?
-    start, end = -d * inverse_a, (b - d) * inverse_a
+    start, end = -d * both.inverse_a, (b - d) * both.inverse_a
     lower, upper, lower_t, upper_t = start, end, 0.0, 1.0
     if b < 0.0:
         lower, upper, lower_t, upper_t = end, start, 1.0, 0.0
@@ -208,33 +190,30 @@ def _lie_along(
     own_lower, own_upper = lower <= 0.0, upper >= 1.0
     s1, s2, t1, t2 = lower, upper, lower_t, upper_t
     if own_lower:
-        s1, t1 = 0.0, _clamp(e * inverse_c)
+        s1, t1 = 0.0, clamp(e * both.inverse_c)
     if own_upper:
-        s2, t2 = 1.0, _clamp((b + e) * inverse_c)
-    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    x1, y1, z1 = wx + s1 * p[3] - t1 * q[3], wy + s1 * p[4] - t1 * q[4], wz + s1 * p[5] - t1 * q[5]
-    first = x1 * x1 + y1 * y1 + z1 * z1
-    x2, y2, z2 = wx + s2 * p[3] - t2 * q[3], wy + s2 * p[4] - t2 * q[4], wz + s2 * p[5] - t2 * q[5]
-    second = x2 * x2 + y2 * y2 + z2 * z2
+        s2, t2 = 1.0, clamp((b + e) * both.inverse_c)
+    gap1, gap2 = between(both, s1, t1), between(both, s2, t2)
+    first, second = _square(gap1), _square(gap2)
     if max(first, second) >= diameter * diameter:
         return 0
     first, second = math.sqrt(first), math.sqrt(second)
     # No deeper than the deepest, whatever the rounding.
     u1, slope1, hardening1 = stretch(min(diameter - first, deepest), diameter)
     u2, slope2, hardening2 = stretch(min(diameter - second, deepest), diameter)
-    length = math.sqrt(a)
-    along = (s2 - s1) * length / diameter
+    length = math.sqrt(both.a)
+    reach = (s2 - s1) * length / diameter
     grown, growth = 1.0, 0.0
-    if along < 1.0:
-        grown, growth = along * along * (3 - 2 * along), 6 * along * (1 - along) / diameter
+    if reach < 1.0:
+        grown, growth = reach * reach * (3 - 2 * reach), 6 * reach * (1 - reach) / diameter
     inverse = 1 / u
     x, y = (u1 * inverse) ** 2, (u2 * inverse) ** 2
     share = 1 - grown * x * y
-    out[0, 6] = out[0, 7] = stiffness * u * slope * share
+    out[0, LOAD] = out[0, CARRIED] = stiffness * u * slope * share
     out[ENERGY, 0] *= 2 - share
-    out[0, 8] = share
-    _note(out, 1, p, q, s1, t1, x1, y1, z1, first, stiffness * grown * u1 * slope1 * y, grown * y, hardening1)
-    _note(out, 2, p, q, s2, t2, x2, y2, z2, second, stiffness * grown * u2 * slope2 * x, grown * x, hardening2)
+    out[0, SHARE] = share
+    _note(out, 1, both, s1, t1, gap1, first, stiffness * grown * u1 * slope1 * y, grown * y, hardening1)
+    _note(out, 2, both, s2, t2, gap2, second, stiffness * grown * u2 * slope2 * x, grown * x, hardening2)
     if growth == 0.0:
         return 0
     bare, push = 0, 0.5 * stiffness * (u1 * u2 / u) ** 2 * growth / length
@@ -242,41 +221,35 @@ def _lie_along(
         own, t, sign = (own_upper, t2, 1.0) if upper_end else (own_lower, t1, -1.0)
         if not own:
             # Only ends of the second link count: an end of the first one moves with the direction that ℓ is along.
-            row = out[POINTS + bare]
-            for k in range(3):
-                row[k], row[3 + k] = q[k] + t * q[3 + k], sign * push * p[3 + k]
+            put(out[POINTS + bare], PLACE, along(both.q, t, both.v))
+            put(out[POINTS + bare], FORCE, scale(sign * push, both.u))
             bare += 1
     return bare
 
 
 @inlined
 def _hinge(
-    p: Array, q: Array, diameter: float, stiffness: float, of_first: bool, other: float, sign: float,
-    bare: int, out: Array,
-) -> int:  # fmt: skip
+    both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
+) -> int:
     """Take off (sign -1) or add the contact of a hinge with a point of the other link; the number of bare forces."""
-    s, t = (0.0, other) if of_first else (other, 0.0)
-    x, y, z = p[0] + s * p[3] - q[0] - t * q[3], p[1] + s * p[4] - q[1] - t * q[4], p[2] + s * p[5] - q[2] - t * q[5]
-    squared = x * x + y * y + z * z
+    gap = sub(sub(along(both.p, s, both.u), both.q), scale(t, both.v))
+    squared = dot(gap, gap)
     if squared >= diameter * diameter:
         return bare
     distance = math.sqrt(squared)
     u, slope, _ = stretch(diameter - distance, diameter)
     load = sign * stiffness * u * slope
     out[ENERGY, 0] += 0.5 * sign * stiffness * u * u
-    row = out[POINTS + bare]
-    row[0] = 0.5 * (p[0] + s * p[3] + q[0] + t * q[3])
-    row[1] = 0.5 * (p[1] + s * p[4] + q[1] + t * q[4])
-    row[2] = 0.5 * (p[2] + s * p[5] + q[2] + t * q[5])
-    push = load / distance
-    row[3], row[4], row[5] = push * x, push * y, push * z
-    # Friction and dashpots go with what is left: taken from the point that is nearest, and added to the same.
+    place = _halfway(both, s, t)
+    put(out[POINTS + bare], PLACE, place)
+    put(out[POINTS + bare], FORCE, scale(load / distance, gap))
+    # Friction and dashpots go with what is left: taken from the point that is nearest, and added to it.
     rest = -load
     for _ in range(POINTS):
         best, least = -1, math.inf
         for k in range(POINTS):
-            if out[k, WEIGHT] > 0.0 and out[k, CARRIED] > 0.0:
-                away = (out[k, 0] - row[0]) ** 2 + (out[k, 1] - row[1]) ** 2 + (out[k, 2] - row[2]) ** 2
+            if out[k, SHARE] > 0.0 and out[k, CARRIED] > 0.0:
+                away = _square(sub(vector(out[k], PLACE), place))
                 if away < least:
                     best, least = k, away
         if best < 0:

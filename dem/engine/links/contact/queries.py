@@ -1,41 +1,76 @@
-"""What is asked of the contacts at one instant: who touches whom, and what their springs hold."""
+"""What is asked of the contacts at one instant: which smarticles touch, extremes, energies, and forces for output.
+
+Nothing of the simulation changes. The wide list must be good for the instant. Forces are those that the next step
+begins with, but for the stretch that tangential springs gain in that step: the same geometry and the same law, over no
+time and on copies of the springs. What acts without friction along a link, or takes back what a hinge has twice, goes
+with the points of its pair.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Ground, Indices, Kept, Pairs
-from dem.engine.links.compiler import kernel, part
+from dem.engine.links.arrays import Array, Bodies, Boundaries, Indices, Kept, Pairs, System
+from dem.engine.links.compiler import inlined, kernel, part
+from dem.engine.links.contact import boundaries as rows_of
 from dem.engine.links.contact.barrier import stretch
-from dem.engine.links.contact.boundaries import DEPTH, FACTOR, PART, ROOM, contacts_with_boundaries
-from dem.engine.links.contact.meeting import ENERGY, POINTS, meet
+from dem.engine.links.contact.boundaries import contacts_with_boundaries, place_and_motion
+from dem.engine.links.contact.law import resist
+from dem.engine.links.contact.meeting import (
+    CARRIED,
+    ENERGY,
+    FORCE,
+    HARDENING,
+    LOAD,
+    NORMAL,
+    PLACE,
+    POINTS,
+    SHARE,
+    meet,
+)  # fmt: skip
+from dem.engine.links.contact.pairs import motion_at
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import Vector, along, dot, put, scale, sub, vector
 
-FASTEST, LOWEST, HIGHEST, WIDEST, DEEPEST, BETWEEN, ELASTIC = range(7)  # places in what `glance` finds
+FASTEST, LOWEST, HIGHEST, WIDEST, DEEPEST, BETWEEN, ELASTIC = range(7)  # places in what `find_extremes` writes
+
+# Columns of a recorded point: both bodies as `dem.body.forces.at_links` and `at_boundaries` number them, normal force
+# [N], point [m], tangential force and the whole one on the first body [N].
+FIRST, SECOND, PRESSED, POINT, FRICTION, WHOLE, WIDTH = 0, 1, 2, 3, 6, 9, 12
+
+# Columns of `boundaries`, which compiled code takes as constants from here.
+SLOT, PART, DEPTH, FACTOR, ROOM, AT, PARTLY = (
+    rows_of.SLOT, rows_of.PART, rows_of.DEPTH, rows_of.FACTOR, rows_of.ROOM, rows_of.NORMAL, rows_of.SHARE,
+)  # fmt: skip
+
+
+class Found(NamedTuple):
+    """What a query of all contacts writes.
+
+    Args:
+        met: (P, 2) numbers of the smarticles whose links touch, in order.
+        touches: (N,) points of contact of each smarticle; added to.
+        held: (N, 6) whether each smarticle touches each boundary.
+        depth: (N,) deepest contact of each smarticle [m]; at a boundary the equal share of the room in which axis and
+            surface meet.
+        out: scratch of `meet`.
+        rows: scratch of `contacts_of_link`.
+    """
+
+    met: Indices
+    touches: Any
+    held: Any
+    depth: Array
+    out: Array
+    rows: Array
 
 
 @part
-def look_at_pairs(
-    shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, met: Indices, touches: Any, depth: Array, out: Array
-) -> tuple[int, float]:
-    """Look at all pairs of links that the wide list holds, which must be good for this instant.
-
-    Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles, posed.
-        pairs: the list.
-        stiffness: kn [N/m].
-        met: (P, 2) written: numbers of the smarticles whose links touch, in order.
-        touches: (N,) points of contact of each smarticle; added to.
-        depth: (N,) deepest contact of each smarticle [m]; brought up to date.
-        out: scratch of `meet`.
-
-    Returns:
-        Rows of `met` that were written, and the energy of all normal springs [J].
-    """
+def _query_pairs(shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
+    """Query all pairs of the wide list; rows of `met` that were written, and the energy of all normal springs [J]."""
     links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
-    diameter, count, energy = 2 * shape.radius, 0, 0.0
+    diameter, count, energy, out = 2 * shape.radius, 0, 0.0, found.out
     for k in range(pairs.counts[0]):
         p, q = pairs.first[k], pairs.second[k]
         bend_p, bend_q = shape.kinds[p % links] != 1, shape.kinds[q % links] != 1
@@ -44,108 +79,98 @@ def look_at_pairs(
         energy += out[ENERGY, 0]
         i, j, points = p // each, q // each, 0
         for slot in range(POINTS):
-            if out[slot, 8] > 0.0 and out[slot, 7] > 0.0:
+            if out[slot, SHARE] > 0.0 and out[slot, CARRIED] > 0.0:
                 points += 1
         if points == 0:
             continue
-        met[count, 0], met[count, 1] = i, j
+        found.met[count, 0], found.met[count, 1] = i, j
         count += 1
         for body in (i, j):
-            touches[body] += points
-        overlap = out[ENERGY, 1]
-        depth[i], depth[j] = max(depth[i], overlap), max(depth[j], overlap)
+            found.touches[body] += points
+            found.depth[body] = max(found.depth[body], out[ENERGY, 1])
     return count, energy
 
 
 @part
-def look_at_boundaries(
-    shape: Shape, bodies: Bodies, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float,
-    touches: Any, held: Any, depth: Array, out: Array, rows: Array,
-) -> float:  # fmt: skip
-    """Look at all contacts with boundaries.
-
-    Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles, posed.
-        ground: the boundaries.
-        channel: (1,) half the distance of the walls of a channel [m]; None for a container.
-        hooks: None where there are none.
-        rims: None where the wall has none.
-        stiffness: kn [N/m].
-        touches: (N,) points of contact of each smarticle; added to.
-        held: (N, 6) whether each smarticle touches each part; written.
-        depth: (N,) deepest contact of each smarticle [m]; brought up to date. At a boundary the same
-            share of the room in which axes, or axis and surface, meet.
-        out: scratch of `meet`.
-        rows: scratch.
-
-    Returns:
-        Energy of all normal springs [J].
-    """
+def _query_boundaries(shape: Shape, bodies: Bodies, boundaries: Boundaries, stiffness: float, found: Found) -> float:
+    """Query all contacts with boundaries; the energy of all normal springs [J]."""
     segments, each, squares = bodies.segments, shape.kinds.shape[0] * shape.offsets.shape[0], 0.0
     for p in range(segments.shape[0]):
         i = p // each
-        for k in range(contacts_with_boundaries(shape, segments, ground, channel, hooks, rims, p, rows, out)):
-            contact = rows[k]
-            touches[i] += 1
-            held[i, int(contact[PART])] = True
-            depth[i] = max(depth[i], 2 * shape.radius * contact[DEPTH] / contact[ROOM])
+        count = contacts_with_boundaries(
+            shape, segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, found.rows,
+            found.out,
+        )  # fmt: skip
+        for k in range(count):
+            contact = found.rows[k]
+            found.touches[i] += 1
+            found.held[i, int(contact[PART])] = True
+            found.depth[i] = max(found.depth[i], 2 * shape.radius * contact[DEPTH] / contact[ROOM])
             u, _, _ = stretch(contact[DEPTH], contact[ROOM])
             squares += u * u * contact[FACTOR]
     return 0.5 * stiffness * squares
 
 
 @kernel
-def look_at_all(
-    shape: Shape, bodies: Bodies, pairs: Pairs, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float,
-    wall_stiffness: float, met: Indices, touches: Any, held: Any, depth: Array, out: Array, rows: Array,
-) -> tuple[int, float]:  # fmt: skip
-    """Look at all contacts; see `look_at_pairs` and `look_at_boundaries`.
+def query_all(system: System, found: Found) -> tuple[int, float]:
+    """Query all contacts.
+
+    Args:
+        system: the simulation, posed.
+        found: written.
 
     Returns:
         Rows of `met` that were written, and the energy of all normal springs [J].
     """
-    count, energy = look_at_pairs(shape, bodies, pairs, stiffness, met, touches, depth, out)
-    energy += look_at_boundaries(
-        shape, bodies, ground, channel, hooks, rims, wall_stiffness, touches, held, depth, out, rows
-    )
+    count, energy = _query_pairs(system.shape, system.bodies, system.pairs, system.law.stiffness, found)
+    energy += _query_boundaries(system.shape, system.bodies, system.boundaries, system.wall_law.stiffness, found)
     return count, energy
 
 
 @kernel
-def glance(
-    shape: Shape, bodies: Bodies, pairs: Pairs, kept: Kept, ground: Ground, channel: Any, hooks: Any, rims: Any,
-    stiffness: float, wall_stiffness: float, velocities: Array, met: Indices, touches: Any, held: Any, depth: Array,
-    out: Array, rows: Array, found: Array,
-) -> None:  # fmt: skip
-    """Find the extremes of all smarticles in one call, which is what a watchdog asks as long as nothing is wrong.
+def find_extremes(system: System, velocities: Array, found: Found, extremes: Array) -> None:
+    """Find the extremes of all smarticles in one call, which is what a watchdog needs as long as nothing is wrong.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles, posed.
-        pairs: as in `look_at_pairs`.
-        kept: what contacts with boundaries remember.
-        ground: the boundaries.
-        channel: as in `look_at_boundaries`.
-        hooks: the same.
-        rims: the same.
-        stiffness: kn between smarticles [N/m].
-        wall_stiffness: kn with boundaries [N/m].
+        system: the simulation, posed.
         velocities: (N, 3, 3) of the links' centres [m/s].
-        met: scratch.
-        touches: scratch.
-        held: scratch.
-        depth: zeros; scratch.
-        out: scratch.
-        rows: scratch.
-        found: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis [m];
-            distance of the farthest one from the vertical axis [m]; deepest contact now and between two looks [m];
-            energy of all springs of contacts [J]. A speed that is no number makes the first one no number.
+        found: scratch, with zeros as depths.
+        extremes: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis
+            [m]; distance of the farthest one from the vertical axis [m]; deepest contact now and between two queries
+            [m]; energy of all springs of contacts [J]. A speed that is no number makes the first one no number.
     """
-    _, energy = look_at_pairs(shape, bodies, pairs, stiffness, met, touches, depth, out)
-    energy += look_at_boundaries(
-        shape, bodies, ground, channel, hooks, rims, wall_stiffness, touches, held, depth, out, rows
-    )
+    bodies, pairs, kept = system.bodies, system.pairs, system.kept
+    _, energy = _query_pairs(system.shape, bodies, pairs, system.law.stiffness, found)
+    energy += _query_boundaries(system.shape, bodies, system.boundaries, system.wall_law.stiffness, found)
+    energy += _sheared(pairs, kept)
+    fastest, total = 0.0, 0.0
+    for i in range(velocities.shape[0]):
+        for link in range(3):
+            velocity = vector(velocities[i, link], 0)
+            square = dot(velocity, velocity)
+            total += square
+            fastest = max(fastest, square)
+    lowest, highest, widest = math.inf, -math.inf, 0.0
+    segments = bodies.segments
+    for p in range(segments.shape[0]):
+        for end in range(2):
+            x, y, z = along(vector(segments[p], 0), end, vector(segments[p], 3))
+            lowest, highest, widest = min(lowest, z), max(highest, z), max(widest, x * x + y * y)
+    deepest, between = 0.0, 0.0
+    for i in range(found.depth.shape[0]):
+        deepest = max(deepest, found.depth[i])
+        # One that is no number must not be lost in the comparison.
+        between = bodies.deepest[i] if not bodies.deepest[i] <= between else between
+        total += bodies.deepest[i]
+    extremes[FASTEST] = fastest**0.5 if math.isfinite(total) else math.nan
+    extremes[LOWEST], extremes[HIGHEST], extremes[WIDEST] = lowest, highest, widest**0.5
+    extremes[DEEPEST], extremes[BETWEEN], extremes[ELASTIC] = deepest, between, energy
+
+
+@inlined
+def _sheared(pairs: Pairs, kept: Kept) -> float:
+    """Return the energy of all tangential springs [J]."""
+    energy = 0.0
     for k in range(pairs.counts[0]):
         if pairs.used[k]:
             for slot in range(pairs.slip.shape[1]):
@@ -154,26 +179,117 @@ def glance(
         if kept.contacts[p]:
             for slot in range(kept.slip.shape[1]):
                 energy += kept.slip[p, slot, 3]
-    fastest, total = 0.0, 0.0
-    for i in range(velocities.shape[0]):
-        for link in range(3):
-            x, y, z = velocities[i, link, 0], velocities[i, link, 1], velocities[i, link, 2]
-            square = x * x + y * y + z * z
-            total += square
-            fastest = max(fastest, square)
-    lowest, highest, widest = math.inf, -math.inf, 0.0
-    segments = bodies.segments
+    return energy
+
+
+# -- forces for output -------------------------------------------------------------------------------------------
+
+
+@inlined
+def _write(
+    rows: Array, count: int, first: float, second: float, load: float, carried: float, place: Vector, normal: Vector,
+    force: Vector,
+) -> int:  # fmt: skip
+    """Write one point where there is room; `count` + 1.
+
+    Args:
+        rows: (…, WIDTH).
+        count: place.
+        first: what touches.
+        second: what is touched.
+        load: of the spring [N].
+        carried: the part of it that dashpot and friction go with [N].
+        place: the point [m].
+        normal: of the contact [1].
+        force: beyond the spring's [N].
+    """
+    if count < rows.shape[0]:
+        row, pressing = rows[count], dot(force, normal)
+        row[FIRST], row[SECOND], row[PRESSED] = first, second, max(0.0, carried + pressing)
+        put(row, POINT, place)
+        put(row, FRICTION, sub(force, scale(pressing, normal)))
+        put(row, WHOLE, along(force, load, normal))
+    return count + 1
+
+
+@inlined
+def _copy(slip: Array, kept: Array) -> None:
+    for d in range(4):
+        slip[d] = kept[d]
+
+
+@kernel
+def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int:
+    """Write the forces of smarticles on each other.
+
+    Args:
+        system: the simulation, posed.
+        out: scratch of `meet`.
+        slip: (4,) scratch.
+        rows: (…, WIDTH) written.
+
+    Returns:
+        Rows that were written, or would have been: there may be more than there is room for.
+    """
+    shape, law, bodies, pairs = system.shape, system.law, system.bodies, system.pairs
+    links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
+    diameter, count = 2 * shape.radius, 0
+    for k in range(pairs.counts[0]):
+        p, q = pairs.first[k], pairs.second[k]
+        i, j, kind_p, kind_q = p // each, q // each, shape.kinds[p % links], shape.kinds[q % links]
+        met = meet(bodies.segments[p], bodies.segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
+        if met == 0:
+            continue
+        first, second = 3 * i + kind_p, 3 * j + kind_q
+        for slot in range(POINTS):
+            row = out[slot]
+            share, load, carried = row[SHARE], row[LOAD], row[CARRIED]
+            if share <= 0.0:
+                continue
+            place, normal, force = vector(row, PLACE), vector(row, NORMAL), (0.0, 0.0, 0.0)
+            if carried > 0.0:
+                moves = (first, second) if bodies.motion.shape[0] > bodies.position.shape[0] else (i, j)
+                velocity, _ = motion_at(bodies, (i, j), moves, place, normal)
+                _copy(slip, pairs.slip[k, slot])
+                share = share if carried == load else share * carried / load
+                force = resist(law, carried, share, row[HARDENING], normal, velocity, 0.0, 0.0, slip)
+            count = _write(rows, count, first, second, load, carried, place, normal, force)
+        for bare in range(POINTS, POINTS + met - 1):
+            # A spring's, without a normal of its own: nothing of it is friction.
+            place, force = vector(out[bare], PLACE), vector(out[bare], FORCE)
+            count = _write(rows, count, first, second, 0.0, 0.0, place, (0.0, 0.0, 0.0), force)
+            if count <= rows.shape[0]:
+                rows[count - 1, FRICTION:WHOLE] = 0.0
+    return count
+
+
+@kernel
+def forces_of_boundaries(system: System, out: Array, contacts: Array, slip: Array, rows: Array) -> int:
+    """Write the forces of boundaries on smarticles; see `forces_of_pairs`.
+
+    Args:
+        system: the simulation, posed.
+        out: scratch of `meet`.
+        contacts: scratch of `contacts_of_link`.
+        slip: (4,) scratch.
+        rows: (…, WIDTH) written.
+    """
+    shape, law, bodies, boundaries = system.shape, system.wall_law, system.bodies, system.boundaries
+    segments, links, count = bodies.segments, shape.kinds.shape[0], 0
     for p in range(segments.shape[0]):
-        for end in range(2):
-            x, y = segments[p, 0] + end * segments[p, 3], segments[p, 1] + end * segments[p, 4]
-            z = segments[p, 2] + end * segments[p, 5]
-            lowest, highest, widest = min(lowest, z), max(highest, z), max(widest, x * x + y * y)
-    deepest, between = 0.0, 0.0
-    for i in range(depth.shape[0]):
-        deepest = max(deepest, depth[i])
-        # One that is no number must not be lost in the comparison.
-        between = bodies.deepest[i] if not bodies.deepest[i] <= between else between
-        total += bodies.deepest[i]
-    found[FASTEST] = fastest**0.5 if math.isfinite(total) else math.nan
-    found[LOWEST], found[HIGHEST], found[WIDEST] = lowest, highest, widest**0.5
-    found[DEEPEST], found[BETWEEN], found[ELASTIC] = deepest, between, energy
+        i, kind = p // (links * shape.offsets.shape[0]), shape.kinds[p % links]
+        moves = 3 * i + kind if bodies.motion.shape[0] > bodies.position.shape[0] else i
+        number = contacts_with_boundaries(
+            shape, segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, contacts, out
+        )
+        for k in range(number):
+            contact = contacts[k]
+            share, normal = contact[PARTLY], vector(contact, AT)
+            place, velocity, speed, _ = place_and_motion(shape, bodies, boundaries.ground, i, moves, contact)
+            relative = velocity[0], velocity[1], velocity[2] - speed
+            _copy(slip, system.kept.slip[p, int(contact[SLOT])])
+            u, slope, hardening = stretch(contact[DEPTH], contact[ROOM])
+            load = law.stiffness * u * slope * share
+            force = resist(law, load, share, hardening, normal, relative, 0.0, 0.0, slip)
+            count = _write(rows, count, 3 * i + kind, -1 - contact[PART], load, load, place, normal, force)
+    return count

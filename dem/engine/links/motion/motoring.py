@@ -80,14 +80,13 @@ def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 @kernel
 def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
-    _note_some(bodies, motors, motors.elapsed[0], 0, bodies.position.shape[0])
-    motors.elapsed[0] = 0.0
+    _note(bodies, motors)
 
 
 @inlined
-def _note_some(bodies: Bodies, motors: Motoring, elapsed: float, begin: int, stop: int) -> None:
-    """The same for smarticles from `begin` up to `stop`, a time [s] after the last look."""
-    for i in range(begin, stop):
+def _note(bodies: Bodies, motors: Motoring) -> None:
+    elapsed = motors.elapsed[0]
+    for i in range(bodies.position.shape[0]):
         row = bodies.plane[i]
         turn_axes(bodies, i)
         normal = along_normal(bodies, i)
@@ -105,6 +104,7 @@ def _note_some(bodies: Bodies, motors: Motoring, elapsed: float, begin: int, sto
             motors.begun[i, k] = bodies.alpha[i, k]
             if motors.law < SLIP:
                 motors.momentum[i, k] = p[k]
+    motors.elapsed[0] = 0.0
 
 
 @kernel
@@ -134,18 +134,10 @@ def look(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
         bodies: the smarticles; `rate` is written.
         motors: written.
     """
-    now = min(motors.due[0], motors.targets.shape[0] - 1)
+    now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
-    look_some(bodies, motors, now, motors.elapsed[0], 0, bodies.position.shape[0])
-    motors.elapsed[0] = 0.0
-
-
-@inlined
-def look_some(bodies: Bodies, motors: Motoring, now: int, elapsed: float, begin: int, stop: int) -> None:
-    """The same for smarticles from `begin` up to `stop`, by row `now`, a time [s] after the last look."""
-    interval = motors.interval
-    _note_some(bodies, motors, elapsed, begin, stop)
-    for i in range(begin, stop):
+    _note(bodies, motors)
+    for i in range(bodies.position.shape[0]):
         r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
         for k in range(2):
             target = motors.targets[now, i, k]
@@ -160,6 +152,8 @@ def look_some(bodies: Bodies, motors: Motoring, now: int, elapsed: float, begin:
         if motors.law < SLIP:
             row, normal = bodies.plane[i], along_normal(bodies, i)
             p = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+            motors.jump[i, 0] += bodies.rate[i, 0] - r1
+            motors.jump[i, 1] += bodies.rate[i, 1] - r2
             motors.work[i, 0] += 0.5 * (r1 + bodies.rate[i, 0]) * (p[0] - motors.momentum[i, 0])
             motors.work[i, 1] += 0.5 * (r2 + bodies.rate[i, 1]) * (p[1] - motors.momentum[i, 1])
             motors.momentum[i, 0], motors.momentum[i, 1] = p[0], p[1]

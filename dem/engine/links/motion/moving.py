@@ -14,14 +14,16 @@ from typing import Any
 from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
+from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import along, dot, vector
 
 
 @part
-def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, dt: float) -> None:
+def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, past: float, dt: float) -> None:
     """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
@@ -30,7 +32,8 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         gravity: g, downwards [m/s²].
         planar: whether all motion is confined to a horizontal plane.
-        dt: time over which they act [s].
+        past: length of the last sub-step [s].
+        dt: time over which they act [s], half of the last and half of the next sub-step.
     """
     velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
     share, across = dt / shape.mass, 0.0 if planar else 1.0
@@ -49,6 +52,10 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
             if motors.law < SLIP:
                 motors.impulse[i, 0] += dt * q1
                 motors.impulse[i, 1] += dt * q2
+                # Half a sub-step of these forces went along the rates before the control update.
+                motors.work[i, 0] += 0.5 * past * q1 * motors.jump[i, 0]
+                motors.work[i, 1] += 0.5 * past * q2 * motors.jump[i, 1]
+                motors.jump[i, 0] = motors.jump[i, 1] = 0.0
             else:
                 row, normal = bodies.plane[i], along_normal(bodies, i)
                 p1, p2 = motors.momentum[i, 0] + dt * q1, motors.momentum[i, 1] + dt * q2
@@ -96,18 +103,14 @@ def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, s
 @part
 def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
     """Greatest speed of an end of a link's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
-    links, position, segments, motion = shape.kinds.shape[0], bodies.position, bodies.segments, bodies.motion
-    each, most = links * shape.offsets.shape[0], 0.0
+    links, segments, most = shape.kinds.shape[0], bodies.segments, 0.0
+    each = links * shape.offsets.shape[0]
     for p in range(each * i, each * (i + 1)):
         row = 3 * i + shape.kinds[p % links] if hinged else i
         for end in range(2):
-            x = segments[p, 0] + end * segments[p, 3] - position[i, 0]
-            y = segments[p, 1] + end * segments[p, 4] - position[i, 1]
-            z = segments[p, 2] + end * segments[p, 5] - position[i, 2]
-            vx = motion[row, 0] + motion[row, 4] * z - motion[row, 5] * y
-            vy = motion[row, 1] + motion[row, 5] * x - motion[row, 3] * z
-            vz = motion[row, 2] + motion[row, 3] * y - motion[row, 4] * x
-            most = max(most, vx * vx + vy * vy + vz * vz)
+            place = along(vector(segments[p], 0), end, vector(segments[p], 3))
+            velocity = velocity_at(bodies, i, row, place)
+            most = max(most, dot(velocity, velocity))
     return math.sqrt(most)
 
 

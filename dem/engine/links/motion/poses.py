@@ -8,6 +8,7 @@ from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, kernel
 from dem.engine.links.motion.planar import rates, spin_of
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import moving, put, put_more, vector
 
 SLIP = 3  # laws of motors from here on leave the angles free
 
@@ -115,13 +116,7 @@ def pose(shape: Shape, bodies: Bodies, hinged: Any) -> None:
             `rate` where angles are free.
         hinged: the motors; None while welded: then no barb moves by itself.
     """
-    pose_some(shape, bodies, hinged, 0, bodies.position.shape[0])
-
-
-@inlined
-def pose_some(shape: Shape, bodies: Bodies, hinged: Any, begin: int, stop: int) -> None:
-    """The same for the smarticles from `begin` up to `stop`."""
-    for i in range(begin, stop):
+    for i in range(bodies.position.shape[0]):
         turn_axes(bodies, i)
         if hinged is not None and hinged.law >= SLIP:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]
@@ -159,10 +154,6 @@ def find_links(bodies: Bodies, hinged: bool, places: Array, frames: Array, veloc
                 frames[i, k, d, 2] = axes[i, d, 2]
                 places[i, k, d] = axes[i, d, 0] * x + axes[i, d, 1] * y
                 spins[i, k, d] = motion[row, 3 + d]
-            rx, ry, rz = places[i, k, 0], places[i, k, 1], places[i, k, 2]
-            wx, wy, wz = spins[i, k, 0], spins[i, k, 1], spins[i, k, 2]
-            velocities[i, k, 0] = motion[row, 0] + wy * rz - wz * ry
-            velocities[i, k, 1] = motion[row, 1] + wz * rx - wx * rz
-            velocities[i, k, 2] = motion[row, 2] + wx * ry - wy * rx
-            for d in range(3):
-                places[i, k, d] += bodies.position[i, d]
+            arm, spin = vector(places[i, k], 0), vector(spins[i, k], 0)
+            put(velocities[i, k], 0, moving(vector(motion[row], 0), spin, arm))
+            put_more(places[i, k], 0, vector(bodies.position[i], 0))

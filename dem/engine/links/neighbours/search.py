@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Indices, Pairs
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.contact.nearest import nearest
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import between, cross, dot, lines, nearest, sub, vector
 
 FEW = 3000  # links; up to so many the list is in the order of their numbers
 SKIN, INVERSE = 6, 7  # places in a row of `Cells.lines`
@@ -48,32 +48,20 @@ class Grid(NamedTuple):
 
 @inlined
 def off_lines(segments: Array, p: int, q: int, reach: float) -> bool:
-    """Whether the lines that two axes are on are farther apart than `reach` [m]; without a division."""
-    ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
-    vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
-    wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    across = wx * nx + wy * ny + wz * nz
-    return bool(across * across > reach * reach * (nx * nx + ny * ny + nz * nz))
+    """Return whether the lines that two axes are on are farther apart than `reach` [m]; without a division."""
+    one, other = segments[p], segments[q]
+    normal = cross(vector(one, 3), vector(other, 3))
+    across = dot(sub(vector(one, 0), vector(other, 0)), normal)
+    return bool(across * across > reach * reach * dot(normal, normal))
 
 
 @inlined
 def near_each_other(segments: Array, p: int, q: int, reach: float, inverse_p: float, inverse_q: float) -> bool:
-    """Whether two axes, of known inverse squares of their lengths [1/m²], are nearer than `reach` [m]."""
-    ux, uy, uz = segments[p, 3], segments[p, 4], segments[p, 5]
-    vx, vy, vz = segments[q, 3], segments[q, 4], segments[q, 5]
-    wx, wy, wz = segments[p, 0] - segments[q, 0], segments[p, 1] - segments[q, 1], segments[p, 2] - segments[q, 2]
-    s, t = nearest(
-        ux * ux + uy * uy + uz * uz,
-        ux * vx + uy * vy + uz * vz,
-        vx * vx + vy * vy + vz * vz,
-        ux * wx + uy * wy + uz * wz,
-        vx * wx + vy * wy + vz * wz,
-        inverse_p,
-        inverse_q,
-    )
-    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    return bool(x * x + y * y + z * z < reach * reach)
+    """Return whether two axes, of known inverse squared lengths [1/m²], are nearer than `reach` [m]."""
+    both = lines(segments[p], segments[q], inverse_p, inverse_q)
+    s, t = nearest(both)
+    gap = between(both, s, t)
+    return bool(dot(gap, gap) < reach * reach)
 
 
 @part
@@ -92,21 +80,28 @@ def search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float
         Their number, or -1 where there is no room.
     """
     count = cells.marks.shape[0]
-    x0, x1, y0, y1, tallest = corners(cells.marks, bare, 0, count)
+    x0, x1, y0, y1, tallest = corners(cells.marks, bare)
     grid = grid_over(x0, x1, y0, y1, tallest, bare, piece, cells.starts.shape[0] - 2)
-    find_bins(cells, grid, 0, count)
+    find_bins(cells, grid)
     sort_bins(cells, grid)
-    draw_boxes(shape, bodies, pairs, cells, grid, 0, count)
-    number = find_pairs(pairs, cells, grid, 0, count, 0, cells.lower.shape[0])
+    draw_boxes(shape, bodies, pairs, cells, grid)
+    number = find_pairs(pairs, cells, grid)
     if number < 0:
         return -1
     for p in range(count + 2):
         cells.rows[p] = 0
     for k in range(number):
         cells.rows[cells.places[cells.lower[k]] + 2] += 1
-    begin_rows(cells)
+    # Lengths of rows, each at its number + 2, become where rows begin, one place further down.
+    for row in range(count):
+        cells.rows[row + 2] += cells.rows[row + 1]
     for k in range(number):
-        put_in_row(cells, k)
+        # A row's end moves to where it belongs, as rows fill.
+        p = cells.lower[k]
+        row = cells.places[p]
+        place = cells.rows[row + 1]
+        cells.rows[row + 1] = place + 1
+        cells.first[place], cells.second[place] = p, cells.upper[k]
     return number
 
 
@@ -124,10 +119,10 @@ def _box(marks: Array, p: int, d: int, more: float) -> tuple[float, float]:
 
 
 @inlined
-def corners(marks: Array, bare: float, begin: int, stop: int) -> tuple[float, float, float, float, float]:
-    """Bounds along x and y of the lower corners of the boxes of links from `begin` up to `stop`; tallest along y."""
+def corners(marks: Array, bare: float) -> tuple[float, float, float, float, float]:
+    """Bounds along x and y of the lower corners of the boxes of all links, and the tallest along y [m]."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
-    for p in range(begin, stop):
+    for p in range(marks.shape[0]):
         low, high = _box(marks, p, 0, 0.5 * bare)
         x0, x1 = min(x0, low), max(x1, low)
         low, high = _box(marks, p, 1, 0.5 * bare)
@@ -145,9 +140,9 @@ def grid_over(x0: float, x1: float, y0: float, y1: float, tallest: float, bare: 
 
 
 @inlined
-def find_bins(cells: Cells, grid: Grid, begin: int, stop: int) -> None:
-    """Write the bins of links from `begin` up to `stop` into `keys`."""
-    for p in range(begin, stop):
+def find_bins(cells: Cells, grid: Grid) -> None:
+    """Write the bins of all links into `keys`."""
+    for p in range(cells.keys.shape[0]):
         x, _ = _box(cells.marks, p, 0, 0.5 * grid.bare)
         y, _ = _box(cells.marks, p, 1, 0.5 * grid.bare)
         strip = _bin(y - grid.y, grid.width, grid.strips - 1)
@@ -174,10 +169,10 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 
 @inlined
-def draw_boxes(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int) -> None:
-    """Write what is asked of the links at places from `begin` up to `stop` of `order`, and which rows they get."""
+def draw_boxes(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid) -> None:
+    """Write what the search needs of the links, in `order`, and which rows they get."""
     few = cells.keys.shape[0] <= FEW
-    for m in range(begin, stop):
+    for m in range(cells.keys.shape[0]):
         p = cells.order[m]
         cells.places[p] = p if few else m
         for d in range(6):
@@ -215,28 +210,25 @@ def _boxed(
 
 
 @part
-def find_pairs(pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, number: int, capacity: int) -> int:
-    """Write the pairs that links at places from `begin` up to `stop` of `order` find into `lower` and `upper`.
+def find_pairs(pairs: Pairs, cells: Cells, grid: Grid) -> int:
+    """Write all pairs into `lower` and `upper`.
 
     Args:
-        pairs: tells owners.
+        pairs: has the owners.
         cells: sorted, and boxes drawn.
         grid: the bins.
-        begin: the first place.
-        stop: the one after the last.
-        number: where the first pair is to be written.
-        capacity: the place after the last that there is room for.
 
     Returns:
-        The place after the last pair, or -1 where there is no room.
+        Their number, or -1 where there is no room.
     """
-    lines, starts, keys, order, boxes = cells.lines, cells.starts, cells.keys, cells.order, cells.boxes
+    number, capacity = 0, cells.lower.shape[0]
+    rows, starts, keys, order, boxes = cells.lines, cells.starts, cells.keys, cells.order, cells.boxes
     owner, close, lower, upper = pairs.owner, cells.close, cells.lower, cells.upper
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
-    for m in range(begin, stop):
+    for m in range(keys.shape[0]):
         p = order[m]
         ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
-        own, mine, skin = owner[p], keys[p] // nx, grid.bare + lines[m, SKIN]
+        own, mine, skin = owner[p], keys[p] // nx, grid.bare + rows[m, SKIN]
         column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
         boxed = 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
@@ -249,29 +241,12 @@ def find_pairs(pairs: Pairs, cells: Cells, grid: Grid, begin: int, stop: int, nu
         for k in range(boxed):
             n = close[k]
             close[hits] = n
-            hits += not (off_lines(lines, m, n, skin + lines[n, SKIN]) | (owner[order[n]] == own))
+            hits += not (off_lines(rows, m, n, skin + rows[n, SKIN]) | (owner[order[n]] == own))
         if number + hits > capacity:
             return -1
         for k in range(hits):
             n = close[k]
             q = order[n]
             lower[number], upper[number] = min(p, q), max(p, q)
-            number += near_each_other(lines, m, n, skin + lines[n, SKIN], lines[m, INVERSE], lines[n, INVERSE])
+            number += near_each_other(rows, m, n, skin + rows[n, SKIN], rows[m, INVERSE], rows[n, INVERSE])
     return number
-
-
-@inlined
-def begin_rows(cells: Cells) -> None:
-    """Turn lengths of rows, each at its number + 2, into where rows begin, one place further down."""
-    for row in range(cells.keys.shape[0]):
-        cells.rows[row + 2] += cells.rows[row + 1]
-
-
-@inlined
-def put_in_row(cells: Cells, k: int) -> None:
-    """Write a pair that was found where it belongs in the list; a row's end moves to where it belongs, as rows fill."""
-    p = cells.lower[k]
-    row = cells.places[p]
-    place = cells.rows[row + 1]
-    cells.rows[row + 1] = place + 1
-    cells.first[place], cells.second[place] = p, cells.upper[k]

@@ -12,99 +12,63 @@ import math
 from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.shape import Shape
+from dem.engine.links.vectors import Vector, add, dot, moving, put, sub, vector
 
 
 @part
 def moved(bodies: Bodies, marks: Array, centres: Array) -> bool:
-    """Whether an end of a link has moved by more than the link's skin since `marks` were taken, apart from the mean.
+    """Return whether an end of a link has moved by more than the link's skin since `marks` were taken.
 
     Args:
         bodies: the smarticles.
         marks: (N S, 7) starts and ends of all links then, and their skins [m].
-        centres: (N, 3) centres of mass then [m].
+        centres: (N, 3) centres of mass then [m]; their mean move does not count.
     """
-    n = bodies.position.shape[0]
-    x, y, z = moves(bodies, centres, 0, n)
-    return moved_beyond(bodies, marks, x / n, y / n, z / n, 0, bodies.segments.shape[0])
-
-
-@inlined
-def moves(bodies: Bodies, centres: Array, begin: int, stop: int) -> tuple[float, float, float]:
-    """Sum of the moves of smarticles from `begin` up to `stop` away from `centres` (N, 3) [m]."""
-    position = bodies.position
-    x, y, z = 0.0, 0.0, 0.0
-    for i in range(begin, stop):
-        x += position[i, 0] - centres[i, 0]
-        y += position[i, 1] - centres[i, 1]
-        z += position[i, 2] - centres[i, 2]
-    return x, y, z
-
-
-@inlined
-def moved_beyond(bodies: Bodies, marks: Array, x: float, y: float, z: float, begin: int, stop: int) -> bool:
-    """Whether one of the links from `begin` up to `stop` has moved beyond its skin, apart from the mean (x, y, z)."""
-    segments = bodies.segments
-    over = False
-    for p in range(begin, stop):
-        ax, ay, az = segments[p, 0] - x, segments[p, 1] - y, segments[p, 2] - z
-        start = (ax - marks[p, 0]) ** 2 + (ay - marks[p, 1]) ** 2 + (az - marks[p, 2]) ** 2
-        ax, ay, az = ax + segments[p, 3], ay + segments[p, 4], az + segments[p, 5]
-        end = (ax - marks[p, 3]) ** 2 + (ay - marks[p, 4]) ** 2 + (az - marks[p, 5]) ** 2
+    mean, segments = (0.0, 0.0, 0.0), bodies.segments
+    n, over = bodies.position.shape[0], False
+    for i in range(n):
+        mean = add(mean, sub(vector(bodies.position[i], 0), vector(centres[i], 0)))
+    mean = mean[0] / n, mean[1] / n, mean[2] / n
+    for p in range(segments.shape[0]):
+        at = sub(vector(segments[p], 0), mean)
+        start = _square(sub(at, vector(marks[p], 0)))
+        end = _square(sub(add(at, vector(segments[p], 3)), vector(marks[p], 3)))
         over |= max(start, end) > marks[p, 6] * marks[p, 6]
     return over
 
 
+@inlined
+def _square(a: Vector) -> float:
+    return a[0] ** 2 + a[1] ** 2 + a[2] ** 2
+
+
 @part
 def mark(shape: Shape, bodies: Bodies, marks: Array, centres: Array, least: float, most: float, time: float) -> None:
-    """Take note of where all links are, and give each a skin, see `moved`; both arrays are written.
+    """Write down where all links are, and give each a skin.
 
     Args:
         shape: what all smarticles have in common.
         bodies: the smarticles.
-        marks: (N S, 7).
-        centres: (N, 3).
+        marks: (N S, 7) written, see `moved`.
+        centres: (N, 3) written.
         least: the thinnest skin [m].
         most: the thickest skin [m].
         time: for which a skin is to be good at the present speed [s].
     """
-    n = bodies.position.shape[0]
-    x, y, z = mark_centres(bodies, centres, 0, n)
-    mark_links(shape, bodies, marks, least, most, time, x / n, y / n, z / n, 0, n)
-
-
-@inlined
-def mark_centres(bodies: Bodies, centres: Array, begin: int, stop: int) -> tuple[float, float, float]:
-    """Take note of where smarticles from `begin` up to `stop` are; the sum of their velocities [m/s]."""
-    position, velocity = bodies.position, bodies.velocity
-    x, y, z = 0.0, 0.0, 0.0
-    for i in range(begin, stop):
-        x, y, z = x + velocity[i, 0], y + velocity[i, 1], z + velocity[i, 2]
-        for d in range(3):
-            centres[i, d] = position[i, d]
-    return x, y, z
-
-
-@part
-def mark_links(
-    shape: Shape, bodies: Bodies, marks: Array, least: float, most: float, time: float,
-    x: float, y: float, z: float, begin: int, stop: int,
-) -> None:  # fmt: skip
-    """Take note of where the links of some smarticles are and give each a skin, see `mark`; (x, y, z) is the mean."""
-    segments, position, velocity, spin = bodies.segments, bodies.position, bodies.velocity, bodies.spin
-    each = shape.kinds.shape[0] * shape.offsets.shape[0]
-    for p in range(each * begin, each * stop):
-        for d in range(3):
-            marks[p, d] = segments[p, d]
-            marks[p, 3 + d] = segments[p, d] + segments[p, 3 + d]
+    segments, each = bodies.segments, shape.kinds.shape[0] * shape.offsets.shape[0]
+    n, mean = bodies.position.shape[0], (0.0, 0.0, 0.0)
+    for i in range(n):
+        mean = add(mean, vector(bodies.velocity[i], 0))
+        put(centres[i], 0, vector(bodies.position[i], 0))
+    mean = mean[0] / n, mean[1] / n, mean[2] / n
+    for p in range(segments.shape[0]):
+        start = vector(segments[p], 0)
+        put(marks[p], 0, start)
+        put(marks[p], 3, add(start, vector(segments[p], 3)))
         i = p // each
-        wx, wy, wz = spin[i, 0], spin[i, 1], spin[i, 2]
         fastest = 0.0
         for end in range(2):
-            rx = marks[p, 3 * end] - position[i, 0]
-            ry = marks[p, 3 * end + 1] - position[i, 1]
-            rz = marks[p, 3 * end + 2] - position[i, 2]
-            vx = velocity[i, 0] - x + wy * rz - wz * ry
-            vy = velocity[i, 1] - y + wz * rx - wx * rz
-            vz = velocity[i, 2] - z + wx * ry - wy * rx
-            fastest = max(fastest, vx * vx + vy * vy + vz * vz)
+            arm = sub(vector(marks[p], 3 * end), vector(bodies.position[i], 0))
+            velocity = moving(sub(vector(bodies.velocity[i], 0), mean), vector(bodies.spin[i], 0), arm)
+            fastest = max(fastest, dot(velocity, velocity))
         marks[p, 6] = min(most, least + time * math.sqrt(fastest))

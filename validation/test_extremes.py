@@ -7,8 +7,7 @@ import pytest
 
 from dem.errors import InputError
 from dem.scene.reading import parse_scene
-from validation.extremes.checks import crossings, surface
-from validation.extremes.scenes import draw_scene
+from validation.extremes import crossings, draw_scene, surface
 
 ALONG_X = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
 ALONG_Y = ALONG_X[:, [1, 0, 2]]

@@ -1,0 +1,426 @@
+"""Test access to the engines' internals: what a case needs beyond a run, such as pushing or holding a body.
+
+Velocities belong to the half step before the positions (leapfrog) on both engines: a body that is to have v at t = 0
+under an acceleration a is pushed to v − a dt/2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from dem.body.particle import Boxes, Particle, SphereChain
+from dem.engine.demand import contact_law_of
+from dem.engine.interface import Engine
+from dem.engine.links.arrays import FLOOR, WALL
+from dem.engine.links.engine import LinksEngine
+from dem.engine.links.motion.planar import lay_out
+from dem.engine.links.motors import LAWS
+from dem.engine.links.shape import shape_of
+from dem.engine.yade.assembly import SMARTICLE_MATERIAL
+from dem.engine.yade.container import WALL_MATERIAL
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.kind import hinge_law, motor_law
+from dem.physics.contact import ContactLaw
+from dem.plan.steps import time_step
+from dem.scene.scene import Scene
+from dem.setting.container import Cylinder
+
+Array = NDArray[np.float64]
+
+ENGINES = ("yade", "links")
+
+# The ball of all cases: steel. The stiffness is that of the fidelities `standard` and `reference`.
+BALL_RADIUS, BALL_MASS = 2e-3, 2.6e-4  # m, kg
+STIFFNESS = 500.0  # N/m
+
+
+class _Access:
+    """What both engines share; no state, so that it can be sent to another process."""
+
+    engine: ClassVar[type[Any]]
+
+    def build(
+        self,
+        particle: Particle,
+        law: ContactLaw,
+        *,
+        dt: float,
+        gravity: float = 0.0,
+        height: float = 0.2,
+        **motors: Any,
+    ) -> Engine:
+        """Build an engine with a floor at z = 0 and a wall far away."""
+        cylinder = Cylinder(radius=0.5, height=height, facets=16)
+        keys = {"particle": particle, "cylinder": cylinder, "law": law, "gravity": gravity, "time_step": dt}
+        engine: Engine = self.engine(**keys, shaken=False, **motors)
+        return engine
+
+    def motors_of(self, scene: Scene) -> dict[str, Any]:
+        """Return the arguments of the engine for the motors of a scene."""
+        raise NotImplementedError
+
+    def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
+        """Build the engine for articulated smarticles of a scene, by default at its time step."""
+        law, dt = contact_law_of(scene), dt or time_step(scene)
+        height, motors = scene.cylinder.height, self.motors_of(scene)
+        return self.build(scene.particle, law, dt=dt, gravity=gravity, height=height, **motors)
+
+
+def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
+    """Return a box without barbs, of the ball's mass [m]."""
+    boxes = Boxes(
+        middle_length=length,
+        barb_length=0.0,
+        thickness_normal=thickness,
+        thickness_in_plane=thickness,
+        density=BALL_MASS / (length * thickness**2),
+    )
+    return kind(boxes, SphereChain(rows=1, diameter=2 * radius, pitch=2 * radius))
+
+
+def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
+    """Return where a spoilt body at (x, y, z) is put [m]."""
+    (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
+    return {
+        "position": (x, y, math.nan),
+        "over the wall": (x, y, engine.cylinder.height + reach),
+        "through the wall": (engine.cylinder.radius + reach, y, z),
+        "under the floor": (x, y, -reach),
+        "hinge": (x, y, z + radius),
+        "overlap": (x, y, z - 2.5 * radius),
+    }[what]
+
+
+# -- links -------------------------------------------------------------------------------------------------------------
+
+HEAVY = 1e9  # a held middle link weighs this many times as much
+# Transverse moments of inertia of the stub that stands for a ball: so large, about 3000 m r², that it does not turn
+# while it touches the floor, or its end would not stay its lowest point.
+STUB_THICKNESS = 200 * BALL_RADIUS
+POINTS = 400  # that stand for a link
+
+
+class Pushed(LinksEngine):
+    """The links engine under forces that no run has.
+
+    Args:
+        keys: of the engine.
+    """
+
+    def __init__(self, **keys: Any) -> None:
+        super().__init__(**keys)
+        self.forces: dict[tuple[int, int], Array] = {}
+        """On the centre of a link, by smarticle and link [N]."""
+        self.grown = (0.0, 0.0)
+        """When forces begin to grow, and how long they do [s]."""
+
+    def advance(self, steps: int) -> None:
+        """Advance; forces are applied step by step."""
+        if not self.forces:
+            super().advance(steps)
+            return
+        for _ in range(steps):
+            self._kick()
+            super().advance(1)
+
+    def _kick(self) -> None:
+        world, dt = self._world, self.time_step
+        bodies, shape, motors = world.posed(), world.shape, world.motors
+        share = shape.barb_mass / shape.mass
+        begun, rise = self.grown
+        part = min(1.0, (self.time - begun + dt) / rise) if rise else 1.0
+        for (k, link), full in self.forces.items():
+            force = part * full
+            row, axes = bodies.plane[k], bodies.axes[k]
+            # About the centre of mass, in the middle link's axes.
+            centre = np.array([*((row[2:4], -row[0:2], row[4:6])[link]), 0.0])
+            local = axes.T @ force
+            bodies.velocity[k] += dt * force / shape.mass
+            bodies.momentum[k] += dt * axes @ np.cross(centre, local)
+            if motors is None or not world.articulated:
+                continue
+            pulled = -share * np.array([row[6:8] @ local[:2], row[8:10] @ local[:2]])
+            if link != 1:
+                sign, place, hinge = (-1.0, 0, -shape.half) if link == 0 else (1.0, 1, shape.half)
+                arm = centre[:2] - [hinge - row[0], -row[1]]
+                pulled[place] += sign * (arm[0] * local[1] - arm[1] * local[0])
+            free = LAWS[motors.law] in ("slip", "servo")
+            (motors.momentum if free else motors.impulse)[k] += dt * pulled
+
+
+class LinksAccess(_Access):
+    """Test access to the links engine, through its arrays."""
+
+    name = "links"
+    engine = Pushed
+    ball_turn = Rotation.from_euler("y", -90, degrees=True)
+    """How `ball` is held so that one point is lowest, and meets another one end to end along z."""
+    arm_share = 0.5
+    """Where in an overlap with the floor its force acts [1]: 0 at the surface of the body, 1 at the floor."""
+    spring_shafts: ClassVar[dict[str, Any]] = {"law": "slip"}  # shafts of motors that halt are rigid
+    """Keys of `motor` in a scene file whose motors have springs for shafts."""
+
+    def motors_of(self, scene: Scene) -> dict[str, Any]:
+        return {"motor_law": motor_law(scene)}
+
+    def ball(self) -> Particle:
+        """Return what meets the floor like a ball of BALL_MASS, at the lever BALL_RADIUS, at `ball_turn`."""
+        # Links are no balls; an upright stub meets things with its round end.
+        return _bar(2 * BALL_RADIUS, STUB_THICKNESS, BALL_RADIUS / 2)
+
+    def roller(self) -> Particle:
+        """Return what rolls along y like a solid ball of BALL_RADIUS and BALL_MASS, not turned."""
+        # A bar that lies across its way, with the ball's moment about its axis, I = m t²/6.
+        return _bar(5 * BALL_RADIUS, BALL_RADIUS * math.sqrt(12 / 5), BALL_RADIUS)
+
+    def ends(self, particle: Particle) -> Array:
+        """Return centres of all spheres that the floor may touch, (n, 3) [m], body frame."""
+        # Ends of links, hinges once.
+        shape, boxes = shape_of(particle), particle.boxes
+        places = [np.array([side * shape.end, 0.0, 0.0]) for side in (-1, 1)]
+        for link, side in ((0, -1), (2, 1)):
+            if link in shape.kinds:
+                places.append(np.array([side * shape.half, 0.0, 0.0]) + shape.tip * boxes.directions[link])
+        return boxes.to_body(np.array([place + np.array([0.0, 0.0, z]) for place in places for z in shape.offsets]))
+
+    def swept(self, particle: Particle) -> Array:
+        """Return centres of spheres that stand for the whole smarticle, (n, 3) [m], body frame."""
+        shape, boxes, found = shape_of(particle), particle.boxes, []
+        starts = {0: -shape.half, 1: -shape.end, 2: shape.half}
+        for link in shape.kinds:
+            long = 2 * shape.end if link == 1 else shape.tip
+            way = np.linspace(0, long, POINTS)[:, None] * boxes.directions[link]
+            found += [way + np.array([starts[int(link)], 0.0, z]) for z in shape.offsets]
+        return boxes.to_body(np.concatenate(found))
+
+    def pin_stiffness(self, scene: Scene) -> float:
+        """Return the stiffness of a hinge against parting [N/m]; inf where it cannot part."""
+        return math.inf
+
+    def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
+        """Give a welded smarticle a velocity [m/s] and a spin [rad/s]."""
+        bodies = _links(engine)._world.posed()
+        row, axes = bodies.plane[k], bodies.axes[k]
+        inertia = np.array([[row[14], row[17], 0.0], [row[17], row[15], 0.0], [0.0, 0.0, row[16]]])
+        bodies.velocity[k] = velocity
+        bodies.momentum[k] = axes @ inertia @ axes.T @ np.asarray(spin, float)
+
+    def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
+        """Let a force [N] act on the centre of a link from now on."""
+        assert isinstance(engine, Pushed)
+        engine.forces[k, link] = np.asarray(force, float)
+
+    def hold(self, engine: Engine) -> None:
+        """Hold the middle link of smarticle 0, articulated and at rest, where it is."""
+        # It becomes too heavy to move, and a force bears its weight.
+        own = _links(engine)
+        world, shape = own._world, own._world.shape
+        middle = own.state().link_positions[0, 1].copy()
+        mass, inertia = HEAVY * shape.middle_mass, HEAVY * shape.middle_inertia
+        world.shape = shape._replace(mass=2 * shape.barb_mass + mass, middle_mass=mass, middle_inertia=inertia)
+        lay_out(world.shape, float(world.bodies.alpha[0, 0]), float(world.bodies.alpha[0, 1]), world.bodies.plane[0])
+        bodies = world.posed()
+        bodies.position[0] = middle + bodies.axes[0, :, :2] @ bodies.plane[0, :2]
+        bodies.velocity[0] = bodies.momentum[0] = 0.0
+        if own.gravity:
+            self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
+
+    def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
+        """Set the links of smarticle 0, articulated and not turned, in motion in their plane.
+
+        Args:
+            engine: the simulation.
+            links: velocities along x and y [m/s] and spin about z [rad/s] of barb 1, middle link, barb 2, which the
+                hinges allow.
+        """
+        world = _links(engine)._world
+        motors, (first, middle, second) = world.motors, np.array(list(links))
+        assert motors is not None
+        shape, bodies, row = world.shape, world.posed(), world.bodies.plane[0]
+        masses = np.array([shape.barb_mass, shape.middle_mass, shape.barb_mass])
+        rates = np.array([middle[2] - first[2], second[2] - middle[2]])
+        velocity = (masses[:, None] * [first[:2], middle[:2], second[:2]]).sum(axis=0) / shape.mass
+        spin = row[16] * middle[2] + row[18:20] @ rates
+        bodies.velocity[0], bodies.momentum[0] = (*velocity, 0.0), (0.0, 0.0, spin)
+        bodies.rate[0] = rates
+        motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
+
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
+        """Make a smarticle `ratio` times as heavy; where its inertia stays, the weight grows within `rise` [s]."""
+        # All smarticles share one mass, so that the weight alone becomes larger.
+        own = _links(engine)
+        if not isinstance(own, Pushed):
+            own.__class__ = Pushed  # a run's engine, built by its kind
+        assert isinstance(own, Pushed)
+        # A force on the middle link would turn it: each link gets its own.
+        weights = -(ratio - 1) * own.gravity * own.particle.boxes.link_masses
+        own.forces = {(k, link): np.array([0.0, 0.0, weights[link]]) for link in range(3)}
+        own.grown = own.time, rise
+
+    def floor_force(self, engine: Engine) -> Array:
+        """Return the force of the smarticles on floor and wall in the last step, (3,) [N]."""
+        force = _links(engine)._world.ground.force
+        total: Array = force[FLOOR] + force[WALL]
+        return total
+
+    def torques(self, engine: Engine) -> Array:
+        """Return the torques of the motors of smarticle 0, (2,) [N m]."""
+        readings = engine.motors.readings  # the mean since the last control update
+        assert readings is not None
+        torques: Array = readings.torques[0].copy()
+        return torques
+
+    def spoil(self, engine: Engine, what: str) -> None:
+        """Spoil the second smarticle, or its last link: see `validation.hard.broken`."""
+        bodies = _links(engine)._world.bodies
+        if what == "velocity":
+            bodies.velocity[1, 1] = math.nan
+        elif what == "spin":
+            bodies.momentum[1, 0] = math.nan
+        elif what == "speed":
+            bodies.velocity[1] = 0.0, 0.0, 1e3
+        else:
+            bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
+
+    def heat(self, engine: Engine, share: float) -> None:
+        """Let all dashpots drive by a share [1] of what they damped."""
+        world = _links(engine)._world
+        world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
+
+
+def _links(engine: Engine) -> LinksEngine:
+    assert isinstance(engine, LinksEngine)
+    return engine
+
+
+# -- YADE --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Ball(Particle):
+    """A particle of one sphere."""
+
+    def __post_init__(self) -> None:
+        """Check nothing: no link exists that the sphere must fit."""
+
+    @cached_property
+    def _layout(self) -> tuple[Array, NDArray[np.int64]]:
+        return np.zeros((1, 3)), np.ones(1, dtype=np.int64)
+
+
+class YadeAccess(_Access):
+    """Test access to YADE, through its bodies; `LinksAccess` describes the methods."""
+
+    name = "yade"
+    engine = YadeEngine
+    ball_turn = Rotation.identity()
+    arm_share = 1.0
+    spring_shafts: ClassVar[dict[str, Any]] = {}
+
+    def motors_of(self, scene: Scene) -> dict[str, Any]:
+        return {"hinges": (hinge_law(scene), motor_law(scene))}
+
+    def ball(self) -> Particle:
+        # A cube of side r √(12/5) has the moment of a solid ball, 2/5 m r².
+        side = BALL_RADIUS * math.sqrt(12 / 5)
+        return _bar(side, side, BALL_RADIUS, Ball)
+
+    def roller(self) -> Particle:
+        return self.ball()
+
+    def ends(self, particle: Particle) -> Array:
+        return particle.centres
+
+    def swept(self, particle: Particle) -> Array:
+        return particle.centres
+
+    def pin_stiffness(self, scene: Scene) -> float:
+        return hinge_law(scene).pin_stiffness
+
+    def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
+        own = _yade(engine)
+        bodies, vector = own._omega.bodies, own._yade.vector
+        clump, (v, w) = bodies[own._assembly.bodies[k]].state, (np.asarray(velocity, float), np.asarray(spin, float))
+        state = own.state()
+        rotation = state.link_rotations[k, 1] @ state.boxes.link_rotations[1].T
+        clump.vel, clump.angVel = vector(*v), vector(*w)
+        # What YADE integrates.
+        clump.angMom = vector(*(rotation @ np.diag(own.particle.boxes.inertia) @ rotation.T @ w))
+        # What contact laws read in the first step.
+        for sphere in own._assembly._spheres[k]:
+            member = bodies[sphere].state
+            member.vel = vector(*(v + np.cross(w, np.array(member.pos) - np.array(clump.pos))))
+            member.angVel = clump.angVel
+
+    def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
+        own = _yade(engine)
+        own._omega.forces.setPermF(own._assembly.bodies[3 * k + link], own._yade.vector(*np.asarray(force, float)))
+
+    def hold(self, engine: Engine) -> None:
+        body, zero = bodies_of(engine)[1], _yade(engine)._yade.vector(0, 0, 0)
+        body.blockedDOFs = "xyzXYZ"
+        body.vel, body.angVel, body.angMom = zero, zero, zero
+
+    def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
+        own = _yade(engine)
+        vector, inertias = own._yade.vector, own.particle.boxes.link_inertias[:, 2]
+        for body, (along, across, spin), inertia in zip(bodies_of(engine), links, inertias, strict=True):
+            body.vel, body.angVel = vector(float(along), float(across), 0.0), vector(0, 0, float(spin))
+            body.angMom = vector(0, 0, float(spin * inertia))
+
+    def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
+        heavy = bodies_of(engine)[k]
+        heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
+
+    def floor_force(self, engine: Engine) -> Array:
+        return _yade(engine).container_force()
+
+    def torques(self, engine: Engine) -> Array:
+        torques: Array = _yade(engine).motors._hinges.torques()[0]
+        return torques
+
+    def spoil(self, engine: Engine, what: str) -> None:
+        own = _yade(engine)
+        body, vector = bodies_of(engine)[2 * (len(own._assembly.bodies) // 3) - 1], own._yade.vector
+        if what == "velocity":
+            body.vel = vector(0, math.nan, 0)
+        elif what == "spin":
+            body.angVel = body.angMom = vector(math.nan, 0, 0)
+        elif what == "speed":
+            body.vel = vector(0, 0, 1e3)
+        else:
+            body.pos = vector(*_spoilt_place(engine, what, body.pos))
+
+    def heat(self, engine: Engine, share: float) -> None:
+        omega = _yade(engine)._omega
+        for material in (omega.materials[label] for label in (SMARTICLE_MATERIAL, WALL_MATERIAL)):
+            material.cn, material.cs = -share * material.cn, 0.0
+        for contact in omega.interactions:
+            contact.phys.cn, contact.phys.cs = -share * contact.phys.cn, 0.0
+
+
+def _yade(engine: Engine) -> YadeEngine:
+    assert isinstance(engine, YadeEngine)
+    return engine
+
+
+def bodies_of(engine: Engine) -> list[Any]:
+    """Return the states of YADE's rigid bodies: one per smarticle, or three."""
+    own = _yade(engine)
+    return [own._omega.bodies[body].state for body in own._assembly.bodies]
+
+
+EngineAccess = LinksAccess | YadeAccess
+
+
+def engine_access(engine: str) -> EngineAccess:
+    """Return test access to an engine, by its name."""
+    return YadeAccess() if engine == "yade" else LinksAccess()

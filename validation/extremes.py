@@ -1,0 +1,388 @@
+"""Run random extreme scenes and check them: `python -m validation.extremes --count 300 --jobs 2 --out DIR`.
+
+Each scene is planned, run and checked; DIR gets `extremes.csv`, and a scene file and a run directory each. A scene
+whose row is there already is not run again. The checker reads frames and series with NumPy alone and shares no code
+with the engines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import yaml
+from numpy.typing import NDArray
+
+from postprocess import read_frames
+
+Array = NDArray[np.float64]
+
+# -- scenes ------------------------------------------------------------------------------------------------------------
+
+SECONDS = 0.3  # of each phase after the pour
+
+
+def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
+    """Draw scene `number`; equal numbers give equal scenes.
+
+    Args:
+        number: also the scene's seed.
+        engine: that computes it.
+
+    Returns:
+        Plain data of a scene file.
+    """
+    rng = np.random.default_rng([28, number])
+
+    def span(low: float, high: float) -> float:
+        return round(float(rng.uniform(low, high)), 4)
+
+    def decades(low: float, high: float) -> float:
+        return float(f"{10 ** rng.uniform(np.log10(low), np.log10(high)):.4g}")
+
+    w = decades(4e-3, 0.04)
+    aspect = float(rng.choice([0.0, 2.0, span(0.05, 0.4), span(0.4, 1.0), span(1.0, 2.0)]))
+    thickness = float(f"{w * span(0.03, 0.12):.4g}")
+    reach = w * (0.5 + aspect)
+    stiffness = {"base": "draft", "stiffness_N_per_m": decades(100, 2e4)}
+    kind = int(rng.integers(4))
+    scene: dict[str, Any] = {
+        "schema_version": 1,
+        "engine": engine,
+        "name": f"extreme {number}",
+        "seed": number,
+        "count": int(rng.integers(2, 41)),
+        "smarticle": {
+            "middle_length_m": w,
+            "aspect_ratio": aspect,
+            "thickness_normal_m": thickness * (2 if kind == 3 else 1),
+            "thickness_in_plane_m": thickness,
+            "density_kg_per_m3": decades(1000, 20000),
+        },
+        "container": {
+            "radius_m": float(f"{reach * span(1.2, 3.0):.4g}"),
+            "height_m": float(f"{min(60 * reach, 0.9):.4g}"),
+        },
+        "contact": {
+            "friction_smarticle": float(rng.choice([0.0, 10.0, span(0, 1)])),
+            "friction_wall": float(rng.choice([0.0, 10.0, span(0, 1)])),
+            "restitution": float(rng.choice([0.01, 1.0, span(0.05, 0.95)])),
+        },
+        "gravity_m_per_s2": float(rng.choice([9.81, decades(0.5, 200)])),
+        "motor": {"law": str(rng.choice(["halt", "stall", "ease", "slip", "servo"])), "speed_limit_rad_per_s": 60.0},
+        "fidelity": [stiffness, "draft", "standard", {"base": "standard", "rows": 2}][kind],
+        "recording": {
+            "frame_interval_s": 1e-3,
+            "series_interval_s": 1e-3,
+            "energy": True,
+            "dissipation_interval_s": 2e-4,
+            "checkpoint_interval_s": None,
+        },
+    }
+    phases: list[dict[str, Any]] = [
+        {
+            "type": "deposit",
+            "per_layer": int(rng.integers(1, 21)),
+            "layer_height_w": span(0.5, 4),
+            "thrown_at_m_per_s": float(rng.choice([0.0, span(0, 10)])),
+        }
+    ]
+    shake = {
+        "type": "shake",
+        "duration_s": SECONDS,
+        "frequency_hz": decades(5, 200),
+        "peak_acceleration_g": span(0, 10),
+    }
+    change = {"type": "shape-change", "opening_s": span(0.02, 0.15), "closing_s": span(0.02, 0.15)}
+    swing = {"type": "internal-oscillation", "theta_deg": span(1, 60), "duration_s": SECONDS}
+    sine = {
+        "type": "actuate",
+        "barbs": {"type": "sine", "centre_deg": 90, "amplitude_deg": span(1, 60), "frequency_hz": decades(1, 40)},
+        "duration_s": SECONDS,
+    }
+    pull = {"type": "pull-hook", "distance_m": float(f"{SECONDS * w * 4:.4g}"), "speed_m_per_s": float(f"{4 * w:.4g}")}
+    chosen = int(rng.choice([0, 1, 1, 5] if aspect == 0 else 6))
+    if chosen == 5:
+        scene["hooks"] = {} if rng.random() < 0.5 else {"length_m": float(f"{w * span(0.5, 3):.4g}")}
+        phases += [{"type": "relax", "duration_s": 0.05}, pull]
+    else:
+        phases.append([{"type": "relax", "duration_s": SECONDS}, shake, change, swing, sine][chosen])
+    return {**scene, "phases": phases}
+
+
+# -- the checker -------------------------------------------------------------------------------------------------------
+
+DEPTH = 0.1  # of a link's thickness: how far a point may be outside the container or below the floor
+ENERGY = 0.01  # of the energy put in: how much more there may be
+INSIDE = 1e-3  # of a segment's length: a crossing is at least so far from both ends
+
+
+def segments(vertices: Array) -> Array:
+    """Return the axes of all links.
+
+    Args:
+        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip [m].
+
+    Returns:
+        (3N, 2, 3) ends of each link's axis [m].
+    """
+    found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return found
+
+
+def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
+    """Return points of all axes, and how much material surrounds each.
+
+    A link ends at its tip, where there is nothing beyond the axis; half a thickness from there on it is a thickness
+    wide. So neither a square nor a rounded end is taken for more than it is.
+
+    Args:
+        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip [m].
+        thickness: of a link [m].
+
+    Returns:
+        (M, 3) points [m], (M,) radius of the material about each [m].
+    """
+    ends = segments(vertices)
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=-1)
+    wide = length > thickness
+    step = along[wide] / length[wide, None] * thickness / 2
+    inner = np.concatenate([ends[wide, 0] + step, ends[wide, 1] - step])
+    points = np.concatenate([ends.reshape(-1, 3), inner])
+    return points, np.repeat([0.0, thickness / 2], [2 * len(ends), len(inner)])
+
+
+def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
+    """Find axes of different smarticles that pass through each other while vertices move along straight lines.
+
+    While two axes pass through each other the volume that their four ends span changes its sign, and both axes'
+    common point is inside of both.
+
+    Args:
+        before: (N, 4, 3) vertices in a frame [m].
+        after: (N, 4, 3) vertices in the next one [m].
+
+    Returns:
+        Pairs of links, numbered along `segments`.
+    """
+    one, two = segments(before), segments(after)
+    # A link without length, of l/w = 0, has no axis to cross.
+    long = np.minimum(np.ptp(one, axis=1), np.ptp(two, axis=1)).max(axis=-1) > 0
+    low = np.minimum(one, two).min(axis=1)
+    high = np.maximum(one, two).max(axis=1)
+    i, j = np.triu_indices(len(one), k=1)
+    near = (i // 3 != j // 3) & long[i] & long[j]
+    i, j = i[near], j[near]
+    near = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=-1)
+    i, j = i[near], j[near]
+    if not len(i):
+        return []
+
+    def ends(time: Array) -> tuple[Array, Array, Array]:
+        a = one[i] + time[:, None, None] * (two[i] - one[i])
+        b = one[j] + time[:, None, None] * (two[j] - one[j])
+        return a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], b[:, 0] - a[:, 0]
+
+    def volume(time: Array) -> Array:
+        u, v, apart = ends(time)
+        found: Array = (np.cross(u, v) * apart).sum(axis=-1)
+        return found
+
+    found = np.zeros(len(i), dtype=bool)
+    times = np.linspace(0, 1, 17)
+    values = np.array([volume(np.full(len(i), time)) for time in times])
+    for k in range(len(times) - 1):
+        change = (values[k] > 0) != (values[k + 1] > 0)
+        if not change.any():
+            continue
+        lower, upper = np.full(len(i), times[k]), np.full(len(i), times[k + 1])
+        for _ in range(40):
+            middle = (lower + upper) / 2
+            left = (volume(middle) > 0) == (values[k] > 0)
+            lower, upper = np.where(left, middle, lower), np.where(left, upper, middle)
+        u, v, apart = ends((lower + upper) / 2)
+        normal = np.cross(u, v)
+        square = (normal**2).sum(axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = (np.cross(apart, v) * normal).sum(axis=-1) / square
+            t = (np.cross(apart, u) * normal).sum(axis=-1) / square
+        inside = (np.abs(s - 0.5) < 0.5 - INSIDE) & (np.abs(t - 0.5) < 0.5 - INSIDE)
+        found |= change & inside
+    return list(zip(i[found].tolist(), j[found].tolist(), strict=True))
+
+
+def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
+    """Check one finished run.
+
+    Args:
+        path: the run directory.
+        scene: plain data of the scene, as `draw_scene` gives it.
+
+    Returns:
+        What was measured, and under "wrong" what is not as it must be, "" if nothing.
+    """
+    thickness = min(scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"])
+    radius, wall = scene["container"]["radius_m"], scene["container"]["height_m"]
+    wrong: list[str] = []
+    floor_depth = wall_depth = moved = -np.inf
+    crossed: set[tuple[int, int]] = set()
+    finite, first, last = True, None, None
+    for frame in read_frames(path):
+        vertices = frame.vertices
+        finite &= bool(np.isfinite(vertices).all())
+        if not finite:
+            wrong.append(f"no number in the frame at {frame.time:.4f} s")
+            break
+        points, inset = surface(vertices, thickness)
+        height = points[:, 2] - frame.floor_z - inset
+        out = np.hypot(points[:, 0], points[:, 1]) + inset - radius
+        floor_depth = max(floor_depth, float((-height).max()) / thickness)
+        wall_depth = max(wall_depth, float(np.where(height < wall, out, -np.inf).max()) / thickness)
+        if last is not None:
+            count = min(len(last), len(vertices))
+            moved = max(moved, float(np.linalg.norm(vertices[:count] - last[:count], axis=-1).max()) / thickness)
+            pairs = crossings(last[:count], vertices[:count])
+            crossed.update(pairs)
+            first = first if first is not None or not pairs else frame.time
+        last = vertices
+    if floor_depth > DEPTH:
+        wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
+    if wall_depth > DEPTH:
+        wrong.append(f"{wall_depth:.2f} thicknesses outside the wall")
+    if crossed:
+        wrong.append(f"{len(crossed)} pairs of axes crossed, first before {first:.4f} s")
+    excess, residual = energy_errors(path)
+    if not excess <= ENERGY:
+        wrong.append(f"energy {100 * excess:.1f} % above what was put in")
+    return {
+        "below the floor [t]": floor_depth,
+        "outside the wall [t]": wall_depth,
+        "pairs of axes crossed [1]": len(crossed),
+        "farthest moved between frames [t]": moved,
+        "energy above what was put in [1]": excess,
+        "largest residual over dissipated [1]": residual,
+        "wrong": "; ".join(wrong),
+    }
+
+
+def energy_errors(path: Path) -> tuple[float, float]:
+    """Return the largest excess of energy over what was put in [1], and of the residual over what was dissipated [1].
+
+    `added_energy_J` has the height and speed that smarticles are poured with; works are those of motors and container.
+    NaN is passed on.
+    """
+    with h5py.File(path / "series.h5") as file:
+        series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}
+
+    def column(name: str) -> Array:
+        return series.get(name, np.zeros(len(series["time_s"])))
+
+    given = column("added_energy_J")
+    works = column("motor_work_J") + column("container_work_J")
+    stored = sum(
+        column(name)
+        for name in (
+            "kinetic_energy_J",
+            "gravitational_energy_J",
+            "contact_elastic_energy_J",
+            "hinge_elastic_energy_J",
+        )
+    )
+    scale = np.maximum.accumulate(np.abs(given) + np.abs(works))
+    scale = np.where(scale > 0, scale, np.inf)
+    excess = ((stored - given - works) / scale).max()
+    dissipated = np.maximum.accumulate(np.abs(column("dissipated_energy_J")))
+    residual = (np.abs(column("energy_residual_J")) / np.where(dissipated > 0, dissipated, np.inf)).max()
+    return float(excess), float(residual)
+
+
+# -- the command -------------------------------------------------------------------------------------------------------
+
+RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped with a cause", "WRONG", "out of time"
+
+
+def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
+    """Plan, run and check one scene.
+
+    Args:
+        number: of the scene.
+        out: folder of scene and run.
+        tree: source tree whose `smarticles` runs it.
+        limit: wall time allowed [s].
+
+    Returns:
+        A row of the table.
+    """
+    scene, path, run = draw_scene(number), out / f"{number:04d}.yaml", out / f"{number:04d}"
+    path.write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")
+    shutil.rmtree(run, ignore_errors=True)
+    begun = time.monotonic()
+    row = {"scene": number, "count": scene["count"], "last phase": scene["phases"][-1]["type"]}
+    environment = {**os.environ, "PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
+    end, cause = "", ""
+    for what, arguments in (("plan", ["plan", str(path)]), ("run", ["run", str(path), "--out", str(run)])):
+        command = [sys.executable, "-m", "smarticles", *arguments]
+        try:
+            child = subprocess.run(
+                command, cwd=tree, env=environment, capture_output=True, text=True, timeout=limit, check=False
+            )
+        except subprocess.TimeoutExpired:
+            end = LATE
+            break
+        if child.returncode:
+            cause = (child.stderr.strip().splitlines() or [f"status {child.returncode}"])[-1]
+            known = "Traceback" not in child.stderr and child.returncode in {1, 2}
+            end = WRONG if not known else REJECTED if what == "plan" or child.returncode == 2 else STOPPED
+            break
+    row |= {"end": end, "cause": cause, "wall time [s]": round(time.monotonic() - begun, 1)}
+    if not end:
+        found = check_run(run, scene)
+        cause = found.pop("wrong")
+        row |= {"end": WRONG if cause else RIGHT, "cause": cause, **found}
+    if row["end"] != WRONG:
+        shutil.rmtree(run, ignore_errors=True)
+    return row
+
+
+def main() -> int:
+    """Run all scenes; the exit status is 1 if one is wrong."""
+    parser = argparse.ArgumentParser(prog="python -m validation.extremes", description=__doc__)
+    parser.add_argument("--count", type=int, default=300, help="scenes (default: %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene (default: %(default)s)")
+    parser.add_argument("--jobs", type=int, default=1, help="runs at a time (default: %(default)s)")
+    parser.add_argument("--limit", type=float, default=300, help="wall time of a run [s] (default: %(default)s)")
+    parser.add_argument("--tree", type=Path, default=Path.cwd(), help="source tree to run (default: this one)")
+    parser.add_argument("--out", type=Path, required=True, help="folder of table, scenes and runs that are wrong")
+    arguments = parser.parse_args()
+    out = arguments.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "extremes.csv"
+    rows = pd.read_csv(path, keep_default_na=False).to_dict("records") if path.exists() else []
+    numbers = range(arguments.first, arguments.first + arguments.count)
+    missing = [number for number in numbers if number not in {row["scene"] for row in rows}]
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        runs = [pool.submit(run_one, number, out, arguments.tree.resolve(), arguments.limit) for number in missing]
+        for run in runs:
+            rows.append(run.result())
+            pd.DataFrame(rows).to_csv(path, index=False, float_format="%.4g")
+            row = rows[-1]
+            print(f"{row['scene']:4d} {row['end']:20s} {row['last phase']}: {row['cause']}", flush=True)
+    table = pd.DataFrame(rows)
+    print(table["end"].value_counts().to_string())
+    return int((table["end"] == WRONG).any())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,1 +1,0 @@
-"""Cases whose answer is on paper."""
