@@ -28,8 +28,8 @@ from dem.phases.take_over import TakeOver, poses_of
 from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_steps
 from dem.record.files import write_text
-from dem.scene.carried import foreign
 from dem.scene.reading import scene_hash
+from dem.scene.rules import foreign
 from dem.scene.scene import Scene
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The two ways in which the project says no, and the word that was meant."""
+"""Errors of the project: `InputError` and `RunError`, and what their messages are made of."""
 
 import difflib
 from collections.abc import Iterable
@@ -14,10 +14,10 @@ class RunError(RuntimeError):
 
 
 def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
-    """Stop a run where some smarticles are not as they must be.
+    """Stop a run if any of the smarticles is concerned.
 
     Args:
-        concerned: (N,) bool array, true for those.
+        concerned: (N,) bool array.
         time: simulated time [s].
         cause: what is wrong with them.
         way_out: what to do about it.
@@ -33,7 +33,7 @@ def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
 
 
 def shown(value: object) -> str:
-    """A value as YAML would have it, cut where it is long; in one line, whatever is in it."""
+    """Return a value as YAML would have it, in one line, cut where it is long."""
     named = {None: "null", True: "true", False: "false"}
     try:
         text = named[value] if value is None or isinstance(value, bool) else repr(value)
@@ -46,13 +46,7 @@ _MOST = 60  # characters of a value that are shown
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
-    """`did you mean …` where a known word is close, else the list of known words.
-
-    Args:
-        word: what was given.
-        known: what there is, in the order in which it is listed.
-        cutoff: how alike a word must be that was meant [1].
-    """
+    """Return `did you mean …` where a known word is close, by more than `cutoff` [1], else the list of known words."""
     words = list(known)
     close = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)
     return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(words) or 'none'}"

@@ -1,19 +1,61 @@
-"""What is read from files that people write: no key that is not known, nothing taken for a number that is none."""
+"""What is read from files that people write: strict models, and what is wrong with a file, in one line."""
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from dem.errors import nearest, shown
 
 _WITH_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d]\S*\s*")
 _WITH_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
+# Words that may end a key, and how the unit that they spell is written.
+_UNITS = {
+    **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
+    **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
+}
+_OF_A_KEY = "[key]"  # how pydantic ends the place of a key that is wrong itself
+# A message that begins with a key is about that key, below the place that pydantic reports.
+_OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
+_LONGEST_KEY = 60  # characters of a key that are shown
+_MOST_ERRORS = 3  # shown at once
+
+_NO_LIST = "{shown} is not a list; write its items in brackets, [ … ]"
+_NO_BOOLEAN = "{shown} is neither true nor false; use one of them"
+_TEXTS = {
+    "missing": "missing; it has no default",
+    "greater_than": "{shown}{unit} is out of range; use more than {gt:g}{unit}",
+    "greater_than_equal": "{shown}{unit} is out of range; use at least {ge:g}{unit}",
+    "less_than": "{shown}{unit} is out of range; use less than {lt:g}{unit}",
+    "less_than_equal": "{shown}{unit} is out of range; use at most {le:g}{unit}",
+    "finite_number": "{shown} is not a finite number; give one{in_unit}",
+    "float_type": "{shown} is not a number; give one{in_unit}",
+    "int_type": "{shown} is not a whole number; give one{in_unit}",
+    "int_from_float": "{shown} is not a whole number; use e.g. {rounded}",
+    "int_parsing_size": "{shown} is out of range; use a smaller one",
+    "bool_type": _NO_BOOLEAN,
+    "bool_parsing": _NO_BOOLEAN,
+    "string_type": "{shown} is not text; {text_way_out}",
+    "string_too_short": "{shown} is too short; use {min_length} or more characters",
+    "string_too_long": "{shown} has {length} characters; use at most {max_length}",
+    "literal_error": "{shown} is not known; {choice}",
+    "too_short": "an empty list; give at least {least}",
+    "too_long": "{shown} has {items}; give at most {most}",
+    "tuple_type": _NO_LIST,
+    "list_type": _NO_LIST,
+    "dict_type": "{shown} is not keys and values; write them as {{key: value}}",
+    "model_type": "{shown} is not keys and values; write them as {{key: value}}",
+    "model_attributes_type": "{shown} is not keys and values; write them as {{type: …}}",
+    "union_tag_not_found": "type: missing in {shown}; write which one it is, see `smarticles schema`",
+    "union_tag_invalid": "type: {shown_tag} is not known; {choice}",
+}
+"""Texts by pydantic's type of error; fields in braces are pydantic's context and what `_text` adds."""
 
 
 class Strict(BaseModel):
@@ -23,58 +65,52 @@ class Strict(BaseModel):
 
     @classmethod
     def known_keys(cls) -> dict[str, FieldInfo]:
-        """The keys as a file has them, in order."""
+        """Return the keys as a file has them, in order."""
         return {field.alias or name: field for name, field in cls.model_fields.items()}
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """The way out for an unknown key."""
+        """Return the way out for an unknown key."""
         return nearest(key, sorted(cls.known_keys()))
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_unknown_keys(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            for key in data:
-                if key not in cls.known_keys():
-                    msg = f"unknown key {shown(key)}; {cls.nearest_key(str(key))}"
-                    raise ValueError(msg)
-        return data
-
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_other_kinds_as_numbers(cls, data: Any) -> Any:
+    def _reject_unknown_keys_and_other_kinds(cls, data: Any) -> Any:
         # YAML reads `yes` and `on` as true, and true would pass as 1; "0.4" in quotes would pass as 0.4.
-        if isinstance(data, Mapping):
-            for key, value in data.items():
-                field = cls.known_keys().get(str(key))
-                if field is None or field.annotation is Any:
-                    continue
-                for item in value if isinstance(value, list) else [value]:
-                    if isinstance(item, bool) and field.annotation is not bool:
-                        msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(field.annotation)}"
-                        raise ValueError(msg)
-                    if isinstance(item, str) and _kind(field.annotation) == "a number":
-                        msg = f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}"
-                        raise ValueError(msg)
+        if not isinstance(data, Mapping):
+            return data
+        known = cls.known_keys()
+        for key, value in data.items():
+            if key not in known:
+                continue
+            annotation = known[key].annotation
+            for item in value if isinstance(value, list) else [value]:
+                if isinstance(item, bool) and annotation not in (bool, Any):
+                    msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}"
+                    raise ValueError(msg)
+                if isinstance(item, str) and _kind(annotation) == "a number":
+                    msg = f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}"
+                    raise ValueError(msg)
+        for key in data:
+            if key not in known:
+                msg = f"unknown key {shown(key)}; {cls.nearest_key(str(key))}"
+                raise ValueError(msg)
         return data
 
 
 def _as_a_number(text: str) -> str:
-    """What to do about text where a number is wanted."""
+    """Return what to do about text where a number is wanted."""
     try:
-        number = float(text)
+        return "leave out the quotes" if math.isfinite(float(text)) else "write a finite one"
     except ValueError:
         pass
-    else:
-        return "leave out the quotes" if math.isfinite(number) else "write a finite one"
     if _WITH_COMMA.fullmatch(text):
         return f"write {text.strip().replace(',', '.')}, with a point"
     return "leave out the unit, which the key names" if _WITH_UNIT.fullmatch(text) else "write it in digits"
 
 
 def _kind(annotation: Any) -> str:
-    """What a key takes, in words; `annotation` is the type of its field."""
+    """Return in words what a key takes, by the type of its field."""
     parts = [annotation] if get_origin(annotation) is None else [*get_args(annotation)]
     parts = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if any(part in (int, float) for part in parts) and all(part in (int, float, type(None), ...) for part in parts):
@@ -83,3 +119,95 @@ def _kind(annotation: Any) -> str:
         return " or ".join(map(repr, get_args(annotation)))
     models = [kind for kind in parts if isinstance(kind, type) and issubclass(kind, Strict)]
     return "keys and values" if models else "text" if annotation is str else "a value of its kind"
+
+
+def explained(error: ValidationError, data: Any, *, described: str) -> str:
+    """Return pydantic's errors as `key: value and what is wrong with it; way out`, the first few of them in one line.
+
+    Args:
+        error: what pydantic found.
+        data: what it was given.
+        described: where the keys are described, for one that is missing.
+    """
+    texts: dict[str, str] = {}
+    filled: set[str] = set()  # places of values that the file does not hold
+    for found in error.errors(include_url=False):
+        # A default that follows from a wrong key is no second error, nor is a list too short whose items are wrong.
+        if found["type"] == "default_factory_not_called" or (found["type"] == "too_short" and found["input"]):
+            continue
+        place, given = _place(found["loc"], data)
+        text = _text(
+            found["type"], found["msg"], found["input"], found.get("ctx", {}), unit_of(place.rpartition(".")[2])[1]
+        )
+        if found["type"] == "missing":
+            text, given = f"{text}, see {described}", True
+        if place:
+            place += "." if _OWN_KEY.match(text) else ": "
+        texts.setdefault(place, text)  # of one value, what was found first
+        if not given:
+            filled.add(place)
+    # A value filled in from a wrong one is wrong in the same words, and no second error.
+    said = {text for place, text in texts.items() if place not in filled}
+    lines = [place + text for place, text in texts.items() if place not in filled or text not in said]
+    more = f" (and {len(lines) - _MOST_ERRORS} more)" if len(lines) > _MOST_ERRORS else ""
+    return "; also ".join(lines[:_MOST_ERRORS]) + more
+
+
+def unit_of(key: str) -> tuple[str, str]:
+    """Split a key into its name and the unit that its end spells: `speed`, `m/s` of `speed_m_per_s`."""
+    words = key.split("_")
+    count = len(words)
+    while count > 1 and words[count - 1] in _UNITS:
+        count -= 1
+    return "_".join(words[:count]), " ".join(_UNITS[word] for word in words[count:]).replace(" / ", "/")
+
+
+def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:
+    """Return what is wrong with a value and what to do; `kind`, `message` and `context` are pydantic's."""
+    if kind == "value_error":
+        return message.removeprefix("Value error, ")
+    if kind not in _TEXTS:
+        return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
+    number = isinstance(value, int | float)
+    choices, chosen = context.get("expected_tags", context.get("expected", "")), context.get("tag", value)
+    close = difflib.get_close_matches(chosen, re.findall("'([^']*)'", choices), 1) if isinstance(chosen, str) else []
+    length = len(value) if hasattr(value, "__len__") else 0
+    items, least, most = (
+        f"{count} item" + ("s" if count != 1 else "")
+        for count in (length, context.get("min_length"), context.get("max_length"))
+    )
+    return _TEXTS[kind].format(
+        **context,
+        shown=shown(value),
+        shown_tag=shown(context.get("tag")),
+        unit=f" {unit}" if unit else "",
+        in_unit=f" in {unit}" if unit else "",
+        rounded=round(value) if isinstance(value, float) and math.isfinite(value) else "",
+        length=length,
+        items=items,
+        least=least,
+        most=most,
+        text_way_out="write it in quotes" if number else "write some",
+        choice=f"did you mean {close[0]!r}?" if close else f"use {choices}",
+    )
+
+
+def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:
+    """Return pydantic's path to a value as a key of the file, and whether the file holds the value.
+
+    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
+    """
+    here, keys, given = data, [], True
+    for step in steps:
+        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
+            continue
+        if step == _OF_A_KEY:
+            given = False
+            continue
+        keys.append(str(step) if len(str(step)) <= _LONGEST_KEY else f"{str(step)[:_LONGEST_KEY]}…")
+        if isinstance(here, Mapping):
+            given &= step in here
+            here = here.get(step)
+        elif isinstance(here, list) and isinstance(step, int):
+            here = here[step] if step < len(here) else None
+    return ".".join(keys), given

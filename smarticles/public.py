@@ -16,8 +16,7 @@ import yaml
 
 from dem.errors import InputError, RunError
 from dem.record.run import Run, open_run
-from dem.scene.overrides import apply_override
-from dem.scene.reading import SCHEMA_VERSION, dump_scene
+from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
 from dem.scene.yaml_text import load_yaml
 from dem.setting.fidelity import fidelities

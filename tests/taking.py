@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from dem.phases.take_over import LAST, take
 from dem.plan.steps import time_step
-from dem.record.taken import LAST, take
 from dem.run.build import build_engine
 from dem.run.run import run_scene
 from dem.scene.reading import parse_scene

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dem.body.particle import Boxes
 from dem.body.state import State
-from dem.phases.gaits.drive import Drive, actuated, drive
+from dem.phases.actuated import Drive, drive
 from dem.phases.shake import Shake
 from dem.phases.take_over import TakeOver, poses_of
 from dem.scene.scene import Scene
@@ -73,7 +73,7 @@ class Given:
     @property
     def actuates(self) -> bool:
         """Whether motors act."""
-        return actuated(self.scene.phases[ACTIVITY])
+        return self.scene.phases[ACTIVITY].actuates
 
     @cached_property
     def gait(self) -> Drive:

@@ -1,4 +1,4 @@
-"""A chain of interlocked smarticles: how it is laid out, and when it has come apart.
+"""A chain of interlocked smarticles: its layout, and whether it has parted.
 
 ⊔-⊓-⊔: every second smarticle is turned by half a turn, and neighbouring barbs hook into each other. The chain lies
 along x, its middle at the origin. Source: Savoie et al., Soft Matter 2023, "Robophysical experiment".
@@ -21,7 +21,7 @@ from dem.body.state import State
 
 @dataclass(frozen=True)
 class Tie:
-    """Where a string is tied: smarticle, link, and distance along x from the link's centre [m]."""
+    """Point where a string is tied: smarticle, link, and distance along x from the link's centre [m]."""
 
     smarticle: int
     link: int
@@ -30,13 +30,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Chain:
-    """Layout of a chain. Lengths in m.
-
-    Args:
-        particle: one smarticle, a U.
-        count: how many.
-        gap: free distance of neighbours.
-    """
+    """Layout of a chain of U shapes with a free distance of neighbours, `gap`. Lengths in m."""
 
     particle: Particle
     count: int
@@ -44,7 +38,7 @@ class Chain:
 
     @property
     def offset(self) -> float:
-        """Distance of the two rows of middle links: the tips of each row are a gap away from the other's links."""
+        """Distance of the two rows of middle links: the tips of each row are a gap away from the other row's links."""
         return self.particle.boxes.barb_length + self.gap + self._half
 
     @property
@@ -68,7 +62,7 @@ class Chain:
         return (self.count - 1) * self.step + self.particle.boxes.middle_length
 
     def poses(self) -> Poses:
-        """Poses of the centres of mass."""
+        """Return the poses of the centres of mass."""
         numbers = np.arange(self.count)
         turned = numbers % 2 == 1
         sign = np.where(turned, 1.0, -1.0)
@@ -80,7 +74,7 @@ class Chain:
         return Poses(positions, tuple(Rotation.from_rotvec([0.0, 0.0, math.pi * half]) for half in turned))
 
     def ties(self, tied_at: Literal["tip", "axis"]) -> tuple[Tie, Tie]:
-        """Of the string at the lower and at the higher x, on the outer barbs; see `Strain.tied_at`."""
+        """Return the ties of the strings at the lower and the higher x, on the outer barbs; see `Strain.tied_at`."""
         half = self.particle.boxes.barb_length / 2
         along = half - self.particle.radius if tied_at == "tip" else self.offset / 2 - half
         last = self.count - 1
@@ -88,19 +82,19 @@ class Chain:
 
 
 def parted(state: State, diameter: float) -> bool:
-    """Whether a straight line across the chain separates two neighbours, which can then not hook again."""
+    """Return whether a straight line across the chain separates two neighbours, which can then not hook again."""
     places = _corners(state)[..., 0]
     return bool((places[:-1].max(axis=1) + diameter < places[1:].min(axis=1)).any())
 
 
 def extent(state: State, diameter: float) -> float:
-    """Width of the chain across its axis, with the links' thickness [m]."""
+    """Return the width of the chain across its axis, with the links' thickness [m]."""
     places = _corners(state)[..., 1]
     return float(np.ptp(places) + diameter)
 
 
 def _corners(state: State) -> NDArray[np.float64]:
-    """(N, V, 3) [m]: tips and hinges, and of thicker middle links the ends of the rows at their faces."""
+    """Return (N, V, 3) tips and hinges, and of thicker middle links the ends of the rows at their faces [m]."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

@@ -1,7 +1,8 @@
-"""Forces at contacts: what a run records of an engine where its scene asks for it.
+"""Forces at contacts, for output.
 
-Engines touch at points: spheres of a chain, or the ends of a stretch over which two links lie on each other. A contact
-is all points of one pair of links, or of a link and a boundary, taken together, which no engine has more or fewer of.
+In engines bodies touch at points: spheres of a chain, or the ends of a stretch over which two links lie on each other.
+A contact is all points of one pair of links, or of a link and a boundary, so that its number does not depend on the
+engine.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Numbers = NDArray[np.int64]
 Number = TypeVar("Number", int, Numbers)
 
 BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall")
-"""What does not give way, by the number that it has in what is recorded."""
+"""Rigid boundaries, by their numbers in recorded files."""
 FLOOR, WALL, LOWER_HOOK, UPPER_HOOK, CHANNEL = range(5)  # the channel has two
 NONE = -1
 
@@ -32,7 +33,7 @@ class ContactForces:
         smarticles: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary.
         links: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary.
         boundaries: (M,) place in `BOUNDARIES`; -1 between smarticles.
-        points: (M, 3) where the force acts: the mean of the points of contact, weighted by their normal forces [m].
+        points: (M, 3) mean of the points of contact, weighted by their normal forces [m].
         normal: (M,) sum of the normal forces at the points, positive [N].
         tangential: (M,) size of the sum of the tangential forces at the points [N].
         forces: (M, 3) on the first one, the sum over all points [N].
@@ -48,27 +49,27 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number) -> Number:
-    """What `contacts_of_points` calls links of smarticles."""
+    """Return the numbers of links in `contacts_of_points`."""
     return LINKS * smarticle + link
 
 
 def at_boundaries(part: Number) -> Number:
-    """What `contacts_of_points` calls boundaries, which are places in `BOUNDARIES`."""
+    """Return the numbers of boundaries, places in `BOUNDARIES`, in `contacts_of_points`."""
     return -1 - part
 
 
 def contacts_of_points(
     first: Numbers, second: Numbers, *, loads: Array, points: Array, friction: Array, forces: Array
 ) -> ContactForces:
-    """Contacts of the points at which bodies touch.
+    """Join the points at which bodies touch into contacts.
 
     Args:
-        first: (P,) what touches: see `at_links`; never a boundary.
-        second: (P,) what is touched: see `at_links` and `at_boundaries`.
+        first: (P,) bodies that touch: see `at_links`; never a boundary.
+        second: (P,) bodies that are touched: see `at_links` and `at_boundaries`.
         loads: (P,) normal force of each point, not negative [N]; a contact without any is left out.
-        points: (P, 3) where they are [m].
-        friction: (P, 3) tangential force of each [N], on the first one, as `forces`.
-        forces: (P, 3) on the first one, all together [N].
+        points: (P, 3) [m].
+        friction: (P, 3) tangential force of each on the first body [N].
+        forces: (P, 3) whole force on the first body [N].
     """
     turned = (second >= 0) & (second < first)
     sign = np.where(turned, -1.0, 1.0)[:, None]
@@ -84,9 +85,10 @@ def contacts_of_points(
     total = added(loads)
     carried = total > 0
     pairs, loose = which[carried].astype(np.int64), which[carried, 1] < 0
+    missing = np.column_stack([np.zeros_like(loose), loose])
     return ContactForces(
-        smarticles=np.where(np.column_stack([np.zeros_like(loose), loose]), NONE, pairs // LINKS),
-        links=np.where(np.column_stack([np.zeros_like(loose), loose]), NONE, pairs % LINKS),
+        smarticles=np.where(missing, NONE, pairs // LINKS),
+        links=np.where(missing, NONE, pairs % LINKS),
         boundaries=np.where(loose, -1 - pairs[:, 1], NONE),
         points=added(loads[:, None] * points)[carried] / total[carried, None],
         normal=total[carried],

@@ -1,13 +1,13 @@
 """One smarticle: three rigid boxes, and the sphere chains that stand for them in contact.
 
-Mass, centre of mass and inertia are those of the boxes, exactly. Spheres only carry contact: how many rows, how far
-apart and how thick is a choice of accuracy against cost (`Fidelity`), and no choice changes the mass or the inertia.
+Mass, centre of mass and inertia are those of the boxes, exactly. Spheres only carry contact; their number, distance and
+diameter are a choice of accuracy against cost (`Fidelity`).
 
 Body frame: origin at the centre of mass, axes along the principal axes of inertia, z along the normal of the plane.
 For the symmetric U (both angles 90°) x runs along the middle link and y from the middle link to the mouth.
 
-A middle link may be thicker in the plane than the barbs, like the body of a robot: the same spheres in rows beside each
-other in the plane, and barbs that begin where they are out of it.
+A middle link may be thicker in the plane than the barbs, like the body of a robot: its spheres then lie in several rows
+in the plane, and the barbs begin outside of them.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from dem.errors import InputError
 Array = NDArray[np.float64]
 
 LINKS = 3
-# Free distance between a barb's first sphere and the hinge's, in diameters: as much as a loaded hinge may give way
-# before the links of one smarticle touch, so that they need no exclusion from contact while they turn.
+# Free distance between a barb's first sphere and the hinge's, in diameters: a loaded hinge may give way by as much
+# before links of one smarticle touch.
 HINGE_CLEARANCE = 0.01
-# How far barbs turn inwards beyond the right angle [rad]: what of them stands out of a thicker middle link stays out.
+# Angle by which barbs turn inwards beyond the right angle [rad], outside of a thicker middle link.
 INWARDS = math.radians(15)
 
 
 def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
-    """Mean caliper width [m] of a rectangular section over all directions: perimeter/π.
+    """Return the mean caliper width [m] of a rectangular section over all directions, perimeter/π.
 
-    A loose packing of thin bars is set by their excluded volume. For two long bars at random orientations it is
-    proportional to the distance at which their axes touch, whose mean is the mean width of the section.
+    A loose packing of thin bars follows their excluded volume, for two long bars at random orientations proportional
+    to the distance at which their axes touch, whose mean is the mean width of the section.
 
     Source: Cauchy's formula for convex sections; Onsager's excluded volume of long rods.
     """
@@ -46,22 +46,19 @@ def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
 
 @lru_cache
 def chain_mean_width(pitch: float) -> float:
-    """Mean distance of the axes of two touching sphere chains, over the sphere diameter [1].
+    """Return the mean distance of the axes of two touching sphere chains, over the sphere diameter [1].
 
     The excluded volume of two long chains is that of two smooth bars of this width: less than one diameter, since beads
     sit partly in the valleys of the other chain. Two chains crossing at the angle γ touch where, seen along their
     common normal, two spheres lie nearest to each other, r diameters apart: the axes are then √(1 - r²) apart. The mean
     is over the phases of both chains, uniform over a period, and over isotropic directions, density sin γ, weighted
-    with the area sin γ of the parallelogram that excluded volume goes with.
+    by the area sin γ of the parallelogram in the excluded volume.
 
-    Args:
-        pitch: distance of neighbouring centres over the diameter, below √2, where chains would pass through each other.
+    `pitch` is the distance of neighbouring centres over the diameter, below √2, where chains pass through each other.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
-    angles, angle_weights = (
-        math.pi / 4 * (nodes + 1),
-        weights * np.sin(math.pi / 4 * (nodes + 1)) ** 2,
-    )
+    angles = math.pi / 4 * (nodes + 1)
+    angle_weights = weights * np.sin(angles) ** 2
     phases = pitch * nodes / 2
     beads = pitch * np.arange(-3, 4)
     along = (phases[:, None] + beads).reshape(24, 1, 7, 1)
@@ -91,18 +88,18 @@ class Boxes:
 
     @property
     def thicknesses_in_plane(self) -> tuple[float, float, float]:
-        """Of barb 1, middle link, barb 2 [m]."""
+        """Thicknesses in the plane of barb 1, middle link, barb 2 [m]."""
         barb, middle = self.thickness_in_plane, self.middle_thickness_in_plane
         return (barb, barb if middle is None else middle, barb)
 
     @property
     def bulge(self) -> float:
-        """By how much the middle link is thicker than the barbs, to either side in the plane [m]."""
+        """Excess thickness of the middle link over the barbs, on either side in the plane [m]."""
         return (self.thicknesses_in_plane[1] - self.thickness_in_plane) / 2
 
     @property
     def _weights(self) -> Array:
-        """(3,) float64 [m]: what masses go with, lengths of links as thick in the plane as the barbs."""
+        """(3,) [m]: weights of the links' masses, lengths of links as thick in the plane as the barbs."""
         return self.lengths * (np.array(self.thicknesses_in_plane) / self.thickness_in_plane)
 
     @property
@@ -112,10 +109,7 @@ class Boxes:
 
     @property
     def volume(self) -> float:
-        """Solid volume t1 t2 (w + 2l) [m³]; the small overlap at the hinges is counted as in the paper.
-
-        A middle link with a thickness of its own counts with that.
-        """
+        """Solid volume t1 t2 (w + 2l) [m³], each link with its own t2; overlap at hinges counts as in the paper."""
         return float(self.thickness_normal * self.thickness_in_plane * self._weights.sum())
 
     @property
@@ -127,13 +121,8 @@ class Boxes:
     def directions(self) -> Array:
         """(3, 3) float64: unit vectors, hinge to tip for the barbs, hinge 1 to hinge 2 for the middle link."""
         a1, a2 = self.angles
-        return np.array(
-            [
-                [-math.cos(a1), math.sin(a1), 0.0],
-                [1.0, 0.0, 0.0],
-                [math.cos(a2), math.sin(a2), 0.0],
-            ]
-        )
+        barbs = [-math.cos(a1), math.sin(a1), 0.0], [math.cos(a2), math.sin(a2), 0.0]
+        return np.array([barbs[0], [1.0, 0.0, 0.0], barbs[1]])
 
     @cached_property
     def _plain_vertices(self) -> Array:
@@ -214,7 +203,7 @@ class Boxes:
         return self._principal[0]
 
     def to_body(self, points: Array) -> Array:
-        """Points (n, 3) [m] from the middle link's frame to the body frame."""
+        """Turn points (n, 3) [m] from the middle link's frame to the body frame."""
         return matrix_product(points - self.plain_centre_of_mass, self._principal[1])
 
     @cached_property
@@ -225,11 +214,10 @@ class Boxes:
 
 @dataclass(frozen=True, kw_only=True)
 class SphereChain:
-    """How spheres are put along the links. Lengths in m.
+    """Arrangement of spheres along the links. Lengths in m.
 
     Args:
         rows: rows of spheres side by side across t1, the thickness along the normal.
-        diameter: sphere diameter [m].
         pitch: largest distance between neighbouring centres along a link [m].
     """
 
@@ -272,10 +260,9 @@ class Particle:
 
     @cached_property
     def _sides(self) -> Array:
-        """(sides,) [m]: offsets of the middle link's rows across it in the plane, no further apart than a diameter.
+        """(sides,) [m]: offsets of the middle link's rows across it in the plane, at most a diameter apart.
 
-        Outermost spheres lie further out than the barbs' by what the link is thicker: of spheres as thick as barbs they
-        reach its face, and of others the section keeps its mean width.
+        Outermost spheres lie further out than those of the barbs by the excess thickness.
         """
         bulge = self.boxes.bulge
         if not bulge:
@@ -284,17 +271,16 @@ class Particle:
 
     @property
     def barb_start(self) -> float:
-        """Distance from the hinge to a barb's first sphere [m].
+        """Distance from the hinge to a barb's first sphere [m]: little more than a diameter, at all angles.
 
-        A little more than one diameter away from the hinge's sphere. Out of a thicker middle link a barb stands as far
-        from its outer row, wherever it turns: up to the right angle by the triangle's inequality, beyond it by the
-        cosine.
+        At a thicker middle link it is the distance from the outer row: up to the right angle by the triangle's
+        inequality, beyond it by the cosine.
         """
         start = self.chain.diameter * (1 + HINGE_CLEARANCE)
         return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start
 
     def _stations(self, link: int) -> Array:
-        """Distances [m] of the sphere centres along a link, from its start (hinge, or hinge 1)."""
+        """Return distances [m] of the sphere centres along a link from its start (hinge, or hinge 1)."""
         d, pitch = self.chain.diameter, self.chain.pitch
         if link == 1:
             # The spheres at the hinges belong to the middle link and are centred on the hinge axes. A bar without

@@ -1,4 +1,4 @@
-"""Random poses of smarticles that overlap neither each other nor the container."""
+"""Poses of smarticles: random ones without overlap in a container, and those fitted to recorded vertices."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from dem.body.particle import Particle
+from dem.body.linear import applied, eigen_symmetric
+from dem.body.particle import Boxes, Particle
 from dem.errors import RunError
 
 Array = NDArray[np.float64]
@@ -41,21 +42,20 @@ def place_layer(
     rng: np.random.Generator,
     narrower: Callable[[Array], Array] | None = None,
 ) -> Poses:
-    """Random, non-overlapping poses in a slab of a cylinder.
+    """Return random poses without overlap in a slab of a cylinder.
 
-    Orientations are uniform over rotations, centres uniform over the disc and the slab's height, both subject to no
-    overlap. A slab that turns out to be too full grows upwards.
+    Orientations are uniform over rotations, centres over the disc and the slab's height, both subject to no overlap. A
+    slab that is too full grows upwards.
 
     Args:
         particle: one smarticle.
-        count: how many to place.
+        count: number of smarticles.
         radius: inner radius of the cylinder [m].
-        bottom: no sphere comes below this height [m].
+        bottom: height below which no sphere comes [m].
         height: height of the slab [m], in which the lowest spheres of the smarticles lie.
-        obstacles: (n, 3) centres of spheres [m], of the same diameter, that are there already.
+        obstacles: (n, 3) centres of present spheres of the same diameter [m].
         rng: source of randomness.
-        narrower: inner radii of the cylinder [m] at heights [m], where it is narrower in places; it must not be wider
-            higher up.
+        narrower: returns inner radii of the cylinder [m] at heights [m]; it must not be wider higher up.
 
     Raises:
         RunError: no room was found.
@@ -73,19 +73,10 @@ def place_layer(
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
-            distance, angle, lift = (
-                radius * math.sqrt(rng.random()),
-                2 * math.pi * rng.random(),
-                rng.random(),
-            )
+            distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
+            lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius
-            centre = np.array(
-                [
-                    distance * math.cos(angle),
-                    distance * math.sin(angle),
-                    bottom + lift * height - lowest,
-                ]
-            )
+            centre = np.array([distance * math.cos(angle), distance * math.sin(angle), bottom + lift * height - lowest])
             spheres += centre
             off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
             if off_axis.max() > widest:
@@ -109,3 +100,46 @@ def place_layer(
                 )
                 raise RunError(msg)
     return Poses(np.array(positions), tuple(rotations))
+
+
+def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
+    """Return the poses at which a shape lies nearest to given vertices, by least squares.
+
+    The turn of a straight shape about its length is unknown; the choice depends on the vertices alone.
+
+    Args:
+        boxes: the shape.
+        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
+
+    Returns:
+        The poses; and (N,) distance of the farthest vertex of each from its place [m].
+
+    Source:
+        Horn, J. Opt. Soc. Am. A 4, 629 (1987).
+    """
+    centre, own = vertices.mean(axis=1), boxes.vertices.mean(axis=0)
+    turns = _turns(np.einsum("nvi,vj->nij", vertices - centre[:, None], boxes.vertices - own))
+    positions = centre - applied(turns, own[None])[:, 0]
+    places = np.einsum("nij,vj->nvi", turns, boxes.vertices) + positions[:, None]
+    off: Array = np.linalg.norm(places - vertices, axis=-1).max(axis=1)
+    return Poses(positions, tuple(Rotation.from_matrix(turn) for turn in turns)), off
+
+
+def _turns(moments: Array) -> Array:
+    """Return (N, 3, 3) rotations R that make trace(Rᵀ M) largest, for M (N, 3, 3)."""
+    m = moments / np.abs(moments).max(axis=(1, 2), keepdims=True)
+    n = np.empty((len(m), 4, 4))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        n[:, 1 + i, 1 + i] = m[:, i, i] - m[:, j, j] - m[:, k, k]
+        n[:, 0, 1 + i] = n[:, 1 + i, 0] = m[:, k, j] - m[:, j, k]
+        n[:, 1 + j, 1 + k] = n[:, 1 + k, 1 + j] = m[:, j, k] + m[:, k, j]
+    n[:, 0, 0] = m[:, 0, 0] + m[:, 1, 1] + m[:, 2, 2]
+    values, vectors = eigen_symmetric(n)
+    w, x, y, z = np.take_along_axis(vectors, values.argmax(axis=1)[:, None, None], axis=2)[:, :, 0].T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)

@@ -1,4 +1,4 @@
-"""All smarticles at one instant."""
+"""Poses and velocities of all smarticles at one instant."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class State:
         *,
         shapes: tuple[Array, Array] | None = None,
     ) -> State:
-        """Smarticles that are rigid bodies.
+        """Return the state of rigid smarticles.
 
         Args:
             boxes: one smarticle.
@@ -52,8 +52,8 @@ class State:
             rotations: (N, 3, 3) body frame to laboratory frame [1].
             velocities: (N, 3) of the centres of mass [m/s].
             spins: (N, 3) angular velocities [rad/s].
-            shapes: (N, 3, 3) centres [m] and (N, 3, 3, 3) frames of the links in the body frame, each smarticle
-                its own; by default all have the boxes' shape.
+            shapes: (N, 3, 3) centres [m] and (N, 3, 3, 3) frames of the links of each smarticle in its body frame;
+                by default those of the boxes.
         """
         centres, frames = shapes or (boxes.link_centres[None], boxes.link_rotations[None])
         arms = np.einsum("nij,nkj->nki", rotations, centres)
@@ -77,8 +77,7 @@ class State:
         return self._mean(self.link_velocities)
 
     def _mean(self, values: Array) -> Array:
-        mean: Array = np.einsum("nkj,k->nj", values, self.boxes.link_masses / self.boxes.mass)
-        return mean
+        return np.asarray(np.einsum("nkj,k->nj", values, self.boxes.link_masses / self.boxes.mass))
 
     @cached_property
     def vertices(self) -> Array:
@@ -90,35 +89,31 @@ class State:
     @cached_property
     def angles(self) -> Array:
         """(N, 2) angles (α1, α2) of the barbs [rad], from the directions of the links."""
-        middle = self.link_rotations[:, 1]
-        along1 = np.einsum("ni,ni->n", self.link_rotations[:, 0, :, 0], middle[..., 0])
-        across1 = np.einsum("ni,ni->n", self.link_rotations[:, 0, :, 0], middle[..., 1])
-        along2 = np.einsum("ni,ni->n", self.link_rotations[:, 2, :, 0], middle[..., 0])
-        across2 = np.einsum("ni,ni->n", self.link_rotations[:, 2, :, 0], middle[..., 1])
+        (along1, across1), (along2, across2) = (
+            [np.einsum("ni,ni->n", self.link_rotations[:, barb, :, 0], self.link_rotations[:, 1, :, k]) for k in (0, 1)]
+            for barb in (0, 2)
+        )
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
     def spheres(self, particle: Particle, which: NDArray[np.int64] | None = None) -> Array:
-        """(N, S, 3) centres of the spheres [m], or of those `which` alone, by their numbers."""
+        """Return (N, S, 3) centres of the spheres [m], or of those with the numbers `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:
             links, local = links[which], local[which]
-        turned: Array = np.einsum("nsij,sj->nsi", self.link_rotations[:, links], local)
-        centres: Array = turned + self.link_positions[:, links]
-        return centres
+        turned = np.einsum("nsij,sj->nsi", self.link_rotations[:, links], local)
+        return np.asarray(turned + self.link_positions[:, links])
 
     @cached_property
     def momentum(self) -> Array:
         """(3,) momentum of all smarticles [kg m/s]."""
-        momentum: Array = self.boxes.mass * self.velocities.sum(axis=0)
-        return momentum
+        return np.asarray(self.boxes.mass * self.velocities.sum(axis=0))
 
     @cached_property
     def angular_momentum(self) -> Array:
         """(3,) angular momentum of all smarticles about the origin [kg m²/s]."""
         orbital = np.cross(self.link_positions, self.link_velocities) * self.boxes.link_masses[None, :, None]
         own = np.einsum("nkij,nkj->nki", self.link_rotations, self.boxes.link_inertias * self._local_spins)
-        total: Array = (orbital + own).sum(axis=(0, 1))
-        return total
+        return np.asarray((orbital + own).sum(axis=(0, 1)))
 
     @cached_property
     def kinetic_energy(self) -> float:
@@ -131,10 +126,9 @@ class State:
     @cached_property
     def _local_spins(self) -> Array:
         """(N, 3, 3) angular velocities in the links' own frames [rad/s]."""
-        spins: Array = np.einsum("nkij,nki->nkj", self.link_rotations, self.link_spins)
-        return spins
+        return np.asarray(np.einsum("nkij,nki->nkj", self.link_rotations, self.link_spins))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Gravitational energy [J] of all smarticles above a height [m], at g [m/s²]."""
+        """Return the gravitational energy [J] of all smarticles above a height [m], at g [m/s²]."""
         heights = self.positions[:, 2] - floor
         return float(self.boxes.mass * gravity * heights.sum())

@@ -1,4 +1,4 @@
-"""The phase that moves barbs as its motions say."""
+"""The phases that move barbs: by given motions, or by one of the paper's two gaits."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from dem.phases.gaits.actuated import ActuatedPhase
-from dem.phases.gaits.drive import BARBS, Gait
-from dem.setting.motion import Hold, Motion
+from dem.phases.actuated import BARBS, ActuatedPhase, Gait
+from dem.setting.motion import Hold, Motion, Ramp, Return, Sequence, Triangle
 from dem.setting.motor import Motor
-from dem.setting.part import Duration, Part
+from dem.setting.part import REFERENCE_ASPECT_RATIO, Duration, HingeAngle, Part
 from dem.setting.smarticle import Smarticle
 
 ActiveFraction = Annotated[
@@ -29,7 +28,7 @@ Offsets = Annotated[
 
 
 def _length_of_motions(data: dict[str, Any]) -> float:
-    """Default of `Actuate.duration_s`: the longest motion of those given; inf if that has no end."""
+    """Return the length [s] of the longest motion given; inf if that has no end."""
     motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
     return max((motion.duration for motion in motions), default=math.inf)
 
@@ -77,10 +76,6 @@ class Actuate(Part, ActuatedPhase):
                     "sequence with repeat"
                 )
                 raise ValueError(msg)
-        return self
-
-    @model_validator(mode="after")
-    def _something_to_offset(self) -> Self:
         if self.offsets == "random" and all(motion.period is None for motion in self.motions):
             msg = "offsets: random, but both barbs hold; use 'none'"
             raise ValueError(msg)
@@ -91,13 +86,8 @@ class Actuate(Part, ActuatedPhase):
         return {key: motion for key, motion in named.items() if motion is not None}
 
     @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
-    @property
     def keys(self) -> tuple[str, str]:
-        """The keys under which the motions of barb 1 and barb 2 stand."""
+        """The keys of the motions of barb 1 and barb 2."""
         return ("barbs", "barbs") if self.barbs is not None else ("barb_1", "barb_2")
 
     @property
@@ -107,7 +97,6 @@ class Actuate(Part, ActuatedPhase):
         return named[self.keys[0]], named[self.keys[1]]
 
     def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
-        """See `ActuatedPhase.gait`."""
         return Gait(
             motions=self.motions,
             keys=self.keys,
@@ -117,8 +106,71 @@ class Actuate(Part, ActuatedPhase):
         )
 
     def own(self, key: str) -> tuple[str, float | None]:
-        """See `ActuatedPhase.own`: a key of one of the motions, such as barbs.steps.1.amplitude_deg."""
+        # A key of one of the motions, such as barbs.steps.1.amplitude_deg.
         here: Any = self
         for part in key.split("."):
             here = here[int(part)] if part.isdigit() else getattr(here, part)
         return key, here
+
+
+class ShapeChange(Part, ActuatedPhase):
+    """Straighten both barbs, and turn them back to the angles where they began."""
+
+    type: Literal["shape-change"]
+    straight_deg: HingeAngle = Field(0.0, description="angle that the barbs are turned to [deg]")
+    opening_s: Duration = Field(1.5, description="time to get there [s]")
+    straight_hold_s: float = Field(0.0, ge=0, le=1e6, description="time to stay there [s]")
+    closing_s: Duration = Field(1.5, description="time to get back [s]")
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the phase [s]."""
+        return self.opening_s + self.straight_hold_s + self.closing_s
+
+    def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
+        steps: list[Motion] = [Ramp(type="ramp", to_deg=self.straight_deg, duration_s=self.opening_s)]
+        if self.straight_hold_s > 0:
+            steps.append(Hold(type="hold", duration_s=self.straight_hold_s))
+        steps.append(Return(type="return", duration_s=self.closing_s))
+        motion = Sequence(type="sequence", steps=tuple(steps))
+        return Gait(motions=(motion, motion), duration=motion.duration)
+
+    def own(self, key: str) -> tuple[str, float | None]:
+        name = "opening_s" if key == "barbs.steps.0.duration_s" else "closing_s"
+        return name, getattr(self, name)
+
+
+class InternalOscillation(Part, ActuatedPhase):
+    """Swing both barbs at the motor's speed limit, θ/2 to either side of the smarticle's own angles."""
+
+    type: Literal["internal-oscillation"]
+    theta_deg: float = Field(..., ge=1e-6, le=240, description="θ, full swing, peak to peak [deg]")
+    scaled: bool = Field(
+        True,
+        description="swing by θ · 0.7/(l/w) instead, so that the arc of a barb's tip is the same for every l/w",
+    )
+    duration_s: Duration = Field(5.0, description="length of the phase [s]")
+    active_fraction: ActiveFraction = 1.0
+    offsets: Offsets = "none"
+
+    def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
+        scale = REFERENCE_ASPECT_RATIO / smarticle.aspect_ratio if self.scaled else 1.0
+        barb_1, barb_2 = (
+            Triangle(
+                type="triangle",
+                centre_deg=angle,
+                amplitude_deg=self.theta_deg / 2 * scale,
+                speed_rad_per_s=motor.speed_limit_rad_per_s,
+            )
+            for angle in smarticle.angles_deg
+        )
+        return Gait(
+            motions=(barb_1, barb_2),
+            keys=("barb_1", "barb_2"),
+            duration=self.duration_s,
+            active_fraction=self.active_fraction,
+            offsets=self.offsets,
+        )
+
+    def own(self, key: str) -> tuple[str, float | None]:
+        return "theta_deg", self.theta_deg

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -11,8 +12,16 @@ from pydantic import Field
 from dem.body.placement import place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.phases.settling import SETTLE_SECONDS, Settle, has_settled
+from dem.phases.phase import (
+    CHECK_INTERVAL,
+    SETTLE_SECONDS,
+    Memory,
+    Phase,
+    SceneView,
+    Settle,
+    Stage,
+    has_settled,
+)
 from dem.setting.part import Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
@@ -52,129 +61,95 @@ class Deposit(Part, Phase):
     )
     settle: Settle = Field(default_factory=Settle, description="when the poured pile counts as settled")
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: something comes down, and a wall is high enough for one layer."""
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.gravity_m_per_s2 == 0:
-            msg = "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
-            raise ValueError(msg)
+            yield "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
         height = scene.container.height_m
-        if height is not None:
-            self._check_first_layer(scene, height)
-
-    def _check_first_layer(self, scene: SceneView, height: float) -> None:
-        """The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top."""
+        # The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top.
         slab = self.layer_height_w * scene.smarticle.middle_length_m
         least = 2 * scene.particle.radius + slab + scene.particle.reach
-        if height < least:
+        if height is not None and height < least:
             key = "container.height_m" if scene.container.tiers is None else "container.tiers"
             what = "it" if scene.container.tiers is None else "height_m of the top tier"
-            msg = (
+            yield (
                 f"{key}: {height:g} m of wall is too low for one layer of the pour, spread over "
                 f"phases.0.layer_height_w = {self.layer_height_w:g} w, which reaches {least:.4g} m; raise {what} by at "
                 f"least {least - height:.3g} m or lower layer_height_w"
             )
-            raise ValueError(msg)
-
-    @property
-    def known_duration(self) -> None:
-        """See `Phase.known_duration`."""
-        return
 
     def expected_duration(self, count: int) -> float:
-        """See `Phase.expected_duration`."""
         layer = LAYER_SECONDS if self.every_s is None else self.every_s
         return layer * math.ceil(count / self.per_layer) + SETTLE_SECONDS
 
     def peak_speed(self, gravity: float) -> float:
-        """See `Phase.peak_speed`."""
         return self.thrown_at_m_per_s
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Pouring(self, scene)
-
-
-class Pouring:
-    """Layers of random poses just above all others, the next when it is due; then the pile settles."""
-
-    def __init__(self, phase: Deposit, scene: SceneView) -> None:
-        self._phase = phase
-        self._scene = scene
+    def first_memory(self, scene: SceneView) -> Memory:
         rng = np.random.default_rng(scene.seed_for("deposit"))
         # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile;
         # `still` [s] that the pile has been.
-        self.memory: Memory = {
-            "left": scene.count,
-            "layer": 0,
-            "waited": 0.0,
-            "still": 0.0,
-            "random": rng.bit_generator.state,
-        }
+        state = rng.bit_generator.state
+        return {"left": scene.count, "layer": 0, "waited": 0.0, "still": 0.0, "random": state}
 
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        memory, every = self.memory, self._phase.every_s
-        if memory["left"] and every is not None:
-            self._pour(engine)
-            memory["layer"] = 0  # nobody waits for it
-            return every
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory = stage.memory
+        if memory["left"] and self.every_s is not None:
+            self._pour(stage, engine)
+            memory["layer"] = 0  # the next layer does not wait for it
+            return self.every_s
         if memory["layer"]:
-            self._look_at_layer(engine)
-        elif not memory["left"] and has_settled(self._phase.settle, memory, engine):
+            self._check_layer(memory, engine)
+        elif not memory["left"] and has_settled(self.settle, memory, engine):
             return 0.0
         if memory["left"] and not memory["layer"]:
-            self._pour(engine)
+            self._pour(stage, engine)
         memory["waited"] += CHECK_INTERVAL
         return CHECK_INTERVAL
 
-    def _pour(self, engine: Engine) -> None:
-        memory = self.memory
-        size = min(self._phase.per_layer, memory["left"])
-        rng = np.random.default_rng()
-        rng.bit_generator.state = memory["random"]
-        _pour_layer(self._phase, self._scene, engine, size, rng)
-        memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)
-
-    def _look_at_layer(self, engine: Engine) -> None:
-        size, limit = self.memory["layer"], self._phase.landed_speed_m_per_s
+    def _check_layer(self, memory: Memory, engine: Engine) -> None:
+        size, limit = memory["layer"], self.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
         if fastest < limit and engine.touches()[-size:].min() > 0:
-            self.memory.update(layer=0, waited=0.0)
-        elif self.memory["waited"] > LAYER_TIMEOUT:
+            memory.update(layer=0, waited=0.0)
+        elif memory["waited"] > LAYER_TIMEOUT:
             msg = (
                 f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
                 f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
             )
             raise RunError(msg)
 
-
-def _pour_layer(phase: Deposit, scene: SceneView, engine: Engine, size: int, rng: np.random.Generator) -> None:
-    particle, state = scene.particle, engine.state()
-    tops = state.vertices[..., 2].max(axis=1)
-    cylinder, slab = engine.cylinder, phase.layer_height_w * scene.smarticle.middle_length_m
-    if phase.every_s is None:
-        bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
-    else:
-        # Some may still fly: from the top of the wall, so that layers keep the distance that they have in time.
-        bottom = cylinder.height - slab - 2 * particle.reach
-    near = tops > bottom - 3 * particle.radius
-    hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
-    poses = place_layer(
-        particle,
-        count=size,
-        radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
-        bottom=bottom,
-        height=slab,
-        obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
-        rng=rng,
-        narrower=cylinder.inner_radii if cylinder.upper else None,
-    )
-    highest = poses.positions[:, 2].max() + particle.reach
-    if highest > cylinder.height:
-        key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
-        msg = (
-            f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} m, "
-            f"above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
+    def _pour(self, stage: Stage, engine: Engine) -> None:
+        scene, memory = stage.scene, stage.memory
+        size = min(self.per_layer, memory["left"])
+        rng = np.random.default_rng()
+        rng.bit_generator.state = memory["random"]
+        particle, state = scene.particle, engine.state()
+        tops = state.vertices[..., 2].max(axis=1)
+        cylinder, slab = engine.cylinder, self.layer_height_w * scene.smarticle.middle_length_m
+        if self.every_s is None:
+            bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
+        else:
+            # Some may still fly: from the top of the wall, so that layers keep the distance that they have in time.
+            bottom = cylinder.height - slab - 2 * particle.reach
+        near = tops > bottom - 3 * particle.radius
+        hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
+        poses = place_layer(
+            particle,
+            count=size,
+            radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
+            bottom=bottom,
+            height=slab,
+            obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
+            rng=rng,
+            narrower=cylinder.inner_radii if cylinder.upper else None,
         )
-        raise RunError(msg)
-    engine.add(poses, speed=phase.thrown_at_m_per_s)
+        highest = poses.positions[:, 2].max() + particle.reach
+        if highest > cylinder.height:
+            key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
+            msg = (
+                f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} "
+                f"m, above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
+            )
+            raise RunError(msg)
+        engine.add(poses, speed=self.thrown_at_m_per_s)
+        memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)

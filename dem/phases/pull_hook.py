@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -14,12 +14,7 @@ from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.smarticle import Smarticle
 
-HELD_FAST = 0.1  # s that a hook stays where its force limit has stopped it, for the force to be measured
-
-
-def _time_of_pull(data: dict[str, Any]) -> float:
-    """Default of `PullHook.duration_s`: until the hook has arrived."""
-    return float(data["distance_m"] / data["speed_m_per_s"])
+HELD_SECONDS = 0.1  # that a hook stays where its force limit has stopped it, for the force to be measured
 
 
 class PullHook(Part, Phase):
@@ -30,7 +25,7 @@ class PullHook(Part, Phase):
     distance_m: Length = Field(..., description="how far the hook is raised [m]; default: 2w")
     speed_m_per_s: Speed = Field(..., description="speed of the hook [m/s]; default: w per second")
     duration_s: Duration = Field(
-        default_factory=_time_of_pull,
+        default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
         description="length of the phase [s]; default: until the hook has arrived; longer: it then stays where it is",
     )
     force_limit_N: Force | None = Field(
@@ -50,14 +45,11 @@ class PullHook(Part, Phase):
             raise ValueError(msg)
         return self
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: there is a hook to pull."""
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.hooks is None:
-            msg = f"phases.{index}: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {{}}` will do)"
-            raise ValueError(msg)
+            yield f"phases.{index}: pull-hook, but the scene has no hooks; add the key hooks (`hooks: {{}}` will do)"
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`: a hook over the pile, and hooks that one smarticle can hold both of."""
         hooks = scene.hooks
         return () if hooks is None else (*self._over_the_pile(scene, hooks), *self._held_by_one(scene, hooks))
 
@@ -84,64 +76,41 @@ class PullHook(Part, Phase):
         )
 
     @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
-    @property
     def pushing_speed(self) -> float:
-        """See `Phase.pushing_speed`."""
         return self.speed_m_per_s
 
     @property
     def raises(self) -> float:
-        """See `Phase.raises`."""
         return self.distance_m
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
         return {
             EffectName.HOOKS: f"phase {index} raises the upper one by {1e3 * self.distance_m:.3g} mm at "
             f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}"
         }
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Pulling(self)
+    def first_memory(self, scene: SceneView) -> Memory:
+        # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last check.
+        return {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
 
-
-# Widths w and thicknesses t2 that the keys are by default.
-_DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
-
-
-def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
-    """Data of a phase with the keys filled in that follow from the smarticle; left alone unless it pulls a hook."""
-    pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
-    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
-
-
-class Pulling:
-    """The upper hook is raised until it has arrived or takes too much force, and then stays where it is."""
-
-    def __init__(self, phase: PullHook) -> None:
-        self._phase = phase
-        # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last look.
-        self.memory: Memory = {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        memory, phase = self.memory, self._phase
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory = stage.memory
         if memory["end"] is None:
-            arrival = engine.time + phase.distance_m / phase.speed_m_per_s
-            memory.update(arrival=arrival, end=engine.time + phase.duration_s, raising=True, felt=_felt_above(engine))
+            arrival = engine.time + self.distance_m / self.speed_m_per_s
+            memory.update(arrival=arrival, end=engine.time + self.duration_s, raising=True, felt=_felt_above(engine))
             engine.motors.weld()
-            engine.boundaries.raise_upper(phase.speed_m_per_s)
-            self._note(engine)
-        elif memory["raising"] and self._overloaded(engine):
-            memory.update(arrival=engine.time, end=engine.time + HELD_FAST)
+            engine.boundaries.raise_upper(self.speed_m_per_s)
+            _note(memory, engine)
+        elif memory["raising"]:
+            # Whether the mean force on the hook since the last check exceeds its limit.
+            before, step = memory["force_sum"], memory["step"]
+            _note(memory, engine)
+            limit = self.force_limit_N
+            if limit is not None and before - memory["force_sum"] > limit * (memory["step"] - step):
+                memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
         if memory["raising"] and (left := time_left(engine, memory["arrival"])):
-            return left if phase.force_limit_N is None else min(CHECK_INTERVAL, left)
+            return left if self.force_limit_N is None else min(CHECK_INTERVAL, left)
         if memory["raising"]:
             memory["raising"] = False
             engine.boundaries.stop()
@@ -153,17 +122,22 @@ class Pulling:
             )
         return left
 
-    def _overloaded(self, engine: Engine) -> bool:
-        """Whether the hook took more than it may since the last look, on average."""
-        limit, before, step = self._phase.force_limit_N, self.memory["force_sum"], self.memory["step"]
-        self._note(engine)
-        return limit is not None and before - self.memory["force_sum"] > limit * (self.memory["step"] - step)
 
-    def _note(self, engine: Engine) -> None:
-        self.memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
+def _note(memory: Memory, engine: Engine) -> None:
+    memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
+
+
+# Widths w and thicknesses t2 that the keys are by default.
+_DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
+
+
+def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
+    """Fill the keys of a pull-hook that follow from the smarticle; return other phases unchanged."""
+    pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
+    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
 
 
 def _felt_above(engine: Engine) -> list[float]:
-    """All that the upper hook has felt so far, summed over steps [N]: unchanged where nothing touches it."""
+    """Return the force on the upper hook, summed over steps [N]: unchanged where nothing touches it."""
     felt: list[float] = engine.boundaries.hook_sums[1].tolist()
     return felt

@@ -18,31 +18,12 @@ class Relax(Part, Phase):
     type: Literal["relax"]
     duration_s: Duration = Field(0.5, description="length of the phase [s]")
 
-    @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Resting(self.duration_s)
-
-
-class Resting:
-    """Nothing acts but gravity.
-
-    Args:
-        duration: length of the phase [s].
-    """
-
-    def __init__(self, duration: float) -> None:
-        self._duration = duration
-        self.memory: Memory = {"begun": False}
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        if self.memory["begun"]:
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
             return 0.0
-        self.memory["begun"] = True
+        stage.memory["begun"] = True
         engine.motors.weld()
-        return self._duration
+        return self.duration_s

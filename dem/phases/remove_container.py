@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -16,7 +16,7 @@ from dem.setting.part import Duration, Part, Speed
 class RemoveContainer(Part, Phase):
     """Take the container's wall away and let the pile rest on its floor, which has no end. Motors hold.
 
-    Smarticles are not held back from then on: how far they go is measured, not refused. A later phase that shakes the
+    Smarticles are not held back from then on: how far they go is measured. A later phase that shakes the
     container shakes the floor, and those that have rolled away with it.
     """
 
@@ -30,50 +30,27 @@ class RemoveContainer(Part, Phase):
         "[m/s]; a wall that is not clear of it at the end of the phase stays where it is; null: gone at once",
     )
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the container is taken away once at most."""
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         for earlier, phase in enumerate(scene.phases[:index]):
             if phase.frees:
-                msg = f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
-                raise ValueError(msg)
-
-    @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
+                yield f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
 
     @property
     def pushing_speed(self) -> float:
-        """See `Phase.pushing_speed`."""
         return self.speed_m_per_s or 0.0
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         speed = self.speed_m_per_s
         how = "at once" if speed is None else f"lifted at {1e3 * speed:.3g} mm/s"
         return {EffectName.WALL_REMOVAL: f"phase {index}: {how}"}
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Removing(self)
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"end": None, "lifting": False}
 
-
-class Removing:
-    """The container's wall goes away, at once or upwards, and the pile rests on the floor.
-
-    Args:
-        phase: the phase.
-    """
-
-    def __init__(self, phase: RemoveContainer) -> None:
-        self._phase = phase
-        self.memory: Memory = {"end": None, "lifting": False}
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        memory, speed = self.memory, self._phase.speed_m_per_s
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory, speed = stage.memory, self.speed_m_per_s
         if memory["end"] is None:
-            memory["end"] = engine.time + self._phase.duration_s
+            memory["end"] = engine.time + self.duration_s
             engine.motors.weld()
             if speed is None:
                 engine.boundaries.remove_wall()

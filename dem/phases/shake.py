@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -31,11 +31,10 @@ class Shake(Part, Phase):
     )
 
     def amplitude(self, gravity: float) -> float:
-        """A = Γ g / (2πf)² [m], gravity in m/s²."""
+        """Return A = Γ g / (2πf)² [m], gravity in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`: shaking that never lets go of the pile."""
         if not 0 < self.peak_acceleration_g < 1:
             return ()
         return (
@@ -43,64 +42,33 @@ class Shake(Part, Phase):
             "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
         )
 
-    @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
-
     def peak_speed(self, gravity: float) -> float:
-        """See `Phase.peak_speed`."""
         return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         alone = ", the floor alone" if _freed(scene, index) or self.moves == "floor" else ""
         return {
             EffectName.CONTAINER_MOTION: f"phase {index}: Γ = {self.peak_acceleration_g:g}, f = "
             f"{self.frequency_hz:g} Hz, A = {1e3 * self.amplitude(scene.gravity_m_per_s2):.3g} mm{alone}"
         }
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: a floor that moves alone stays within its wall."""
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        # A floor that moves alone stays within its wall.
         amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
         if self.moves == "floor" and amplitude > below:
-            msg = (
+            yield (
                 f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
                 f"{below:.3g} m below it; use a lower peak_acceleration_g, a higher frequency_hz, or moves: container"
             )
-            raise ValueError(msg)
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Shaking(self, scene.gravity_m_per_s2, freed=_freed(scene, index))
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
 
-
-def _freed(scene: SceneView, index: int) -> bool:
-    """Whether the container is taken away before a phase."""
-    return any(before.frees for before in scene.phases[:index])
-
-
-class Shaking:
-    """The container moves, or its floor alone where the wall was taken away.
-
-    Args:
-        phase: the phase.
-        gravity: g [m/s²].
-        freed: whether the wall was to be taken away before.
-    """
-
-    def __init__(self, phase: Shake, gravity: float, *, freed: bool) -> None:
-        self._phase = phase
-        self._amplitude = phase.amplitude(gravity)
-        self._freed = freed
-        self.memory: Memory = {"begun": False}
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        if self.memory["begun"]:
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
             engine.boundaries.stop()
             return 0.0
-        if self._freed and engine.boundaries.walled:
+        if _freed(stage.scene, stage.index) and engine.boundaries.walled:
             edge = engine.boundaries.wall_bottom - engine.boundaries.floor
             msg = (
                 f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
@@ -108,8 +76,13 @@ class Shaking:
                 "speed_m_per_s"
             )
             raise RunError(msg)
-        self.memory["begun"] = True
+        stage.memory["begun"] = True
         engine.motors.weld()
-        walls = self._phase.moves == "container"
-        engine.boundaries.shake(amplitude=self._amplitude, frequency=self._phase.frequency_hz, walls=walls)
-        return self._phase.duration_s
+        amplitude = self.amplitude(stage.scene.gravity_m_per_s2)
+        engine.boundaries.shake(amplitude=amplitude, frequency=self.frequency_hz, walls=self.moves == "container")
+        return self.duration_s
+
+
+def _freed(scene: SceneView, index: int) -> bool:
+    """Return whether an earlier phase takes the container away."""
+    return any(before.frees for before in scene.phases[:index])

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from dem.body.chain import Chain, parted
+from dem.body.chain import parted
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.phases.actuated import ActuatedPhase, Gait
 from dem.phases.arrange import chain_of
-from dem.phases.gaits.actuated import ActuatedPhase, Actuating
-from dem.phases.gaits.drive import Drive, Gait, drive
 from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
 from dem.physics.contact import StringLaw
 from dem.setting.motion import Hold
@@ -43,76 +42,50 @@ class Strain(Part, ActuatedPhase):
         """Length of the phase [s], unless the chain parts before."""
         return self.distance_m / self.speed_m_per_s
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the strings reach the axis."""
-        super().check(scene, index)
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        yield from super().check(scene, index)
         chain = chain_of(scene)
         if self.string_length_m < chain.width:
-            msg = (
+            yield (
                 f"phases.{index}.string_length_m: {self.string_length_m:g} m does not reach the axis from a barb of a "
                 f"chain that is h = {chain.width:.4g} m wide; use at least {chain.width:.4g} m"
             )
-            raise ValueError(msg)
-
-    @property
-    def known_duration(self) -> float:
-        """See `Phase.known_duration`."""
-        return self.duration_s
 
     @property
     def pushing_speed(self) -> float:
-        """See `Phase.pushing_speed`."""
         return self.speed_m_per_s
 
     @property
     def pulled_by(self) -> tuple[float, float]:
-        """See `Phase.pulled_by`."""
         return self.string_stiffness_N_per_m, self.string_damping_N_s_per_m
 
     def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
-        """See `ActuatedPhase.gait`: barbs stay."""
         hold = Hold(type="hold")
         return Gait(motions=(hold, hold), duration=self.duration_s)
 
     def own(self, key: str) -> tuple[str, float | None]:
-        """See `ActuatedPhase.own`."""
         return "distance_m", self.distance_m
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """See `Phase.calls`."""
         return {
             **super().calls(scene, index),
             EffectName.STRINGS: f"phase {index} pulls at {1e3 * self.speed_m_per_s:.3g} mm/s, tied at the "
             f"{self.tied_at}, {self.string_stiffness_N_per_m:g} N/m each",
         }
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return Straining(drive(scene, index), scene.fidelity.control_interval_s, self, chain_of(scene))
-
-
-class Straining(Actuating):
-    """The motors hold while strings pull the chain apart, until it has parted or the end of the way."""
-
-    def __init__(self, schedule: Drive, interval: float, phase: Strain, chain: Chain) -> None:
-        self._looks_per_check = max(1, round(CHECK_INTERVAL / interval))
-        super().__init__(schedule, interval, halt_every=self._looks_per_check)
-        self._phase = phase
-        self._chain = chain
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        phase, diameter = self._phase, 2 * self._chain.particle.radius
-        if self.memory["look"] == 0:
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        chain, look = chain_of(stage.scene), stage.memory["look"]
+        every = max(1, round(CHECK_INTERVAL / stage.scene.fidelity.control_interval_s))
+        if look == 0:
             engine.motors.articulate()
             law = StringLaw(
-                length=phase.string_length_m,
-                stiffness=phase.string_stiffness_N_per_m,
-                damping=phase.string_damping_N_s_per_m,
+                length=self.string_length_m,
+                stiffness=self.string_stiffness_N_per_m,
+                damping=self.string_damping_N_s_per_m,
             )
-            engine.strings.tie(self._chain.ties(phase.tied_at), law, (0.0, phase.speed_m_per_s))
-        over = self.memory["look"] % self._looks_per_check == 0 and parted(engine.state(), diameter)
-        wait = 0.0 if over else super().proceed(engine)
+            engine.strings.tie(chain.ties(self.tied_at), law, (0.0, self.speed_m_per_s))
+        over = look % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
+        wait = 0.0 if over else self.follow(stage, engine, every)
         if not wait:
             engine.strings.untie()
         return wait

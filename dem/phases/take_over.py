@@ -1,42 +1,103 @@
-"""The phase that takes over the smarticles of another run, on whatever engine that one was computed.
+"""The phase that takes over the smarticles of another run of any engine.
 
-A frame holds poses to the last bit, and no contacts: what springs of friction held is forgotten, and smarticles begin
-at rest. On another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each
-other's valleys, smooth links do not. What overlaps by that is let apart without speed, before time goes on freely.
+A frame holds poses to the last bit, and no contacts: friction springs are lost, and smarticles begin at rest. On
+another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each other's
+valleys, smooth links do not. Such overlaps are first relaxed without speed.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
-from dem.body.fitting import fitted_poses
-from dem.body.placement import Poses
+from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
-from dem.phases.settling import Settle, has_settled
-from dem.record.taken import LAST, Taken, take
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, Stage, has_settled
+from dem.record.frame import Frame
+from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
 from dem.setting.part import Part
 
 Array = NDArray[np.float64]
 
+LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
-STRIDE = 10  # steps between looks at whether what overlaps flies apart; a contact swings in about as many
+STRIDE = 10  # steps between checks whether overlapping smarticles fly apart; a contact swings in about as many
 # Sphere diameters that a vertex may be from its place in the scene's shape. A hinge on YADE gives way by 0.01 in a
 # pile, and contacts at rest are about as deep, so that it makes no more overlap than there is.
 MOST_OFF = 0.02
 # Keys of a smarticle that run.json has too.
 _SHAPE = ("aspect_ratio", "middle_length_m", "thickness_normal_m", "thickness_in_plane_m")
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One frame of another run, by its number."""
+
+    run: Run
+    number: int
+    frame: Frame
+
+    @property
+    def vertices(self) -> Array:
+        """(N, 4, 3) above the floor [m]."""
+        return self.frame.vertices - [0.0, 0.0, self.frame.floor_z]
+
+    @property
+    def sha256(self) -> str:
+        """Hash of these vertices: all of a frame that decides what comes after."""
+        return hashlib.sha256(np.ascontiguousarray(self.vertices, dtype="<f8").tobytes()).hexdigest()
+
+    @property
+    def fastest(self) -> float:
+        """Greatest speed of a link's centre [m/s], which is not taken over."""
+        return float(np.linalg.norm(self.frame.link_velocity, axis=-1).max())
+
+    def __str__(self) -> str:
+        return f"frame {self.number} of {self.run.path}"
+
+
+def take(path: Path, frame: int | str) -> Taken:
+    """Read a frame of a run, by its number or `LAST`.
+
+    Raises:
+        InputError: no such run or frame, damaged, or the run is not over; begins with the wrong key, `run` or `frame`.
+    """
+    try:
+        run = open_run(path)
+        frames, state = run.frames, run.status.state
+    except InputError as error:
+        msg = f"run: {error}"
+        raise InputError(msg) from None
+    number = len(frames) - 1 if frame == LAST else int(frame)
+    msg = ""
+    if state == "running":
+        msg = f"run: {run} is still being computed; wait until it is done: smarticles status {run}"
+    elif frame == LAST and state != "done":
+        msg = (
+            f"frame: {LAST}, but {run} is {state}; go on with it (smarticles resume {run}), or give the "
+            "number of a frame"
+        )
+    elif number >= len(frames):
+        msg = f"frame: {number}, but the frames of {run} are 0 … {len(frames) - 1}; use one of them, or {LAST}"
+    if msg:
+        raise InputError(msg)
+    try:
+        return Taken(run, number, frames[number])
+    except InputError as error:
+        msg = f"frame: {error}"
+        raise InputError(msg) from None
 
 
 class TakeOver(Part, Phase):
@@ -86,22 +147,18 @@ class TakeOver(Part, Phase):
     @model_validator(mode="wrap")
     @classmethod
     def _pinned(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """What is meant today: the number of the last frame, and the hash of its content."""
+        """Fill in the number of the last frame and the hash of its content, as they are today."""
         made = handler(data)
         if made.sha256 is not None and made.frame != LAST:
             return made
         taken = take(Path(made.run), made.frame)
         pinned = {"frame": taken.number, "sha256": made.sha256 or taken.sha256}
-        # What was filled in here was not said: another run in its place has a hash of its own.
+        # Filled in here, not given by the user: another run in its place has a hash of its own.
         return cast("Self", cls.model_construct(_fields_set=made.model_fields_set, **{**dict(made), **pinned}))
 
     @cached_property
     def taken(self) -> Taken:
-        """The frame.
-
-        Raises:
-            InputError: it is not there, or not what the scene was made from.
-        """
+        """The frame; an InputError if it is missing, or not the one that the scene was made from."""
         taken = take(Path(self.run), self.frame)
         if taken.sha256 != self.sha256:
             msg = (
@@ -111,22 +168,16 @@ class TakeOver(Part, Phase):
             raise InputError(msg)
         return taken
 
-    def check(self, scene: SceneView, index: int) -> None:
-        """See `Phase.check`: the frame's smarticles are the scene's, and fit into its container.
-
-        A source that is gone is no reason to refuse a scene that was run; `ready` refuses to run one.
-        """
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.gravity_m_per_s2 == 0:
-            msg = "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
-            raise ValueError(msg)
+            yield "gravity_m_per_s2: 0 m/s²; without gravity no pile settles in phases.0 (take-over)"
         try:
             taken = self.taken
         except InputError:
-            return
-        poses_of(scene, taken)
+            return  # a scene whose source is gone can still be read; `ready` rejects it before a run
+        yield from _mismatches(scene, taken)
 
     def ready(self, scene: SceneView) -> None:
-        """See `Phase.ready`."""
         try:
             taken = self.taken
         except InputError as error:
@@ -136,7 +187,6 @@ class TakeOver(Part, Phase):
 
     @property
     def origin(self) -> Mapping[str, Any]:
-        """See `Phase.origin`."""
         taken = self.taken
         return {
             "run": self.run,
@@ -150,7 +200,6 @@ class TakeOver(Part, Phase):
         }
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """See `Phase.warnings`."""
         try:
             taken = self.taken
         except InputError:
@@ -163,41 +212,25 @@ class TakeOver(Part, Phase):
             "m/s), and velocities are not taken over; use a frame at the end of a relax phase",
         )
 
-    @property
-    def known_duration(self) -> None:
-        """See `Phase.known_duration`."""
-        return
-
     def expected_duration(self, count: int) -> float:
-        """See `Phase.expected_duration`: nothing falls, so that little more than the hold is needed."""
+        # Nothing falls, so that little more than the hold is needed.
         return self.settle.hold_s + TAKEN_SECONDS
 
-    def begin(self, scene: SceneView, index: int) -> Stage:
-        """See `Phase.begin`."""
-        return TakingOver(self, scene)
+    def first_memory(self, scene: SceneView) -> Memory:
+        # `task`: what is due; `stops`: how often smarticles were stopped; `height`: their mean when added [m];
+        # `waited`: since then [s]; `still`: that the pile has been [s].
+        return {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
 
-
-class TakingOver:
-    """All smarticles are put in at once, at rest; what overlaps is let apart without speed; then the pile settles."""
-
-    def __init__(self, phase: TakeOver, scene: SceneView) -> None:
-        self._phase = phase
-        self._scene = scene
-        # `task`: what is due; `stops`: how often smarticles were stopped; `height` [m] of their mean when they were put
-        # in; `waited` [s] since; `still` [s] that the pile has been.
-        self.memory: Memory = {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
-
-    def proceed(self, engine: Engine) -> float:
-        """See `Stage.proceed`."""
-        wait = self._do(engine)
-        self.memory["waited"] += wait
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        wait = self._do(stage, engine)
+        stage.memory["waited"] += wait
         return wait
 
-    def _do(self, engine: Engine) -> float:
-        memory, settle, stride = self.memory, self._phase.settle, STRIDE * engine.time_step
+    def _do(self, stage: Stage, engine: Engine) -> float:
+        memory, settle, stride = stage.memory, self.settle, STRIDE * engine.time_step
         if memory["task"] == "put":
-            self._phase.ready(self._scene)
-            engine.add(poses_of(self._scene, self._phase.taken))
+            self.ready(stage.scene)
+            engine.add(poses_of(stage.scene, self.taken))
             memory.update(task="count", height=_mean_height(engine))
             return engine.time_step
         if memory["task"] == "count":
@@ -208,32 +241,24 @@ class TakingOver:
         if memory["task"] == "let apart":
             fastest = float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
             if fastest > settle.speed_m_per_s + stride * engine.gravity:
-                self._stop(engine, fastest)
+                if memory["waited"] > settle.timeout_s:
+                    msg = (
+                        f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up "
+                        f"to {fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
+                        "phases.0.settle.speed_m_per_s, or pour on this engine"
+                    )
+                    raise RunError(msg)
+                engine.still()
+                memory["stops"] += 1
                 return stride
             memory["task"] = "settle"
-            self._tell(engine)
+            if memory["stops"]:
+                memory["warning"] = (
+                    f"poses of {self.run} overlap as this scene has its links (engine, fidelity): smarticles were "
+                    f"stopped {memory['stops']} times in {memory['waited']:.3g} s while contacts let them apart, and "
+                    f"stand {1e3 * (_mean_height(engine) - memory['height']):.2g} mm higher on average"
+                )
         return 0.0 if has_settled(settle, memory, engine) else CHECK_INTERVAL
-
-    def _stop(self, engine: Engine, fastest: float) -> None:
-        settle: Settle = self._phase.settle
-        if self.memory["waited"] > settle.timeout_s:
-            msg = (
-                f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up to "
-                f"{fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
-                "phases.0.settle.speed_m_per_s, or pour on this engine"
-            )
-            raise RunError(msg)
-        engine.still()
-        self.memory["stops"] += 1
-
-    def _tell(self, engine: Engine) -> None:
-        memory = self.memory
-        if memory["stops"]:
-            memory["warning"] = (
-                f"poses of {self._phase.run} overlap as this scene has its links (engine, fidelity): smarticles were "
-                f"stopped {memory['stops']} times in {memory['waited']:.3g} s while contacts let them apart, and stand "
-                f"{1e3 * (_mean_height(engine) - memory['height']):.2g} mm higher on average"
-            )
 
 
 def _mean_height(engine: Engine) -> float:
@@ -241,86 +266,85 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """The smarticles of a frame as poses of the scene's own.
+    """Return the smarticles of a frame as poses of the scene's own.
 
     Raises:
-        InputError: they are others, or do not fit into its container; one line with key, value and the way out.
+        InputError: they differ, or do not fit into its container; one line with key, value and the way out.
     """
-    if taken.run.manifest.planar:
-        msg = f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
-        raise InputError(msg)
-    _check_smarticle(scene, taken)
-    _check_room(scene, taken)
-    poses, off = fitted_poses(scene.particle.boxes, taken.vertices)
-    if off.max() > MOST_OFF * scene.sphere_diameter:
-        _refuse_angles(scene, taken)
-    return poses
+    for mismatch in _mismatches(scene, taken):
+        raise InputError(mismatch)
+    return fitted_poses(scene.particle.boxes, taken.vertices)[0]
 
 
-def _check_smarticle(scene: SceneView, taken: Taken) -> None:
+def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
+    """Yield what of a frame does not fit the scene; each item relies on the ones before not to be yielded."""
+    manifest, taking = taken.run.manifest, "which phases.0 (take-over) takes over"
+    if manifest.planar:
+        yield f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
     for key in _SHAPE:
-        here, there = getattr(scene.smarticle, key), getattr(taken.run.manifest, key)
+        here, there = getattr(scene.smarticle, key), getattr(manifest, key)
         if not math.isclose(here, there, rel_tol=1e-9):
             unit = "" if key == "aspect_ratio" else " m"
-            msg = (
-                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, which phases.0 "
-                "(take-over) takes over; use the same, or another run"
+            yield (
+                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, {taking}; use the same, or "
+                "another run"
             )
-            raise InputError(msg)
     if taken.frame.count != scene.count:
-        whole = (
-            "" if taken.frame.count == taken.run.manifest.count else f" of {taken.run.manifest.count}, poured so far"
+        whole = "" if taken.frame.count == manifest.count else f" of {manifest.count}, poured so far"
+        yield (
+            f"count: {scene.count} here, but {taken}, {taking}, holds {taken.frame.count}{whole}; use the same, or "
+            "another frame"
         )
-        msg = (
-            f"count: {scene.count} here, but {taken}, which phases.0 (take-over) takes over, holds "
-            f"{taken.frame.count}{whole}; use the same, or another frame"
-        )
-        raise InputError(msg)
     straight = scene.smarticle.aspect_ratio == 0 or scene.smarticle.angles_deg == (0.0, 0.0)
     if straight and scene.fidelity.rows > 1:
-        msg = (
+        yield (
             f"fidelity.rows: {scene.fidelity.rows}, but frames do not know how a straight smarticle is turned about "
             "its length, which phases.0 (take-over) needs for more than 1; use 1, or angles_deg that are not 0"
         )
-        raise InputError(msg)
-
-
-def _check_room(scene: SceneView, taken: Taken) -> None:
-    """No link's axis may lie outside the wall, under the floor or in a hook, from where no contact pushes it back."""
+    # No link's axis may lie outside the wall, under the floor or in a hook: no contact would push it back.
     cylinder, vertices = scene.cylinder, taken.vertices
     heights, off_axis = vertices[..., 2], np.hypot(vertices[..., 0], vertices[..., 1])
-    room = cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)
-    beyond = (off_axis > room).any(axis=1)
+    beyond = (off_axis > cylinder.radii(heights) * (cylinder.corner_radius / cylinder.radius)).any(axis=1)
     if beyond.any():
-        msg = (
-            f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, which phases.0 "
-            f"(take-over) takes over, reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider "
-            "container or another run"
+        yield (
+            f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, {taking}, "
+            f"reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider container or another run"
         )
-        raise InputError(msg)
     lowest = float(_within_tips(vertices, scene.particle.radius)[..., 2].min())
     if heights.max() > cylinder.height or lowest < 0:
-        msg = (
-            f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, which phases.0 (take-over) "
-            f"takes over, lie at {lowest:.4g} to {heights.max():.4g} m; use a higher container or another "
-            "run"
+        yield (
+            f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, {taking}, lie at "
+            f"{lowest:.4g} to {heights.max():.4g} m; use a higher container or another run"
         )
-        raise InputError(msg)
     for name, cross in zip(("lower", "upper"), scene.hooks.crosses if scene.hooks else (), strict=False):
         inside = _in_cross(cross, vertices)
         if inside.any():
-            msg = (
-                f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, which phases.0 "
-                "(take-over) takes over, lie in this hook; take over a run that was poured with these hooks"
+            yield (
+                f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, {taking}, lie in "
+                "this hook; take over a run that was poured with these hooks"
             )
-            raise InputError(msg)
+    _, off = fitted_poses(scene.particle.boxes, vertices)
+    if off.max() <= MOST_OFF * scene.sphere_diameter:
+        return
+    angles = _angles(taken)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
+    (first, second), middle = scene.smarticle.angles_deg, (low + high) / 2
+    # A scene can be made with barbs that all stand alike.
+    alike = math.radians(float((high - low).max()) / 2) * scene.particle.boxes.barb_length
+    way_out = (
+        f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
+        if alike < MOST_OFF * scene.sphere_diameter
+        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
+    )
+    yield (
+        f"smarticle.angles_deg: ({first:g}, {second:g}) here, but the barbs of {taken}, {taking}, stand at {reached}; "
+        f"{way_out}"
+    )
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Vertices with both tips a radius [m] further in, where a chain or strand has its last point: what touches.
-
-    A tip may be under the floor by as much as a contact is deep.
-    """
+    """Return vertices with both tips a radius [m] further in, at the last contact point of a chain or strand."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -334,48 +358,26 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
-    """(N,) whether the axis of a link of each smarticle passes through a bar, looked at in steps of a quarter of it."""
+    """Return (N,) whether the axis of a link passes through a bar, checked in steps of a quarter of its side."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
     points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
     above = points - [0.0, 0.0, cross.height]
-    inside = [(np.abs(above) < extents).all(axis=-1).any(axis=-1) for extents in cross.half_extents]
+    inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
     found: NDArray[np.bool_] = np.logical_or.reduce(inside)
     return found
 
 
-def _refuse_angles(scene: SceneView, taken: Taken) -> NoReturn:
-    angles = _angles(taken)
-    low, high = angles.min(axis=0), angles.max(axis=0)
-    told = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
-    here = scene.smarticle.angles_deg
-    middle = (low + high) / 2
-    # Of barbs that stand alike a scene can be made.
-    alike = float((high - low).max()) / 2 * math.pi / 180 * scene.particle.boxes.barb_length
-    way_out = (
-        f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
-        if alike < MOST_OFF * scene.sphere_diameter
-        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
-    )
-    msg = (
-        f"smarticle.angles_deg: ({here[0]:g}, {here[1]:g}) here, but the barbs of {taken}, which phases.0 (take-over) "
-        f"takes over, stand at {told}; {way_out}"
-    )
-    raise InputError(msg)
-
-
 def _angles(taken: Taken) -> Array:
-    """(N, 2) angles of the barbs [deg]; of a run whose frames do not tell them without their sign."""
+    """Return (N, 2) angles of the barbs [deg], without their sign where frames do not hold them."""
     recorded = taken.frame.cell_data.get("angle_rad")
     if recorded is not None:
-        told: Array = np.degrees(recorded[:, [0, 2]])
-        return told
+        return np.asarray(np.degrees(recorded[:, [0, 2]]))
     tip_1, hinge_1, hinge_2, tip_2 = np.moveaxis(taken.vertices, 1, 0)
     along = hinge_2 - hinge_1
     cosines = [
         np.einsum("ni,ni->n", way, barb) / np.linalg.norm(way, axis=1) / np.linalg.norm(barb, axis=1)
         for way, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
     ]
-    seen: Array = np.degrees(np.arccos(np.clip(cosines, -1, 1))).T
-    return seen
+    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))).T)

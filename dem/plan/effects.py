@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
+from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
-from dem.phases.gaits.checks import overshoot
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,

@@ -1,11 +1,11 @@
-"""Checkpoints: everything that a run needs to go on, in one checksummed file; the one before is kept.
+"""Checkpoints: everything that a run needs to be resumed, in one checksummed file; the previous one is kept.
 
-What the engine saved is opaque here: bytes, and the name and version of the engine that can read them. Everything
-else is plain data.
+What the engine saved is opaque here: bytes, with the name and version of the engine that can read them. The rest is
+plain data.
 
-A run on one thread that goes on from a checkpoint gives the same bits as the run that was never stopped, because the
-running simulation reloads its own checkpoint whenever it writes one: an engine may order bodies and contacts anew when
-it loads, and sums of forces depend on their order.
+On one thread a resumed run gives the same bits as one that was never stopped, because the running simulation reloads
+each checkpoint that it writes: an engine may order bodies and contacts anew when it loads, and sums of forces depend on
+their order.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from dem.record.files import whole
 from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
-# In checkpoints of before engines had names there was one engine: its member, and the key of its version.
+# Checkpoints written before engines had names: the member of the only engine, and the key of its version.
 _YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """What a run needs to go on.
+    """What a run needs to be resumed.
 
     Args:
-        scene_sha256: of the scene that is run.
+        scene_sha256: hash of the scene.
         made_by: name and version of the engine.
         state: plain data: phase, stage, recorder, clock.
         series: columns of the series so far.
@@ -51,10 +51,10 @@ class Checkpoint:
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write beside, flush to the disk, keep the one before, rename.
+    """Write a checkpoint whole, flushed to the disk; the previous one is kept.
 
     Raises:
-        RunError: it cannot be written; the checkpoints that were there stay.
+        RunError: it cannot be written; older checkpoints stay.
     """
     newest = folder / CHECKPOINT
     name, version = checkpoint.made_by
@@ -82,15 +82,10 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
-    """The newest checkpoint that is whole.
-
-    Args:
-        folder: the run directory.
-        scene_sha256: of the scene that is to go on.
-        made_by: name and version of the engine that is to go on.
+    """Read the newest checkpoint that is whole, of a scene, and of an engine by name and version.
 
     Returns:
-        The checkpoint, and a warning where the newest one was damaged and the one before is used.
+        The checkpoint, and a warning where the newest one is damaged and the previous one is used.
 
     Raises:
         InputError: no whole checkpoint, or one of another format, engine or scene.
@@ -121,12 +116,12 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
 
 
 def has_checkpoint(folder: Path) -> bool:
-    """Whether a run directory holds a checkpoint, whole or not."""
+    """Return whether a run directory holds a checkpoint, whole or not."""
     return (folder / CHECKPOINT).exists() or (folder / CHECKPOINT_BEFORE).exists()
 
 
 def _read(path: Path) -> tuple[object, Checkpoint]:
-    """Its format, and all of it."""
+    """Return the format of a checkpoint, and its content."""
     with zipfile.ZipFile(path) as archive:
         # Reading a member checks its CRC.
         state = json.loads(archive.read(_STATE))

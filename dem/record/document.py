@@ -26,14 +26,14 @@ REMEDY = "give the directory of a run made by `smarticles run`"
 
 
 class Document(BaseModel):
-    """A JSON object with typed keys; keys of other versions are passed over."""
+    """A JSON object with typed keys; keys of other versions are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, strict=True)
     remedy: ClassVar[str] = REMEDY
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read the object that a file holds.
+        """Read a file.
 
         Raises:
             InputError: It is missing, damaged, or lacks a key; one line with file, key and value.
@@ -44,12 +44,11 @@ class Document(BaseModel):
             cannot_read("manifest", path, error, cls.remedy)
         except ValidationError as error:
             found = error.errors(include_url=False)[0]
-            key = ".".join(map(str, found["loc"]))
+            place = [*map(str, found["loc"])]
             text = found["msg"].removeprefix("Value error, ")
-            got = (
-                "" if found["type"] in ("missing", "json_invalid", "value_error") else f", got {shown(found['input'])}"
-            )
-            cannot_read("manifest", path, f"{key}: {text}{got}" if key else text + got, cls.remedy)
+            if found["type"] not in ("missing", "json_invalid", "value_error"):
+                text += f", got {shown(found['input'])}"
+            cannot_read("manifest", path, ": ".join([".".join(place), text] if place else [text]), cls.remedy)
 
     def write(self, path: Path, *, make_folder: bool = False) -> None:
         """Write it whole, without keys that are None.
@@ -76,25 +75,21 @@ class Manifest(Document):
     """What made a run, `run.json`.
 
     Attributes:
-        format: Version of the run directory.
-        versions: Version of each program that took part.
         engine: Absent in manifests written before the key was added.
-        threads: Threads that the engine ran with; ranks on lammps.
+        threads: Threads of the engine; ranks on lammps.
         fidelity: Name of the fidelity that the scene's is based on.
-        count: Number of smarticles of the scene.
         aspect_ratio: l/w [-].
-        thickness_normal_m: Thickness t1 along the normal of the smarticle's plane.
-        thickness_in_plane_m: Thickness t2 in the smarticle's plane.
-        middle_thickness_in_plane_m: That of the middle link, where it has its own.
+        thickness_normal_m: t1, along the normal of the smarticle's plane.
+        thickness_in_plane_m: t2, in the smarticle's plane.
+        middle_thickness_in_plane_m: That of the middle link, where it differs.
         solid_volume_m3: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2.
         container_radius_m: Of the widest tier.
         packing_radius_m: Radius that packing fractions are computed with, where it is not the container's.
         container_tiers: Cylinders of different radii that stand on each other.
         planar: Whether all motion is confined to a plane, without a container.
         channel_width_m: Distance of the two walls in the plane; None without.
-        sphere_diameter_m: Diameter of the spheres that stand for a smarticle.
         time_step_s: The shortest of its phases.
-        taken_over: Where its smarticles come from, if from another run.
+        taken_over: The source of its smarticles, if from another run.
     """
 
     format: Literal[1] = 1
@@ -136,13 +131,13 @@ class Manifest(Document):
 
     @property
     def thicknesses_in_plane_m(self) -> tuple[float, float, float]:
-        """Of barb 1, middle link, barb 2 [m]."""
+        """Thicknesses in the plane of barb 1, middle link, barb 2 [m]."""
         middle = self.middle_thickness_in_plane_m
         return (self.thickness_in_plane_m, middle or self.thickness_in_plane_m, self.thickness_in_plane_m)
 
     @property
     def bulge_m(self) -> float:
-        """By how much the middle link is thicker than the barbs, to either side in the plane [m]."""
+        """Excess thickness of the middle link over the barbs, on either side in the plane [m]."""
         return (self.thicknesses_in_plane_m[1] - self.thickness_in_plane_m) / 2
 
     @property
@@ -151,16 +146,16 @@ class Manifest(Document):
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:
-        """Whether the container's wall is there in the phase of an index."""
+        """Return whether the container has its wall in a phase, by its index."""
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Whether the pile fills one cylinder then, so that packing fractions have a meaning."""
+        """Return whether the pile fills one cylinder in a phase, so that packing fractions have a meaning."""
         return self.container_tiers == 1 and self.walled(phase)
 
 
 class Done(Document):
-    """How a run that is done went, `done.json`, the last of its files."""
+    """Times and cost of a run that is done, `done.json`, the last of its files."""
 
     status: Literal["done"] = "done"
     time_s: NonNegativeFloat
@@ -199,7 +194,7 @@ class Failed(Document):
 
 
 class Progress(Document):
-    """How far a run is that goes on, `progress.json`, at most a second old."""
+    """Progress of a running run, `progress.json`, at most a second old."""
 
     phase: str | None = None
     phase_index: int | None = None

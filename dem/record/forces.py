@@ -24,7 +24,7 @@ _REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: 
 
 
 def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
-    """All contacts as lines from the first smarticle's centre of mass to the second's, or to the point at a boundary.
+    """Return contacts as lines from the first smarticle's centre of mass to the second's, or the point at a boundary.
 
     Args:
         found: the contacts.
@@ -76,24 +76,15 @@ class RecordedForces:
 
 
 def has_forces(directory: Path) -> bool:
-    """Whether a run directory holds forces at contacts."""
+    """Return whether a run directory holds forces at contacts."""
     return (directory / collection(FORCE)).is_file()
 
 
 def read_forces(frame: Frame) -> RecordedForces:
-    """The forces at contacts that were recorded with a frame.
-
-    Args:
-        frame: One of a run's frames.
-
-    Returns:
-        The forces.
+    """Read the forces at contacts that were recorded with one of a run's frames.
 
     Raises:
         InputError: The run recorded none, or the file is damaged.
-
-    Source:
-        docs/reference/files.md.
     """
     path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
     points, data = _content(path)
@@ -102,18 +93,21 @@ def read_forces(frame: Frame) -> RecordedForces:
     def values(name: str, *shape: int) -> Array:
         if not number:
             return np.zeros((0, *shape))
-        found = data.get(name)
-        if found is None or found.shape != (number, *shape):
-            told = "is missing" if found is None else f"has shape {found.shape}, for {number} contacts"
-            cannot_read("forces", path, f"cell data '{name}' {told}", _REMEDY)
-        if not np.all(np.isfinite(found)):
-            cannot_read("forces", path, f"cell data '{name}' is not finite", _REMEDY)
+        found, wrong = data.get(name), ""
+        if found is None:
+            wrong = "is missing"
+        elif found.shape != (number, *shape):
+            wrong = f"has shape {found.shape}, for {number} contacts"
+        elif not np.all(np.isfinite(found)):
+            wrong = "is not finite"
+        if found is None or wrong:
+            cannot_read("forces", path, f"cell data '{name}' {wrong}", _REMEDY)
         return found.astype(np.float64)
 
     def numbers(*names: str, below: int) -> NDArray[np.int64]:
         found = np.column_stack([values(name) for name in names]).astype(np.int64)
         if np.any((found < NONE) | (found >= below)):
-            cannot_read("forces", path, f"cell data '{names[0]}' holds numbers of nothing that there is", _REMEDY)
+            cannot_read("forces", path, f"cell data '{names[0]}' is out of range", _REMEDY)
         return found
 
     contacts = ContactForces(

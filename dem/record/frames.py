@@ -25,12 +25,12 @@ _REMEDY = "give the directory of a run that has written a frame"
 
 @dataclass
 class FrameWriter:
-    """Writes frames into a run directory, and rewrites its `frames.pvd` at each.
+    """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each.
 
     Args:
         folder: the run directory.
-        noun: what one file is called; "sphere": `spheres.pvd` and `spheres/sphere_000000.vtu` and so on.
-        times: times [s] of the frames written so far.
+        noun: name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`.
+        times: times of the frames written so far [s].
     """
 
     folder: Path
@@ -49,7 +49,7 @@ class FrameWriter:
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def truncate(self, times: Sequence[float]) -> None:
-        """Keep the first frames only, of the given times [s]; later files are removed."""
+        """Keep the first frames, of the given times [s]; remove later files."""
         self.times = list(times)
         kept = {self.folder / names.member(self.noun, k) for k in range(len(self.times))}
         for path in set((self.folder / names.folder(self.noun)).glob("*.vtu")) - kept:
@@ -66,9 +66,7 @@ class FrameWriter:
 
 
 class FrameSequence(Sequence[Frame]):
-    """The frames of a run in time order; a file is read only when its frame is asked for.
-
-    A slice is again a lazy sequence. Frames are not kept: each access reads the file anew.
+    """The frames of a run in time order; each access reads the file anew, and a slice is again a lazy sequence.
 
     Attributes:
         times: (n,) float64 [s], as listed in `frames.pvd`; needs no frame to be read.
@@ -100,7 +98,7 @@ class FrameSequence(Sequence[Frame]):
         return read_frame(self.paths[index])
 
     def nearest(self, time: float) -> int:
-        """Index of the frame nearest to a time [s].
+        """Return the index of the frame nearest to a time [s].
 
         Raises:
             InputError: The time is before the first or after the last frame.
@@ -113,40 +111,21 @@ class FrameSequence(Sequence[Frame]):
         return int(np.argmin(np.abs(self.times - time)))
 
     def after(self, time: float) -> FrameSequence:
-        """The frames later than a time [s], by the list alone: none of them is read.
-
-        A frame at that very time is not later, whatever the ninth digit says, to which the list rounds.
-        """
+        """Return the frames later than a time [s], by their list alone; its times are rounded to nine digits."""
         return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
 
     def in_phase(self, phase: int) -> FrameSequence:
-        """The frames of one phase, found by bisection: phases follow each other in time.
-
-        Args:
-            phase: Index into `Run.phases`.
-
-        Returns:
-            Its frames; empty if the run has not recorded any.
-        """
+        """Return the frames of one phase, by its index; found by bisection, since phases follow each other in time."""
         first = bisect_left(self, phase, key=attrgetter("phase"))
         last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
         return self[first:last]
 
 
 def read_frames(directory: Path | str) -> FrameSequence:
-    """Opens the frames of a run; the run may be done, failed or still going on.
-
-    Args:
-        directory: A run directory.
-
-    Returns:
-        The frames in time order, read lazily.
+    """Open the frames of a run directory, which may be done, failed or still running.
 
     Raises:
         InputError: `frames.pvd` is missing, damaged or not in time order.
-
-    Source:
-        docs/reference/files.md.
 
     Example:
         >>> for frame in read_frames("runs/pile")[-2:]:
@@ -155,20 +134,20 @@ def read_frames(directory: Path | str) -> FrameSequence:
         3 (12, 4, 3)
     """
     path = Path(directory) / names.collection(names.FRAME)
-    try:
-        root = ET.parse(path).getroot()
-    except (OSError, ET.ParseError) as error:
-        cannot_read("list of frames", path, error, _REMEDY)
     times, files = [], []
-    for entry in root.iter("DataSet"):
-        try:
+    cause: BaseException | str | None = None
+    try:
+        for entry in ET.parse(path).getroot().iter("DataSet"):
             times.append(float(entry.attrib["timestep"]))
             files.append(path.parent / entry.attrib["file"])
-        except (KeyError, ValueError) as error:
-            cause = f"entry {len(files)} lacks a time or a file ({error})"
-            cannot_read("list of frames", path, cause, _REMEDY)
-    if not files:
-        cannot_read("list of frames", path, "it lists no frame", _REMEDY)
-    if not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0):
-        cannot_read("list of frames", path, "its times do not ascend", _REMEDY)
+    except (OSError, ET.ParseError) as error:
+        cause = error
+    except (KeyError, ValueError) as error:
+        cause = f"entry {len(files)} lacks a time or a file ({error})"
+    if cause is None and not files:
+        cause = "it lists no frame"
+    elif cause is None and (not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0)):
+        cause = "its times do not ascend"
+    if cause is not None:
+        cannot_read("list of frames", path, cause, _REMEDY)
     return FrameSequence(np.array(times), tuple(files))

@@ -14,19 +14,15 @@ SERIES = "series.h5"
 CHECKPOINT = "checkpoint.zip"
 CHECKPOINT_BEFORE = "checkpoint.previous.zip"
 
-FRAME = "frame"
-"""Noun of the pictures of centrelines; see `collection` and `member`."""
-SPHERE = "sphere"
-"""Noun of the pictures of spheres."""
-FORCE = "force"
-"""Noun of the pictures of forces at contacts."""
+# Nouns of the VTK files of centrelines, of spheres and of forces at contacts; see `collection` and `member`.
+FRAME, SPHERE, FORCE = "frame", "sphere", "force"
 
 SERIES_FORMAT = 1
 CHECKPOINT_FORMAT = 4
 
 
 def folder(noun: str) -> str:
-    """Where files of a noun lie: `frames` of "frame".
+    """Return the folder of the files of a noun, `frames` of "frame".
 
     Example:
         >>> folder(FRAME), collection(FRAME), member(FRAME, 7)
@@ -36,21 +32,21 @@ def folder(noun: str) -> str:
 
 
 def collection(noun: str) -> str:
-    """The list of all files of a noun with their times."""
+    """Return the name of the list of all files of a noun with their times."""
     return f"{noun}s.pvd"
 
 
 def member(noun: str, number: int) -> str:
-    """One file of a noun, by its number from 0."""
+    """Return the name of one file of a noun, by its number from 0."""
     return f"{noun}s/{noun}_{number:06d}.vtu"
 
 
 def partial(name: str) -> str:
-    """What a file is called while it is written."""
+    """Return the name of a file while it is written."""
     stem, dot, suffix = name.rpartition(".")
     return f".{stem}.partial{dot}{suffix}" if stem else f".{name}.partial"
 
 
 def is_partial(name: str) -> bool:
-    """Whether a file is one that a killed process had not finished writing."""
+    """Return whether a file is one that a killed process had not finished writing."""
     return name.startswith(".") and ".partial." in name

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 def second_highest(heights: NDArray[np.float64]) -> float:
-    """Of (N,) heights; NaN of fewer than two.
+    """Return the second-highest of (N,) heights; NaN for fewer than two.
 
     Example:
         >>> second_highest(np.array([0.01, 0.04, 0.02, 0.03]))
@@ -19,7 +19,7 @@ def second_highest(heights: NDArray[np.float64]) -> float:
 
 
 def filled(count: int, *, solid_volume: float, radius: float, height: float) -> float:
-    """N V_s / (pi r² z): what so many smarticles fill of a cylinder [1].
+    """Return N V_s / (pi r² z) [1].
 
     Args:
         count: smarticles.
@@ -31,12 +31,6 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
 
 
 def packing_fraction(heights: NDArray[np.float64], *, solid_volume: float, radius: float) -> float:
-    """φ by the second-highest centre of mass; NaN for fewer than two smarticles, and for none above the floor.
-
-    Args:
-        heights: (N,) centres of mass above the floor [m].
-        solid_volume: of one smarticle [m³].
-        radius: of the container [m].
-    """
+    """Return φ of (N,) centres of mass above the floor [m]; NaN for fewer than two, and for none above the floor."""
     height = second_highest(heights)
     return filled(len(heights), solid_volume=solid_volume, radius=radius, height=height) if height > 0 else math.nan

@@ -1,4 +1,4 @@
-"""What a running simulation tells: `progress.json` for other processes, one line for the person at the terminal."""
+"""Progress of a running simulation: `progress.json` for other processes, one line on the terminal."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def _now() -> float:
 
 @dataclass
 class ProgressWriter:
-    """Tells at most once per second.
+    """Reports progress at most once per second.
 
     Args:
-        folder: the run directory; `progress.json` in it is replaced.
+        folder: the run directory.
         total: smarticles in the scene.
         show: whether to draw a line on standard error.
     """
@@ -32,93 +32,79 @@ class ProgressWriter:
     folder: Path
     total: int
     show: bool
-    _phase: str = ""
-    _index: int = 0
-    _end: float | None = None
+    _said: Progress = field(default_factory=Progress)
     _begun: float = field(default_factory=_now)
     _start: float = 0.0
     _here_since: tuple[float, float] = (0.0, 0.0)
     _last: float = -math.inf
-    _checkpoint: float | None = None
-    _seen: tuple[float, int] | None = None
 
     def begin(self, *, index: int, phase: str, start: float, now: float, end: float | None) -> None:
-        """A phase begins, or is gone on with.
+        """Begin or resume a phase.
 
         Args:
             index: number of the phase.
             phase: its type.
             start: simulated time at which it began [s].
             now: simulated time [s].
-            end: when it will end [s], if that is known.
+            end: simulated time at which it will end [s], if known.
         """
-        self._index, self._phase, self._start, self._end = index, phase, start, end
+        self._said = self._said.model_copy(update={"phase": phase, "phase_index": index, "end_s": end})
+        self._start = start
         self._here_since = (_now(), now)
         self._last = -math.inf
 
     def warn(self, message: str) -> None:
-        """Tell the person at the terminal at once."""
+        """Print a warning at once."""
         start = "\r\x1b[K" if self.show else ""
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
     def checkpointed(self, time: float) -> None:
-        """There is a checkpoint of a simulated time [s], from which the run would go on; told at once."""
-        self._checkpoint = time
-        if self._seen is not None:
-            phi, count = self._seen
+        """Report at once the simulated time [s] of a new checkpoint."""
+        said = self._said = self._said.model_copy(update={"checkpoint_s": time})
+        if said.count is not None:
             self._last = -math.inf
-            self.update(time=time, phi=phi, count=count)
+            self.update(time=time, phi=math.nan if said.phi is None else said.phi, count=said.count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
-        """Simulated time [s], packing fraction [1] and smarticles present."""
-        self._seen = (phi, count)
+        """Report simulated time [s], packing fraction [1] and smarticles present."""
         now = _now()
+        said = {"time_s": time, "phi": phi if math.isfinite(phi) else None, "count": count, "wall_s": now - self._begun}
+        self._said = self._said.model_copy(update=said)
         if now - self._last < INTERVAL:
             return
         self._last = now
-        shown_phi = phi if math.isfinite(phi) else None
-        said = Progress(
-            phase=self._phase,
-            phase_index=self._index,
-            time_s=time,
-            end_s=self._end,
-            phi=shown_phi,
-            count=count,
-            wall_s=now - self._begun,
-            checkpoint_s=self._checkpoint,
-        )
         try:
-            if self.folder.is_dir():  # one that was taken away is not made again
-                said.write(self.folder / PROGRESS)
+            if self.folder.is_dir():  # a folder that was removed is not made again
+                self._said.write(self.folder / PROGRESS)
         except RunError:
-            # Progress is a courtesy: a disk that is full stops the run where results are written, not here.
+            # A full disk stops the run where results are written, not here.
             return
         if self.show:
-            self._draw(time, shown_phi, count, now)
+            self._draw(time, count, now)
 
     def finish(self) -> None:
-        """The run has ended."""
+        """End the report."""
         (self.folder / PROGRESS).unlink(missing_ok=True)
         if self.show:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()
 
-    def _draw(self, simulated: float, phi: float | None, count: int, now: float) -> None:
-        wall_since, since = self._here_since
+    def _draw(self, simulated: float, count: int, now: float) -> None:
+        (wall_since, since), phase, end, phi = self._here_since, self._said.phase, self._said.end_s, self._said.phi
         done, left = "", ""
-        if self._end is not None and simulated > since:
-            fraction = (simulated - self._start) / (self._end - self._start)
+        if end is not None and simulated > since:
+            fraction = (simulated - self._start) / (end - self._start)
             bar = "█" * round(20 * fraction)
             done = f" {bar:<20} {100 * fraction:3.0f} %"
-            ahead = max(0.0, self._end - simulated)
+            ahead = max(0.0, end - simulated)
             left = f"  {(now - wall_since) * ahead / (simulated - since):.0f} s left in this phase"
-        elif self._phase == "deposit":
+        elif phase == "deposit":
             fraction = count / self.total
             done = f" {'█' * round(20 * fraction):<20} {count}/{self.total}"
             if 0 < fraction < 1:
                 # The pile grows, and each layer costs as much as the pile under it: time goes as the square.
                 left = f"  about {(now - wall_since) * (1 / fraction**2 - 1):.0f} s left in this phase"
         packing = f"  φ {phi:.3f}" if phi is not None else ""
-        line = f"{self._phase:<8}{done}  t = {simulated:.2f} s{packing}{left}"
+        line = f"{phase:<8}{done}  t = {simulated:.2f} s{packing}{left}"
         sys.stderr.write(f"\r\x1b[K{line}")
         sys.stderr.flush()

@@ -1,8 +1,8 @@
-"""A run directory as an object: what measures, studies, exports, reports and commands take."""
+"""A run directory as an object, which measures, studies, exports, reports and commands take."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, NoReturn
@@ -27,14 +27,13 @@ class Status:
     """How far a run is; None where its files do not say.
 
     Attributes:
-        state: Where it stands.
         cause: Why it failed or was interrupted.
-        phase: Type of the phase that it is in.
+        phase: Type of its current phase.
         time_s: Simulated time [s].
         steps: Time steps of a done run.
         wall_s: Wall time so far [s].
         cpu_s: Processor time of a done run [s].
-        checkpoint_s: Simulated time of the checkpoint from which it can go on [s].
+        checkpoint_s: Simulated time of the checkpoint from which it can be resumed [s].
     """
 
     state: State
@@ -118,7 +117,7 @@ class Run:
 
     @property
     def has_series(self) -> bool:
-        """Whether it has recorded time series; a run that failed early has not."""
+        """Whether it has recorded time series; a run that failed early has none."""
         return (self.path / SERIES).exists()
 
     @cached_property
@@ -149,27 +148,23 @@ class Run:
             done = Done.read(self.path / DONE)
             return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
         said = self.progress
-        if not (self.path / FAILED).exists():
-            return Status(
-                state="running" if in_use(self.path) else "stopped",
-                phase=said.phase,
-                time_s=said.time_s,
-                wall_s=said.wall_s,
-                checkpoint_s=said.checkpoint_s,
-            )
-        failed = Failed.read(self.path / FAILED)
-        return Status(
-            state=failed.status,
-            cause=failed.cause,
+        status = Status(
+            state="running",
             phase=said.phase,
-            time_s=failed.time_s,
+            time_s=said.time_s,
             wall_s=said.wall_s,
-            checkpoint_s=failed.checkpoint_s,
+            checkpoint_s=said.checkpoint_s,
+        )
+        if not (self.path / FAILED).exists():
+            return status if in_use(self.path) else replace(status, state="stopped")
+        failed = Failed.read(self.path / FAILED)
+        return replace(
+            status, state=failed.status, cause=failed.cause, time_s=failed.time_s, checkpoint_s=failed.checkpoint_s
         )
 
     @property
     def progress(self) -> Progress:
-        """What it says of itself while it goes on; empty otherwise."""
+        """Progress of a running run; empty otherwise."""
         try:
             return Progress.read(self.path / PROGRESS)
         except InputError:
@@ -212,11 +207,7 @@ def _within(path: Path, place: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class ForceSequence:
-    """The forces at contacts of a run's frames, each read when it is asked for.
-
-    Args:
-        frames: the frames.
-    """
+    """The forces at contacts of a run's frames, read at each access."""
 
     frames: FrameSequence
 
@@ -228,7 +219,7 @@ class ForceSequence:
 
 
 def _reject_place(path: Path) -> NoReturn:
-    """Say what is there instead of a run."""
+    """Report what is there instead of a run."""
     remedy = REMEDY
     if not path.exists():
         cause = "no such directory"
@@ -242,7 +233,7 @@ def _reject_place(path: Path) -> NoReturn:
 
 
 def open_run(path: Path | str) -> Run:
-    """Open a run directory and read its manifest, so that what is none is rejected here.
+    """Open a run directory and read its manifest.
 
     Raises:
         InputError: It is no run directory.

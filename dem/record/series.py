@@ -19,12 +19,13 @@ from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
 from dem.record.files import cannot_read, write_whole
+from dem.record.frame import frozen
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PERIOD = 1.0  # s of wall time between two writings of a series that grows
-# What the columns of a series of vectors are, by their number.
+# Names of the components of a series of vectors, by their number.
 _COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
@@ -49,7 +50,7 @@ class SeriesWriter:
         self._rows = {name: [] for name in self.described}
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Take one row: a number, (2,) or (3,) values for each column."""
+        """Add one row: a number, (2,) or (3,) values for each column."""
         if row.keys() != self._rows.keys():
             msg = f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}"
             raise ValueError(msg)
@@ -66,7 +67,7 @@ class SeriesWriter:
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:
-        """Rewrite the file, but for a moment after it was written: whole, it costs more than the rows that are new.
+        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole.
 
         Raises:
             RunError: it cannot be written.
@@ -104,12 +105,9 @@ class Series:
 
     Attributes:
         path: The file it came from.
-        data: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. What
-            there is depends on the scene: one that never actuates has no motors to tell of.
+        data: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. The scene
+            decides which there are: one that never actuates has none of motors.
         units: Unit of each, e.g. "m"; "1" for a pure number.
-        descriptions: What each one is.
-        scene_sha256: Hash of the scene the run was made from.
-        seed: Seed of the run.
     """
 
     path: Path
@@ -120,7 +118,7 @@ class Series:
     seed: int
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """The array of one quantity.
+        """Return the array of one quantity.
 
         Raises:
             InputError: The series does not hold it.
@@ -141,7 +139,7 @@ class Series:
         return times
 
     def table(self) -> pd.DataFrame:
-        """The series as a table: one row per sample, units in its column names."""
+        """Return the series as a table: one row per sample, units in its column names."""
         import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
 
         columns = {name: self[name] for name in ("time_s", "phase")}
@@ -152,31 +150,15 @@ class Series:
         return pd.DataFrame(columns)
 
     def nearest(self, time: float) -> int:
-        """Index of the sample nearest in time.
-
-        Args:
-            time: Simulated time [s].
-
-        Returns:
-            Index into every array.
-        """
+        """Return the index of the sample nearest to a time [s]."""
         return int(np.argmin(np.abs(self.time - time)))
 
 
 def read_series(directory: Path | str) -> Series:
-    """Reads the time series of a run; the run may be done, failed or still going on.
-
-    Args:
-        directory: A run directory.
-
-    Returns:
-        The series with their units.
+    """Read the time series of a run directory, which may be done, failed or still running.
 
     Raises:
         InputError: The file is missing, damaged, or lacks what it must have.
-
-    Source:
-        docs/reference/files.md.
 
     Example:
         >>> series = read_series("runs/pile")
@@ -189,12 +171,13 @@ def read_series(directory: Path | str) -> Series:
     try:
         with h5py.File(path, "r") as file:
             attributes = dict(file.attrs)
-            data = {name: _frozen(file[name]) for name in file}
+            data = {name: frozen(np.atleast_1d(file[name][()])) for name in file}
             texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
     # h5py fails with OSError, KeyError or RuntimeError, depending on where the damage lies.
     except Exception as error:
         cannot_read("series", path, error, _REMEDY)
-    _check(path, attributes, data)
+    if cause := _wrong(attributes, data):
+        cannot_read("series", path, cause, _REMEDY)
     return Series(
         path=path,
         data=MappingProxyType(data),
@@ -205,26 +188,20 @@ def read_series(directory: Path | str) -> Series:
     )
 
 
-def _check(path: Path, attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> None:
+def _wrong(attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> str | None:
+    """Return what is wrong with the content of a file."""
     for key in ("format", "scene_sha256", "seed"):
         if key not in attributes:
-            cannot_read("series", path, f"attribute '{key}' is missing", _REMEDY)
+            return f"attribute '{key}' is missing"
     if int(attributes["format"]) != names.SERIES_FORMAT:
-        cause = f"'format' must be {names.SERIES_FORMAT}: got {attributes['format']}"
-        cannot_read("series", path, cause, _REMEDY)
+        return f"'format' must be {names.SERIES_FORMAT}: got {attributes['format']}"
     for name in ("time_s", "phase"):
         if name not in data:
-            cannot_read("series", path, f"dataset '{name}' is missing", _REMEDY)
+            return f"dataset '{name}' is missing"
     rows = len(data["time_s"])
     if rows == 0:
-        cannot_read("series", path, "it holds no sample yet", _REMEDY)
+        return "it holds no sample yet"
     for name, values in data.items():
         if values.shape not in ((rows,), (rows, 2), (rows, 3)):
-            cause = f"'{name}' has shape {values.shape}, 'time_s' has {rows} samples"
-            cannot_read("series", path, cause, _REMEDY)
-
-
-def _frozen(dataset: Any) -> NDArray[Any]:
-    values = np.atleast_1d(np.asarray(dataset[()]))
-    values.flags.writeable = False
-    return values
+            return f"'{name}' has shape {values.shape}, 'time_s' has {rows} samples"
+    return None

@@ -1,4 +1,4 @@
-"""What a run is made of, from its scene: the engine, and what records and watches it."""
+"""The parts of a run, made from its scene: engine, recorder, watchdog."""
 
 from __future__ import annotations
 
@@ -28,25 +28,24 @@ from dem.scene.scene import Scene
 
 GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
 SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
-# Sphere diameters: a centre on the other's surface, from where on wall and floor push ever less or outwards, and chains
-# slip through each other; shaking at Γ = 10, draft, reaches 0.4.
+# Sphere diameters: beyond it wall and floor push ever less or outwards, and chains slip through each other; shaking at
+# Γ = 10, draft, reaches 0.4.
 DEPTH_LIMIT = 0.5
-# The same on links, whose contacts stiffen without bound before axes meet: a load of a hundred piles does not reach it.
+# Sphere diameters on links, whose contacts stiffen without bound before axes meet: 100 piles on one stay below it.
 BARRIER_LIMIT = 0.9
-# Of what was dissipated, which the energy ledger of links may miss; that of YADE is sampled, as often as a scene asks.
+# Fraction of the dissipation that the ledger of links may miss; that of YADE is sampled, as often as a scene asks.
 MISSED_LIMIT = 0.05
-# Sphere diameters that the energy which comes from nowhere could lift all smarticles by: less than any height in the
-# results resolves.
+# Sphere diameters by which energy from nowhere could lift all smarticles: less than any height in the results resolves.
 RISE_LIMIT = 0.5
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """The engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
+    """Return the engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
     return engine_kind(scene.engine).build(scene, dt)
 
 
 def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-    """The recorder of a scene, with the watchdog's limits."""
+    """Return the recorder of a scene, with the watchdog's limits."""
     recording = scene.recording
     # No one radius gives the volume of a mould of tiers.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius
@@ -68,7 +67,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
 
 
 def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
-    """What the watchdog looks at of a state, (N, P, 3) [m]: all spheres, or the ends and the middle of smooth links."""
+    """Return the (N, P, 3) points [m] that the watchdog checks: all spheres, or ends and middles of smooth links."""
     particle = scene.particle
     if not scene.smooth:
         return lambda state: state.spheres(particle)
@@ -84,7 +83,7 @@ def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
 
 
 def build_watchdog(scene: Scene) -> Watchdog:
-    """The watchdog of a scene, with its limits."""
+    """Return the watchdog of a scene, with its limits."""
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
     return Watchdog(
@@ -100,13 +99,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
 
 @dataclass(frozen=True)
 class Builders:
-    """What makes the parts of a run; who watches or spoils one on purpose gives others.
-
-    Args:
-        steps: time step of each phase [s].
-        engine: of a scene and a time step [s].
-        recorder: of a scene, a run directory and its progress.
-    """
+    """Makers of the parts of a run: time step of each phase [s], engine, recorder; tests replace them."""
 
     steps: Callable[[Scene], Sequence[float]] = time_steps
     engine: Callable[[Scene, float], Engine] = build_engine

@@ -1,4 +1,4 @@
-"""Everything a run writes while time passes: series, frames, progress; and the watchdog that sees the same state."""
+"""Everything that a run writes while time advances, and its checks by the watchdog."""
 
 from __future__ import annotations
 
@@ -13,34 +13,33 @@ from numpy.typing import NDArray
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
-from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frame import centreline_mesh, motor_fields, sphere_mesh
 from dem.record.frames import FrameWriter
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.sampler import Sampler
 from dem.run.watchdog import Watchdog
 
-# Steps between the watchdog's looks, about. A look takes the time of one or two steps; what blows up grows from step to
-# step, so steps are the measure.
+# Steps between checks of the watchdog, about. A check takes as long as one or two steps; instabilities grow by steps.
 WATCH_STEPS = 500
 
 
 @dataclass
 class Recorder:
-    """Records at fixed intervals of time; what is rarer than a sample of the series is counted in samples.
+    """Records at fixed intervals of time, which are whole numbers of samples of the series.
 
     Args:
         sampler: makes the rows of the series.
         series: writes them.
         frames: writes the frames.
-        watchdog: looks at the state now and then, at every checkpoint and at the end.
-        points: (N, P, 3) points of the smarticles that must stay inside [m], of a state.
-        progress: told at every sample.
+        watchdog: checks the state at intervals, at every checkpoint and at the end.
+        points: returns (N, P, 3) points of a state that must stay inside the container [m].
+        progress: reports every sample.
         interval: time between samples [s].
         frame_every: samples between frames.
-        watch_every: samples between the watchdog's looks; None: as many as have `WATCH_STEPS` steps, about.
-        forces: writes the forces at contacts, with each frame; None: nobody does.
-        spheres: writes the spheres as points; None: nobody does.
+        watch_every: samples between checks of the watchdog; None: about `WATCH_STEPS` steps.
+        forces: writes the forces at contacts, with each frame.
+        spheres: writes the spheres as points.
         sphere_every: samples between these.
     """
 
@@ -57,14 +56,14 @@ class Recorder:
     spheres: FrameWriter | None = None
     sphere_every: int = 1
     samples: int = 0
-    """Taken so far."""
+    """Number of samples so far."""
     residual: str | None = None
-    """What the run says of its energy ledger, if it ended now."""
+    """Warning about the energy ledger, if the run ended now."""
     next_step: int = 0
-    """When the next one is due."""
+    """Step of the next sample."""
 
     def record(self, engine: Engine, phase: int) -> None:
-        """Take what is due at this step; the state is read once for all.
+        """Record what is due at this step.
 
         Raises:
             RunError: the watchdog stopped the run, or a file cannot be written.
@@ -74,16 +73,16 @@ class Recorder:
         self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
             motors = engine.motors.readings if engine.motors.articulated else None
-            mesh = frame_mesh(
-                state,
+            at_work = () if motors is None else (motors.torques, motors.work, motors.halted)
+            mesh = centreline_mesh(
+                state.vertices,
+                velocities=state.link_velocities,
+                spins=state.link_spins,
                 contacts=engine.neighbours(),
                 time=engine.time,
                 floor=engine.boundaries.floor,
                 phase=phase,
-                hinged=engine.motors.present,
-                torques=None if motors is None else motors.torques,
-                work=None if motors is None else motors.work,
-                halted=None if motors is None else motors.halted,
+                extra=motor_fields(state.angles, *at_work) if engine.motors.present else None,
             )
             self.frames.write(mesh, engine.time)
             if self.forces is not None:
@@ -92,7 +91,7 @@ class Recorder:
             self.series.keep_up()
         if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
-        # After the frame is written: the last picture of a run that fails is worth having.
+        # After the frame is written: the last frame of a run that fails is worth having.
         if self.samples % (self.watch_every or max(1, round(WATCH_STEPS * engine.time_step / self.interval))) == 0:
             self.watch(engine, state)
         if "energy_residual_J" in row and not math.isnan(row["energy_residual_J"]):
@@ -104,11 +103,11 @@ class Recorder:
         self.schedule(engine)
 
     def schedule(self, engine: Engine) -> None:
-        """Find the step that is nearest to the time of the next sample; to be called when the time step changes."""
+        """Set the step nearest to the time of the next sample; call it again when the time step changes."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Let the watchdog look at everything.
+        """Let the watchdog check everything.
 
         Raises:
             RunError: it stopped the run.
@@ -130,30 +129,22 @@ class Recorder:
     @property
     def memory(self) -> dict[str, Any]:
         """Plain data that `restore` needs besides the columns of the series."""
-        asked = {
-            name: writer.times
-            for name, writer in (("forces", self.forces), ("spheres", self.spheres))
-            if writer is not None
-        }
-        return {
-            "samples": self.samples,
-            "next_step": self.next_step,
-            "frames": self.frames.times,
-            **asked,
-            "series": self.sampler.memory,
-        }
+        times = {name: writer.times for name, writer in self._writers()}
+        return {"samples": self.samples, "next_step": self.next_step, **times, "series": dict(self.sampler.memory)}
+
+    def _writers(self) -> list[tuple[str, FrameWriter]]:
+        named = (("frames", self.frames), ("forces", self.forces), ("spheres", self.spheres))
+        return [(name, writer) for name, writer in named if writer is not None]
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from where `memory` was taken; frames written since are removed, the series is cut back."""
+        """Restore what `memory` returned: later frames are removed, the series is cut back."""
         self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
-        self.sampler.restore(memory["series"])
+        self.sampler.memory = dict(memory["series"])
         self.series.restore(columns)
         self.series.write()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:
-        """Keep the frames of `memory` only; of an empty one none."""
-        self.frames.truncate(memory.get("frames", []))
-        for name, writer in (("forces", self.forces), ("spheres", self.spheres)):
-            if writer is not None:
-                writer.truncate(memory.get(name, []))
+        """Keep the frames of `memory` only; none of an empty one."""
+        for name, writer in self._writers():
+            writer.truncate(memory.get(name, []))

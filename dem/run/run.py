@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import platform
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import h5py
 import meshio
@@ -20,7 +19,7 @@ import numpy as np
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.outlook import warnings_of
-from dem.record.checkpoint import has_checkpoint, read_checkpoint
+from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
 from dem.record.document import Done, Ended, Failed, Manifest, Phase
 from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE
@@ -29,31 +28,13 @@ from dem.record.run import Run
 from dem.record.rundir import claimed, log_of
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
-from dem.scene.comparing import difference
-from dem.scene.reading import dump_scene, load_scene, scene_hash
+from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
-
-
-@dataclass(frozen=True)
-class RunOutcome:
-    """A finished run.
-
-    Args:
-        folder: the run directory.
-        time_s: simulated time [s].
-        steps: steps made.
-        wall_s: wall time [s].
-    """
-
-    folder: Path
-    time_s: float
-    steps: int
-    wall_s: float
 
 
 def run_scene(
     scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
-) -> RunOutcome | None:
+) -> Done | None:
     """Run a scene into a run directory.
 
     Args:
@@ -62,57 +43,73 @@ def run_scene(
         command: the command line, for the manifest.
         progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
-        builders: what makes its parts; by default what a run has.
+        builders: makers of its parts, where they differ from the usual ones.
 
     Returns:
-        The outcome; None where the run was done already and there was nothing to resume.
+        Times and cost; None where the run was done already and there was nothing to resume.
 
     Raises:
         InputError: `out` holds something else, or another process runs in it.
-        RunError: the run failed; `failed.json` tells the cause and everything recorded before stays.
+        RunError: the run failed; `failed.json` states the cause and everything recorded before stays.
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
         KeyboardInterrupt: the run was interrupted; what was recorded is whole.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
     steps, made_by, threads = builders.steps(scene), (kind.name, kind.version()), kind.threads()
     if not resume:
-        _check_sources(scene)
+        _check_ready(scene)
+    saved: tuple[Checkpoint, str | None] | None = None
     with claimed(out, resume=resume):
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
                 return None
             if not has_checkpoint(out):
-                _check_sources(scene)
+                _check_ready(scene)
+            else:
+                # Before anything is changed: it may be of another version.
+                saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
         if not (out / SCENE).exists():
-            # Killed between the two, a run is resumed: what tells a run is the manifest.
+            # A run killed between the two files can be resumed: a run is known by its manifest.
             write_text(out / SCENE, dump_scene(scene, out))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            return _run(
-                scene,
-                out,
-                log,
-                builders,
-                steps=steps,
-                made_by=made_by,
-                threads=threads,
-                progress=progress,
-                resume=resume,
-            )
+            bar = ProgressWriter(out, scene.count, show=progress)
+            simulation: Simulation | None = None
+            try:
+                simulation = Simulation(
+                    scene=scene,
+                    engine=builders.engine(scene, min(steps)),
+                    recorder=builders.recorder(scene, out, bar),
+                    folder=out,
+                    log=log,
+                    made_by=made_by,
+                    time_steps=steps,
+                )
+                for warning in warnings_of(scene):
+                    simulation.warn(warning)
+                if resume:
+                    _restore(simulation, saved, threads)
+                return _finish(simulation)
+            except (Exception, KeyboardInterrupt) as error:
+                cause = _mark_ended(simulation, out, log, error)
+                if isinstance(error, RunError):
+                    raise RunError(cause) from error
+                raise
+            finally:
+                bar.finish()
 
 
-def _check_sources(scene: Scene) -> None:
-    """Refuse to begin what cannot begin any more."""
+def _check_ready(scene: Scene) -> None:
     for phase in scene.phases:
         phase.ready(scene)
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
-    """Refuse to go on, or to call done, what was made from another scene."""
+    """Check that a run directory was made from this scene."""
     made = Run(out).manifest.scene_sha256
     if made == scene_hash(scene):
         return
@@ -133,72 +130,50 @@ def _check_scene(scene: Scene, out: Path) -> None:
     raise InputError(msg)
 
 
-def _run(
-    scene: Scene,
-    out: Path,
-    log: logging.Logger,
-    builders: Builders,
-    *,
-    steps: Sequence[float],
-    made_by: tuple[str, str],
-    threads: int,
-    progress: bool,
-    resume: bool,
-) -> RunOutcome:
-    bar = ProgressWriter(out, scene.count, show=progress)
-    simulation: Simulation | None = None
-    try:
-        engine = builders.engine(scene, min(steps))
-        simulation = Simulation(
-            scene=scene,
-            engine=engine,
-            recorder=builders.recorder(scene, out, bar),
-            folder=out,
-            log=log,
-            made_by=made_by,
-            time_steps=steps,
+def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
+    out, log = simulation.folder, simulation.log
+    if saved is None:
+        log.info("resumed from the start: no checkpoint was written")
+        simulation.recorder.truncate({})
+        return
+    checkpoint, warning = saved
+    if warning:
+        simulation.warn(warning)
+    simulation.restore(checkpoint)
+    begun = Run(out).manifest.threads
+    if begun != threads:
+        workers = engine_kind(simulation.scene.engine).workers
+        simulation.warn(
+            f"--{workers} {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
+            "never stopped"
         )
-        for warning in warnings_of(scene):
-            simulation.warn(warning)
-        if resume:
-            _restore(simulation, scene, out, log, threads)
-        phases = simulation.run()
-        wall, cpu = simulation.wall, simulation.cpu
-        Done(time_s=engine.time, steps=engine.steps, wall_s=wall, cpu_s=cpu, phases=phases).mark(out)
-    except RunError as error:
-        raise RunError(_mark_ended(simulation, out, log, status="failed", cause=str(error))) from error
-    except StopRequestedError as error:
-        _mark_ended(simulation, out, log, status="interrupted", cause=str(error))
-        raise
-    except KeyboardInterrupt:
-        _mark_ended(simulation, out, log, status="interrupted", cause="interrupted by the user")
-        raise
-    except Exception as error:
+    log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
+
+
+def _finish(simulation: Simulation) -> Done:
+    """Run to the end and mark the run as done."""
+    phases, engine = simulation.run(), simulation.engine
+    done = Done(
+        time_s=engine.time, steps=engine.steps, wall_s=simulation.wall, cpu_s=simulation.cpu, phases=tuple(phases)
+    )
+    done.mark(simulation.folder)
+    return done
+
+
+def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
+    """Write the series so far and why the run ended; return the cause, for a failed run with its last checkpoint."""
+    status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
+    cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
+    if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
         # A defect of ours: the run directory must still say that the run has ended.
-        log.exception("unexpected error")
-        _mark_ended(simulation, out, log, status="failed", cause=f"unexpected {type(error).__name__}: {error}")
-        raise
-    finally:
-        bar.finish()
-    return RunOutcome(out, engine.time, engine.steps, simulation.wall)
-
-
-def _mark_ended(
-    simulation: Simulation | None,
-    out: Path,
-    log: logging.Logger,
-    *,
-    status: Ended,
-    cause: str,
-) -> str:
-    """Write the series that was taken, and say why a run ends too early.
-
-    Returns:
-        The cause, and for a failed run its last good checkpoint.
-    """
-    _keep_series(simulation)
+        log.error("unexpected error", exc_info=error)
+        cause = f"unexpected {type(error).__name__}: {error}"
     time, checkpoint = 0.0, None
     if simulation is not None:
+        # Without samples the series on the disk is that of a run which could not be resumed.
+        if simulation.recorder.samples:
+            with contextlib.suppress(RunError):  # a full disk: what was written before is whole
+                simulation.recorder.series.write()
         time, checkpoint = simulation.engine.time, simulation.checkpointed
         if status == "failed":
             good = "none" if checkpoint is None else f"t = {checkpoint:.4f} s"
@@ -208,39 +183,10 @@ def _mark_ended(
     return cause
 
 
-def _restore(simulation: Simulation, scene: Scene, out: Path, log: logging.Logger, threads: int) -> None:
-    if not has_checkpoint(out):
-        log.info("resumed from the start: no checkpoint was written")
-        simulation.recorder.truncate({})
-        return
-    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=simulation.made_by)
-    if warning:
-        simulation.warn(warning)
-    simulation.restore(checkpoint)
-    begun = Run(out).manifest.threads
-    if begun != threads:
-        workers = engine_kind(scene.engine).workers
-        simulation.warn(
-            f"--{workers} {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
-            "never stopped"
-        )
-    log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
-
-
-def _keep_series(simulation: Simulation | None) -> None:
-    if simulation is None or not simulation.recorder.samples:
-        return  # nothing was taken yet: what is there is of a run that could not be gone on with
-    try:
-        simulation.recorder.series.write()
-    except RunError:
-        # The disk is full: the cause is on the terminal, and what was written before is whole.
-        return
-
-
 def manifest(
     scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
 ) -> Manifest:
-    """What makes the run, and the numbers that measures need.
+    """Return what made a run, and the numbers that measures need.
 
     Args:
         scene: what is run.
@@ -248,11 +194,12 @@ def manifest(
         steps: time step of each phase [s].
         command: the command line.
         made_by: name and version of the engine.
-        threads: that it runs with.
+        threads: number of threads of the engine.
     """
-    particle, boxes = scene.particle, scene.smarticle.boxes
+    particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
+    if origin is not None:  # a path that holds where both runs are moved
+        origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
     return Manifest(
-        format=1,
         name=scene.name,
         scene_sha256=scene_hash(scene),
         seed=scene.seed,
@@ -283,24 +230,18 @@ def manifest(
         ),
         planar=scene.plane is not None,
         channel_width_m=None if scene.plane is None else scene.plane.width_m,
-        taken_over=_origin(scene, out),
+        taken_over=origin,
     )
 
 
-def _origin(scene: Scene, out: Path) -> dict[str, Any] | None:
-    """What the manifest says of the run that smarticles come from, by a path that holds where both are moved."""
-    origin = scene.phases[0].origin
-    return None if origin is None else {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
-
-
 def versions(made_by: tuple[str, str]) -> dict[str, str]:
-    """Versions of everything that results depend on.
-
-    Args:
-        made_by: name and version of the engine.
-    """
+    """Return the versions of everything that results depend on; `made_by`: name and version of the engine."""
+    try:
+        own = version("smarticles")
+    except PackageNotFoundError:
+        own = "not installed"
     return {
-        "smarticles": _own_version(),
+        "smarticles": own,
         "git": _git_revision(),
         made_by[0]: made_by[1],
         "python": platform.python_version(),
@@ -313,7 +254,7 @@ def versions(made_by: tuple[str, str]) -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Model of the processor, for output only."""
+    """Return the model of the processor, for output only."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -322,21 +263,14 @@ def _processor() -> str:
 
 
 def _blas() -> str:
-    """BLAS that NumPy was built with, and the kernels that its environment forces; no run of links depends on it."""
+    """Return NumPy's BLAS and the kernels that the environment forces; no run of links depends on it."""
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"
 
 
-def _own_version() -> str:
-    try:
-        return version("smarticles")
-    except PackageNotFoundError:
-        return "not installed"
-
-
 def _git_revision() -> str:
-    """Commit of the code, with `-dirty` where files differ from it; `unknown` outside a checkout."""
+    """Return the commit of the code, with `-dirty` where files differ from it; `unknown` outside a checkout."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         answer = subprocess.run(

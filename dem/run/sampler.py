@@ -1,10 +1,10 @@
-"""What the series is made of: numbers that the engine is asked for at each sample."""
+"""Rows of the series: numbers that the engine reports at each sample."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ from dem.record.columns import (
 )
 from dem.record.packing import packing_fraction
 
+Array = NDArray[np.float64]
+
 COLUMNS_OF: Mapping[EffectName, Columns] = {
     EffectName.MOTORS: MOTOR_COLUMNS,
     EffectName.ENERGIES: ENERGY_COLUMNS,
@@ -39,7 +41,7 @@ COLUMNS_OF: Mapping[EffectName, Columns] = {
 
 @dataclass
 class Sampler:
-    """Makes a row of the series of what the engine says; means since the sample before are its memory.
+    """Makes rows of the series from an engine; for means between samples it remembers the sample before.
 
     Args:
         radius: of the container [m].
@@ -48,9 +50,9 @@ class Sampler:
 
     radius: float
     effects: Set[EffectName] = frozenset()
-    _before: tuple[float, float, NDArray[np.float64]] | None = None
-    _hooks_before: tuple[int, NDArray[np.float64]] | None = None
-    _strain_before: tuple[int, NDArray[np.float64]] | None = None
+    memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(("before", "hooks", "strain")))
+    """Plain data of the sample before: time [s], impulse of gravity [N s] and momentum [kg m/s]; for hooks and strain
+    steps, and forces summed over them [N]."""
 
     @property
     def described(self) -> Columns:
@@ -62,21 +64,15 @@ class Sampler:
         return columns
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
-        """One row.
-
-        Args:
-            engine: what is asked.
-            state: its smarticles now.
-            phase: index of the phase.
-        """
+        """Return one row, of an engine with its present state and the index of the phase."""
         boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
         more: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
-            lower, upper = self._hook_forces(engine)
-            # The balance does not tell hooks from the container.
+            lower, upper = self._mean_since("hooks", engine.steps, engine.boundaries.hook_sums)
+            # The balance includes the hooks.
             container_force -= lower + upper
             more |= {
                 "hook_upper_force_N": upper,
@@ -90,7 +86,7 @@ class Sampler:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
             more |= self._strain_row(engine, state)
-            # Nor does it tell strings, whose pull the smarticles received from elsewhere.
+            # It includes the strings, too.
             pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
             container_force += np.nan_to_num(pulls)
         row = {
@@ -117,25 +113,23 @@ class Sampler:
             row |= _ledger_row(engine, row)
         return row | more
 
-    def _mean_force(self, engine: Engine, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
-        # What the container received is what the smarticles lost to it, gravity's part put aside. Exact over any
-        # interval, where a sampled contact force would alias the shaking and miss the impacts between samples.
-        # What smarticles were thrown with when they were added counts with what gravity gave.
-        time, impulse, before = engine.time, engine.impulse, self._before
-        self._before = (time, impulse, momentum)
+    def _mean_force(self, engine: Engine, momentum: Array) -> Array:
+        # The container received what the smarticles lost, apart from gravity and from the throw of added smarticles.
+        # This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
+        time, impulse, before = engine.time, engine.impulse, self.memory["before"]
+        self.memory["before"] = [time, impulse, momentum.tolist()]
         if before is None or time <= before[0]:
             return np.full(3, math.nan)
-        lost = before[2] - momentum - np.array([0.0, 0.0, impulse - before[1]])
-        mean: NDArray[np.float64] = lost / (time - before[0])
-        return mean
+        lost = np.array(before[2]) - momentum - np.array([0.0, 0.0, impulse - before[1]])
+        return np.asarray(lost / (time - before[0]))
 
-    def _hook_forces(self, engine: Engine) -> NDArray[np.float64]:
-        steps, sums, before = engine.steps, engine.boundaries.hook_sums, self._hooks_before
-        self._hooks_before = (steps, sums)
+    def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
+        """Return the mean over the steps since the sample before, from forces summed over all steps."""
+        before = self.memory[name]
+        self.memory[name] = [steps, sums.tolist()]
         if before is None or steps <= before[0]:
             return np.full_like(sums, math.nan)
-        mean: NDArray[np.float64] = (sums - before[1]) / (steps - before[0])
-        return mean
+        return np.asarray((sums - np.array(before[1])) / (steps - before[0]))
 
     def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
@@ -144,45 +138,23 @@ class Sampler:
         if not engine.count:
             return row
         row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
-        before, self._strain_before = self._strain_before, None
         if not strings.tied:
+            self.memory["strain"] = None
             return row
         walls = engine.boundaries.channel_sums
         sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
-        self._strain_before = (engine.steps, sums)
         row["pulled_m"] = strings.pulled
         row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
-        if before is not None and engine.steps > before[0]:
-            means = (sums - before[1]) / (engine.steps - before[0])
-            row |= dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
-        return row
-
-    @property
-    def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
-        marks = {"hooks": self._hooks_before, "strain": self._strain_before}
-        before = self._before
-        return {
-            "before": None if before is None else [before[0], before[1], before[2].tolist()],
-            **{name: None if mark is None else [mark[0], mark[1].tolist()] for name, mark in marks.items()},
-        }
-
-    def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken."""
-        before = memory["before"]
-        self._before = None if before is None else (before[0], before[1], np.array(before[2]))
-        self._hooks_before, self._strain_before = (
-            None if mark is None else (mark[0], np.array(mark[1])) for mark in (memory["hooks"], memory["strain"])
-        )
+        means = self._mean_since("strain", engine.steps, sums)
+        return row | dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
 
 
 def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
     motors = engine.motors.readings
     angles = _mean(state.angles)
     if motors is None or not engine.motors.articulated:
-        unknown = math.nan
         held = angles if motors is None else _mean(motors.commands)
-        behind = error = torque = halted = unknown
+        behind = error = torque = halted = math.nan
     else:
         held = _mean(motors.commands)
         behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
@@ -214,7 +186,6 @@ def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _mean(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) mean over smarticles of (N, 2); NaN without smarticles."""
-    mean: NDArray[np.float64] = angles.mean(axis=0) if len(angles) else np.full(2, math.nan)
-    return mean
+def _mean(angles: Array) -> Array:
+    """Return the (2,) mean over smarticles of (N, 2); NaN without smarticles."""
+    return np.asarray(angles.mean(axis=0)) if len(angles) else np.full(2, math.nan)

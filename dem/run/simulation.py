@@ -63,10 +63,7 @@ class Simulation:
     _stop_requested: bool = False
 
     def run(self) -> tuple[Phase, ...]:
-        """Run to the end of the last phase, from wherever the simulation stands.
-
-        Returns:
-            The phases with their times.
+        """Run from the present state to the end of the last phase; return the phases with their times.
 
         Raises:
             RunError: a phase failed.
@@ -81,7 +78,7 @@ class Simulation:
         finally:
             signal.signal(signal.SIGUSR1, before)
         if self.checkpointed != self.engine.time:
-            # What was just loaded has been looked at, and knows its contacts from the next step on.
+            # After a checkpoint contacts are known from the next step on, and the state has been checked.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
         if self.recorder.residual:
@@ -91,28 +88,21 @@ class Simulation:
     def _run_phase(self) -> None:
         phase = self.scene.phases[self._phase]
         if self._stage is None:
-            self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
+            self._stage = phase.begin(self.scene, self._phase)
             if self.engine.time_step != self.time_steps[self._phase]:
                 self.engine.set_time_step(self.time_steps[self._phase])
                 self.recorder.schedule(self.engine)
-            self._performed.append(
-                {
-                    "index": self._phase,
-                    "type": phase.type,
-                    "start_s": self.engine.time,
-                    "wall_s": -self.wall,
-                    "cpu_s": -self.cpu,
-                }
-            )
+            begun = {"index": self._phase, "type": phase.type, "start_s": self.engine.time}
+            self._performed.append({**begun, "wall_s": -self.wall, "cpu_s": -self.cpu})
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]
-        duration = phase.progress_duration
+        duration = phase.known_duration
         self.recorder.progress.begin(
             index=self._phase,
             phase=phase.type,
             start=entry["start_s"],
             now=self.engine.time,
-            end=None if duration is None else entry["start_s"] + duration,
+            end=entry["start_s"] + duration if duration else None,
         )
         self._advance()
         while wait := self._stage.proceed(self.engine):
@@ -121,20 +111,15 @@ class Simulation:
         entry["end_s"] = self.engine.time
         entry["wall_s"] += self.wall
         entry["cpu_s"] += self.cpu
-        self.log.info(
-            "phase %d %s ended at t = %.4f s after %.1f s of wall time",
-            self._phase,
-            phase.type,
-            self.engine.time,
-            entry["wall_s"],
-        )
+        text = "phase %d %s ended at t = %.4f s after %.1f s of wall time"
+        self.log.info(text, self._phase, phase.type, self.engine.time, entry["wall_s"])
         if warning := self._stage.memory.get("warning"):
             self.warn(f"phases.{self._phase} ({phase.type}): {warning}")
         self._stage = None
         self._phase += 1
 
     def warn(self, message: str) -> None:
-        """Tell the log and the person at the terminal."""
+        """Warn in the log and on the terminal."""
         self.log.warning("%s", message)
         self.recorder.progress.warn(message)
 
@@ -150,28 +135,25 @@ class Simulation:
                 if due:
                     self._checkpoint()
 
-    # -- checkpoints -------------------------------------------------------------------------------------------
-
     def _checkpoint(self) -> None:
-        # A checkpoint is good: the watchdog has looked at it.
+        # A checkpoint is good: the watchdog has checked it.
         self.recorder.watch(self.engine)
         self._check_space()
         saved = self.engine.save(self.folder)
         assert self._stage is not None  # a checkpoint is taken while a phase runs
-        state = {
-            "engine": saved.memory,
-            "recorder": self.recorder.memory,
-            "phase": self._phase,
-            "stage": self._stage.memory,
-            "target": self._target,
-            "performed": self._performed,
-            "wall_s": self.wall,
-            "cpu_s": self.cpu,
-        }
         checkpoint = Checkpoint(
             scene_sha256=scene_hash(self.scene),
             made_by=self.made_by,
-            state=state,
+            state={
+                "engine": saved.memory,
+                "recorder": self.recorder.memory,
+                "phase": self._phase,
+                "stage": self._stage.memory,
+                "target": self._target,
+                "performed": self._performed,
+                "wall_s": self.wall,
+                "cpu_s": self.cpu,
+            },
             series=self.recorder.series.columns,
             engine=saved.content,
         )
@@ -186,7 +168,7 @@ class Simulation:
         self.recorder.progress.checkpointed(self.engine.time)
 
     def _check_space(self) -> None:
-        # An engine may not notice a full disk when it saves, and would then load what it could not write.
+        # An engine may not notice a full disk when it saves, and would then load a truncated file.
         newest = self.folder / CHECKPOINT
         needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
         free = shutil.disk_usage(self.folder).free
@@ -198,7 +180,7 @@ class Simulation:
             raise RunError(msg)
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go on from a checkpoint."""
+        """Restore a checkpoint."""
         state: Mapping[str, Any] = checkpoint.state
         self.engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), self.folder)
         self._note_checkpoint()
@@ -213,12 +195,12 @@ class Simulation:
 
     @property
     def wall(self) -> float:
-        """Wall time spent [s], in the processes before this one too."""
+        """Wall time spent [s], including earlier processes of this run."""
         return self._spent + time.monotonic() - self._began
 
     @property
     def cpu(self) -> float:
-        """Processor time spent [s], in the processes before this one too, and by those that the engine has here."""
+        """Processor time spent [s], including earlier processes and those of the engine on this machine."""
         return self._cpu_spent + time.process_time() - self._cpu_began + self.engine.cpu_elsewhere
 
     def _request_stop(self, number: int, frame: FrameType | None) -> None:

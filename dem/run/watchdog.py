@@ -1,4 +1,4 @@
-"""Stops a run whose result would be nonsense, and says why."""
+"""Checks that stop a run whose result would have no meaning."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from dem.setting.container import Cylinder
 Array = NDArray[np.float64]
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
-SAID_SHARE = 0.2  # of the limit of what the energy ledger may miss, from where on a run says so at its end
+WARNED_SHARE = 0.2  # of the limit of what the energy ledger may miss: from here on a run warns at its end
 BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 
 @dataclass(kw_only=True)
 class Watchdog:
-    """Limits that no smarticle may pass.
+    """Limits that no smarticle may exceed.
 
     Args:
-        cylinder: the container; who has a sphere's centre, or a link's axis, beyond its wall or under its floor has
-            escaped, whose centre of mass is above it has been thrown out.
+        cylinder: the container; a smarticle with a sphere's centre, or a link's axis, beyond its wall or under its
+            floor has escaped, one whose centre of mass is above it has been thrown out.
         speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
         gap: [m]; a hinge whose links are farther apart is broken.
         depth: [m]; contacts that overlap by more no longer keep bodies apart.
         energy: [J]; smarticles that gain more from nowhere are blowing up.
-        missed: [1]; the energy ledger may miss this share of what was dissipated.
+        missed: [1]; the energy ledger may miss this fraction of the dissipation.
     """
 
     cylinder: Cylinder
@@ -40,16 +40,12 @@ class Watchdog:
     depth: float = math.inf
     energy: float = math.inf
     missed: float = math.inf
-    # What kinetic and potential energy less the work done may amount to from now on [J].
-    _ceiling: float = math.inf
+    _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def content(self, glance: Glance, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Whether all smarticles are within all limits but that of the energy, for certain: then nobody need be asked.
+        """Return whether the extremes of all smarticles are certainly within all limits but that of the energy.
 
-        Args:
-            glance: their extremes.
-            floor: as in `check` [m].
-            raised: the same [m].
+        `floor` and `raised` are as in `check`.
         """
         inside = glance.lowest >= floor
         if raised is not None:
@@ -69,17 +65,17 @@ class Watchdog:
         raised: float | None = 0.0,
         gaps: Array | None = None,
     ) -> None:
-        """Look at all smarticles once.
+        """Check speeds, hinges and places of all smarticles.
 
         Args:
             state: the smarticles.
-            points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of mass
-                stand for them. Contacts with wall and floor do not tell: from the centre on YADE takes them for
-                shallower the deeper they are.
+            points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of
+                mass. Contacts with wall and floor are no measure: YADE takes those deeper than the centre for
+                shallower.
             floor: height of the floor [m].
             time: simulated time [s].
-            raised: how far a hook may have raised smarticles [m]; None: nothing holds them, so that none escapes.
-            gaps: (N, 2) how far the links of each hinge are apart [m]; None while welded.
+            raised: distance by which a hook may have raised smarticles [m]; None: nothing holds them, none escapes.
+            gaps: (N, 2) distances of the links of each hinge [m]; None while welded.
 
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
@@ -122,11 +118,7 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Look at all contacts once.
-
-        Args:
-            overlaps: the contacts, those deeper than `depth` named.
-            time: simulated time [s].
+        """Check the depths of all contacts at a simulated time [s].
 
         Raises:
             RunError: cause, smarticles concerned, time and the way out.
@@ -153,17 +145,17 @@ class Watchdog:
         refuse(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
-        """Compare the energy with what it may be after all that was seen before.
+        """Check that no energy comes from nowhere.
 
-        Contacts, hinges and welding only take energy away, and what their springs hold comes back once at most. So
-        kinetic and potential energy less the work done can never rise above what they were at any earlier time by more
-        than the springs held then. The lowest of these ceilings counts: dissipation makes no room for a later rise.
+        Contacts, hinges and welding only take energy away, and their springs give back at most what they hold. So
+        kinetic and potential energy less the work done can never exceed their value at an earlier time by more than
+        the springs held then. The lowest of these ceilings counts: dissipation makes no room for a later rise.
 
         Args:
             state: the smarticles, to name the fast ones.
             energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
-                where the work is not known at present: then everything seen so far is forgotten.
-            elastic: what the springs of contacts and hinges hold at most [J].
+                where the work is unknown at present: the ceiling is then forgotten.
+            elastic: energy of the springs of contacts and hinges at most [J].
             time: simulated time [s].
 
         Raises:
@@ -185,7 +177,7 @@ class Watchdog:
         self._ceiling = min(self._ceiling, energy + elastic)
 
     def check_residual(self, residual: float, *, dissipated: float, time: float) -> str | None:
-        """Judge what the energy ledger misses.
+        """Check the residual of the energy ledger.
 
         Args:
             residual: energy added and work done, less everything stored and dissipated [J].
@@ -193,16 +185,16 @@ class Watchdog:
             time: simulated time [s].
 
         Returns:
-            What the run says if it ends now; None where the residual is small.
+            A warning for the end of the run; None where the residual is small.
 
         Raises:
             RunError: the residual is too large, with cause and way out.
         """
-        if not abs(residual) > SAID_SHARE * self.missed * dissipated > 0.0:
+        if not abs(residual) > WARNED_SHARE * self.missed * dissipated > 0.0:
             return None
         share = 100 * abs(residual) / dissipated
         text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
-        # At the beginning, when next to nothing was dissipated, a share says nothing.
+        # At the beginning, when next to nothing was dissipated, a fraction has no meaning.
         if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
             msg = f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}"
             raise RunError(msg)
@@ -210,6 +202,5 @@ class Watchdog:
 
 
 def _speeds(state: State) -> Array:
-    """(N,) speed of the fastest link's centre of each smarticle [m/s]."""
-    speeds: Array = np.linalg.norm(state.link_velocities, axis=-1).max(axis=-1)
-    return speeds
+    """Return (N,) speed of the fastest link's centre of each smarticle [m/s]."""
+    return np.asarray(np.linalg.norm(state.link_velocities, axis=-1).max(axis=-1))

@@ -1,11 +1,11 @@
-"""Scenes read, written and told apart."""
+"""Scenes: read from files and changed by `--set`, written, hashed and compared."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,13 +15,13 @@ from pydantic import ValidationError
 
 from dem.errors import InputError, shown
 from dem.record.names import SCENE
-from dem.refusal import refusals
-from dem.scene.overrides import apply_override
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import parse_yaml
+from dem.scene.yaml_text import load_yaml, parse_yaml
 from dem.setting.fidelity import FIDELITIES
+from dem.strict import explained
 
 SCHEMA_VERSION = 1
+MOST_DIFFERENCES = 3  # keys that are shown where two scenes differ
 DEFAULT_ENGINE = "yade"
 YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {"shake": {"moves": "container"}, "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0}}
@@ -35,33 +35,35 @@ def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     Args:
         data: the content of a scene file.
         source: file name for messages.
-        folder: where directories of other runs are seen from; by default the working directory.
+        folder: folder that directories of other runs are relative to; by default the working directory.
 
     Raises:
         InputError: one line with file, key, value and the way out.
     """
-    if data is None:
-        msg = f"{source}: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
-        raise InputError(msg)
-    if not isinstance(data, Mapping):
-        msg = f"{source}: a scene is a mapping of keys to values, got {shown(data)}"
-        raise InputError(msg)
-    if "template" in data and "points" in data:
-        msg = f"{source}: is a sweep file, which makes many scenes; give it to `smarticles sweep`"
-        raise InputError(msg)
-    if "schema_version" not in data:
-        # A scene made in Python is of this version; a file says of which it is.
-        msg = f"{source}: schema_version: missing; it has no default"
-        raise InputError(msg)
-    version = data.get("schema_version")
-    if isinstance(version, int) and version != SCHEMA_VERSION:
-        msg = f"{source}: schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
+    if problem := _not_a_scene(data):
+        msg = f"{source}: {problem}"
         raise InputError(msg)
     try:
         return Scene.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        msg = f"{source}: {refusals(error, data, described='`smarticles schema`')}"
+        msg = f"{source}: {explained(error, data, described='`smarticles schema`')}"
         raise InputError(msg) from None
+
+
+def _not_a_scene(data: Any) -> str | None:
+    if data is None:
+        return "is empty; a scene is a mapping of keys to values, see `smarticles schema`"
+    if not isinstance(data, Mapping):
+        return f"a scene is a mapping of keys to values, got {shown(data)}"
+    if "template" in data and "points" in data:
+        return "is a sweep file, which makes many scenes; give it to `smarticles sweep`"
+    if "schema_version" not in data:
+        # A scene made in Python is of this version; a file states its own.
+        return "schema_version: missing; it has no default"
+    version = data["schema_version"]
+    if isinstance(version, int) and version != SCHEMA_VERSION:
+        return f"schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
+    return None
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
@@ -75,60 +77,90 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
     """
     path = Path(path)
-    if path.is_dir():
-        inside = path / SCENE
-        msg = f"{path}: is a directory; give " + (str(inside) if inside.is_file() else "the path of a scene file")
-        raise InputError(msg)
-    if path.suffix == ".j2" and path.is_file():
-        msg = f"{path}: is a template of scenes; give the sweep file that names it to `smarticles sweep`"
-        raise InputError(msg)
+    problem, way_out = "", "give the path of a scene file"
     try:
-        text = path.read_text(encoding="utf-8")
+        if path.is_dir():
+            problem = "is a directory"
+            way_out = f"give {path / SCENE}" if (path / SCENE).is_file() else way_out
+        elif path.suffix == ".j2" and path.is_file():
+            problem, way_out = "is a template of scenes", "give the sweep file that names it to `smarticles sweep`"
+        else:
+            text = path.read_text(encoding="utf-8")
     except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror}); give the path of a scene file"
-        raise InputError(msg) from None
+        problem = f"cannot be read ({error.strerror})"
     except UnicodeDecodeError:
-        msg = f"{path}: is not a text file; give the path of a scene file"
-        raise InputError(msg) from None
+        problem = "is not a text file"
+    if problem:
+        msg = f"{path}: {problem}; {way_out}"
+        raise InputError(msg)
     data = parse_yaml(text, str(path))
     for override in overrides if isinstance(data, Mapping) else ():
         apply_override(data, override)
     return parse_scene(data, source=str(path), folder=path.parent)
 
 
-def _plain(scene: Scene) -> dict[str, Any]:
-    """The resolved scene as plain data; keys younger than the format are not told where they have their defaults.
+def apply_override(data: Any, override: str) -> None:
+    """Change one key of a scene's data in place, by `KEY=VALUE` with dots for nesting; the value is read as YAML.
 
-    A protocol would fill them in again, so that with one they are all told.
+    Raises:
+        InputError: it has another form, or there is no such place.
+    """
+    key, separator, text = override.partition("=")
+    if not separator or not key:
+        msg = f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2"
+        raise InputError(msg)
+    try:
+        value = load_yaml(text)
+    except yaml.YAMLError:
+        msg = f"--set {override}: the value is not valid YAML"
+        raise InputError(msg) from None
+    here: Any = data
+    parts = key.split(".")
+    for number, part in enumerate(parts, 1):
+        last = number == len(parts)
+        place: Any = int(part) if isinstance(here, list) and part.isdigit() else part
+        if not isinstance(here, dict) and not (isinstance(here, list) and isinstance(place, int) and place < len(here)):
+            msg = f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0"
+            raise InputError(msg)
+        if last:
+            here[place] = value
+        elif isinstance(here, dict):
+            if part == "fidelity" and isinstance(here.get(part), str):
+                here[part] = {"base": here[part]}
+            here = here.setdefault(part, {})
+        else:
+            here = here[place]
+
+
+def _plain(scene: Scene) -> dict[str, Any]:
+    """Return the resolved scene as plain data, without keys younger than the format that have their defaults.
+
+    A protocol would fill such keys in again, so that with one they are all kept.
     """
     data = scene.model_dump(mode="json")
-    if scene.engine == DEFAULT_ENGINE:
-        del data["engine"]
-    _leave_out(data["recording"], {"contact_forces": False})
-    _leave_out(data["smarticle"], {"middle_thickness_in_plane_m": None})
+    optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
+        (data, {"engine": DEFAULT_ENGINE}),
+        (data["recording"], {"contact_forces": False}),
+        (data["smarticle"], {"middle_thickness_in_plane_m": None}),
+    ]
     if scene.hooks is not None:
-        _leave_out(data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1})
+        optional.append((data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1}))
     if scene.protocol is None:
-        _leave_out(data, {"protocol": None})
-        _leave_out(data["container"], {"packing_radius_m": None})
-        for phase in data["phases"]:
-            _leave_out(phase, YOUNGER.get(phase["type"], {}))
+        optional += [(data, {"protocol": None}), (data["container"], {"packing_radius_m": None})]
+        optional += [(phase, YOUNGER.get(phase["type"], {})) for phase in data["phases"]]
+    for part, defaults in optional:
+        for key, default in defaults.items():
+            if part[key] == default:
+                del part[key]
     return data
 
 
-def _leave_out(data: dict[str, Any], defaults: Mapping[str, Any]) -> None:
-    for key, default in defaults.items():
-        if data[key] == default:
-            del data[key]
-
-
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """The resolved scene as YAML, every default written out.
+    """Return the resolved scene as YAML, every default written out.
 
     Args:
         scene: the scene.
-        folder: of the file that it is written to, where directories of other runs are seen from; None: nobody knows,
-            and they are written in full.
+        folder: folder that directories of other runs are written relative to; None: they are written in full.
     """
     data = _plain(scene)
     if folder is not None:
@@ -139,17 +171,36 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
 
 
 def scene_hash(scene: Scene) -> str:
-    """SHA-256 of the canonical JSON of the resolved scene, without what says where pinned content comes from."""
+    """Return the SHA-256 of the canonical JSON of the resolved scene, without the source of pinned content."""
     data = _plain(scene)
-    for told, phase in zip(data["phases"], scene.phases, strict=True):
+    for dumped, phase in zip(data["phases"], scene.phases, strict=True):
         for key in phase.sources:
-            del told[key]
+            del dumped[key]
     text = json.dumps(data, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def difference(there: Scene, here: Scene) -> str:
+    """Return the first keys in which two scenes differ: `seed 1 there, 2 here; count 100 there, 50 here`."""
+    one, other = (dict(_leaves(scene.model_dump(mode="json"))) for scene in (there, here))
+    pairs = [(key, one.get(key, "absent"), other.get(key, "absent")) for key in {**one, **other}]
+    texts = [f"{key} {a} there, {b} here" for key, a, b in pairs if a != b]
+    more = len(texts) - MOST_DIFFERENCES
+    return "; ".join(texts[:MOST_DIFFERENCES]) + (f"; {more} more" if more > 0 else "")
+
+
+def _leaves(data: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every value with its key, `phases.1.duration_s`."""
+    items = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list) else None
+    if items is None:
+        yield place, data
+        return
+    for key, value in items:
+        yield from _leaves(value, f"{place}.{key}" if place else str(key))
+
+
 def json_schema() -> dict[str, Any]:
-    """JSON schema of the scene file, for editors."""
+    """Return the JSON schema of the scene file, for editors."""
     schema = Scene.model_json_schema()
     schema["required"].insert(0, "schema_version")
     del schema["properties"]["schema_version"]["default"]

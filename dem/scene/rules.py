@@ -1,126 +1,115 @@
 """What the parts of a scene must be to each other: rules that no part can check alone.
 
-Source of every limit: what the engine can do, or what would make a run that means nothing.
+Each limit comes from what the engine can do, or from what would make a run without meaning.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from dem.phases.kinds import KINDS
 from dem.phases.phase import SceneView
+from dem.phases.remove_container import RemoveContainer
 from dem.setting.hooks import TOLERANCE, Hooks
 
 
-def check(scene: SceneView) -> None:
-    """Check a scene as a whole.
+def check(scene: SceneView, engine: str) -> None:
+    """Check a scene as a whole, for an engine.
 
     Raises:
         ValueError: one line with key, value and the way out.
     """
+    for problem in _problems(scene, engine):
+        raise ValueError(problem)
+
+
+def _problems(scene: SceneView, engine: str) -> Iterator[str]:
     if scene.plane is None:
-        _check_space(scene)
-        _check_order(scene)
-        _check_container(scene)
+        yield from _of_order(scene)
+        yield from _of_container(scene)
     else:
-        _check_plane(scene)
-    _check_section(scene)
-    _check_body(scene)
-    _check_recording(scene)
+        yield from _of_plane(scene)
+    yield from _of_section(scene)
+    yield from _of_body(scene)
+    yield from _of_recording(scene)
     for index, phase in enumerate(scene.phases):
-        phase.check(scene, index)
+        yield from phase.check(scene, index)
     if scene.hooks is not None:
-        _check_bars(scene.hooks)
-        _check_room(scene, scene.hooks)
+        yield from _of_bars(scene.hooks)
+        yield from _of_room(scene, scene.hooks)
+    if engine == "lammps":
+        yield from _of_lammps(scene)
 
 
-def _check_space(scene: SceneView) -> None:
+def _of_order(scene: SceneView) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.planar:
-            msg = f"phases.{index}: {phase.kind} needs motion confined to a plane; add the key plane"
-            raise ValueError(msg)
-
-
-def _check_order(scene: SceneView) -> None:
+            yield f"phases.{index}: {phase.kind} needs motion confined to a plane; add the key plane"
     begins = [phase.begins for phase in scene.phases]
     if not begins[0] or sum(begins) > 1:
         kinds = ", ".join(phase.kind for phase in scene.phases)
-        msg = f"phases: got {kinds}; a run starts with one 'deposit' or one 'take-over' and has no other"
-        raise ValueError(msg)
+        yield f"phases: got {kinds}; a run starts with one 'deposit' or one 'take-over' and has no other"
 
 
-def _check_plane(scene: SceneView) -> None:
+def _of_plane(scene: SceneView) -> Iterator[str]:
     planar = ", ".join(kind.tag() for kind in KINDS if kind.planar is not False)
     for index, phase in enumerate(scene.phases):
         if phase.planar is False:
-            msg = f"phases.{index}: {phase.kind} has no meaning in a plane; use {planar}, or leave plane out"
-            raise ValueError(msg)
+            yield f"phases.{index}: {phase.kind} has no meaning in a plane; use {planar}, or leave plane out"
         if phase.begins != (index == 0):
-            msg = f"phases.{index}: {phase.kind}; a run in a plane starts with one 'arrange' and has no other"
-            raise ValueError(msg)
+            yield f"phases.{index}: {phase.kind}; a run in a plane starts with one 'arrange' and has no other"
     if scene.hooks is not None:
-        msg = "hooks: they lie out of the plane; leave hooks or plane out"
-        raise ValueError(msg)
+        yield "hooks: they lie out of the plane; leave hooks or plane out"
     if scene.container != type(scene.container)():
-        msg = "container: a plane has none but two walls; leave container out and give plane.width_m"
-        raise ValueError(msg)
+        yield "container: a plane has none but two walls; leave container out and give plane.width_m"
     if scene.fidelity.rows != 1:
-        msg = f"fidelity.rows: {scene.fidelity.rows} rows of spheres out of the plane; use 1"
-        raise ValueError(msg)
+        yield f"fidelity.rows: {scene.fidelity.rows} rows of spheres out of the plane; use 1"
 
 
-def _check_section(scene: SceneView) -> None:
+def _of_section(scene: SceneView) -> Iterator[str]:
     rows, t1 = scene.fidelity.rows, scene.smarticle.thickness_normal_m
     diameter = scene.sphere_diameter
     if rows > 1 and diameter >= t1:
-        msg = (
+        yield (
             f"fidelity.rows: {rows} rows of {diameter:g} m do not fit into thickness_normal_m = {t1:g} m; "
             "use one row or a smaller diameter_m"
         )
-        raise ValueError(msg)
 
 
-def _check_body(scene: SceneView) -> None:
-    """A middle link with a thickness of its own: where it can be had, and whether barbs stand out of it."""
+def _of_body(scene: SceneView) -> Iterator[str]:
     thickness = scene.smarticle.middle_thickness_in_plane_m
     if thickness is None:
         return
     key = f"smarticle.middle_thickness_in_plane_m: {thickness:g} m"
     if scene.plane is None:
-        msg = f"{key} in a scene without the key plane; links of their own thickness move in a plane, or leave it out"
-        raise ValueError(msg)
+        yield f"{key} in a scene without the key plane; links of their own thickness move in a plane, or leave it out"
     if scene.smooth:
-        msg = f"{key} on engine: links, whose links are all as thick; use engine: yade, or leave it out"
-        raise ValueError(msg)
+        yield f"{key} on engine: links, whose links are all as thick; use engine: yade, or leave it out"
     particle = scene.particle
     least = particle.barb_start + particle.radius
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
-        msg = (
+        yield (
             f"{key} leaves nothing outside of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
             f"use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}), or a "
             "thinner middle link"
         )
-        raise ValueError(msg)
 
 
-def _check_container(scene: SceneView) -> None:
+def _of_container(scene: SceneView) -> Iterator[str]:
     radius, reach = scene.container.radius_m, scene.particle.reach
-    if reach > radius:
-        msg = (
-            f"container.radius_m: {radius:g} m is narrower than a smarticle, whose farthest point is {reach:.4g} m "
-            f"from its centre of mass; use at least {reach:.4g} m"
-        )
-        raise ValueError(msg)
     tiers = scene.container.tiers or ()
-    for number, tier in enumerate(tiers):
-        if reach > tier.radius_m:
-            msg = (
-                f"container.tiers.{number}.radius_m: {tier.radius_m:g} m is narrower than a smarticle, whose "
-                f"farthest point is {reach:.4g} m from its centre of mass; use at least {reach:.4g} m"
+    for key, inner in (
+        ("radius_m", radius),
+        *((f"tiers.{number}.radius_m", tier.radius_m) for number, tier in enumerate(tiers)),
+    ):
+        if reach > inner:
+            yield (
+                f"container.{key}: {inner:g} m is narrower than a smarticle, whose farthest point is {reach:.4g} m "
+                f"from its centre of mass; use at least {reach:.4g} m"
             )
-            raise ValueError(msg)
     height = scene.container.height_m
     if height is not None:
         # No random packing of thin bars comes near one half; a scene beyond it cannot fit, whatever the pour.
@@ -128,85 +117,76 @@ def _check_container(scene: SceneView) -> None:
         most = int(0.5 * math.pi * space / scene.smarticle.boxes.volume)
         if scene.count > most:
             way_out = "make the top tier higher" if tiers else "leave height_m out"
-            msg = (
+            yield (
                 f"count: {scene.count} smarticles cannot fit into {height:g} m of container.height_m "
                 f"(half full is {most}); lower the count or {way_out}"
             )
-            raise ValueError(msg)
 
 
-def _check_recording(scene: SceneView) -> None:
+def _of_recording(scene: SceneView) -> Iterator[str]:
     series = scene.recording.series_interval_s
     for key in ("frame_interval_s", "sphere_interval_s", "checkpoint_interval_s"):
         interval = getattr(scene.recording, key)
         if interval is None:
             continue
         if abs(interval / series - round(interval / series)) > 1e-6 or interval < series:
-            msg = (
+            yield (
                 f"recording.{key}: {interval:g} s is not a whole multiple of series_interval_s = {series:g} s; "
                 f"use e.g. {max(1, round(interval / series)) * series:g} s"
             )
-            raise ValueError(msg)
     sampled = scene.recording.dissipation_interval_s
     if sampled is not None and sampled > series:
-        msg = (
+        yield (
             f"recording.dissipation_interval_s: {sampled:g} s is longer than series_interval_s = {series:g} s, so "
             "that the energy ledger would not close; 2e-4 s is dense enough"
         )
-        raise ValueError(msg)
     for number, phase in enumerate(scene.phases):
-        # How long a pour takes is not known, and laying out a chain takes no time.
-        duration = phase.progress_duration
-        if duration is not None and duration < series:
-            msg = (
-                f"phases.{number}{phase.duration_key}: {duration:g} s is shorter than "
+        # The length of a pour is unknown, and laying out a chain takes no time.
+        duration = phase.known_duration
+        if duration and duration < series:
+            # Some phases add their length up from several keys.
+            key = ".duration_s" if "duration_s" in getattr(type(phase), "model_fields", {}) else ""
+            yield (
+                f"phases.{number}{key}: {duration:g} s is shorter than "
                 f"recording.series_interval_s = {series:g} s; lengthen the phase or sample more often"
             )
-            raise ValueError(msg)
 
 
-def _check_bars(hooks: Hooks) -> None:
+def _of_bars(hooks: Hooks) -> Iterator[str]:
+    side, lower = f"side_m = {hooks.side_m:g} m", hooks.lower_height_m
     for key, length in (("length_m", hooks.length_m), ("lower_length_m", hooks.lower_length_m)):
         if hooks.side_m > length:
-            msg = f"hooks.side_m: {hooks.side_m:g} m is more than {key} = {length:g} m; bars are long and thin"
-            raise ValueError(msg)
+            yield f"hooks.side_m: {hooks.side_m:g} m is more than {key} = {length:g} m; bars are long and thin"
     if hooks.side_m * hooks.lower_bars > hooks.lower_length_m / 2:
-        msg = (
-            f"hooks.lower_bars: {hooks.lower_bars} bars of side_m = {hooks.side_m:g} m leave no room between them over "
+        yield (
+            f"hooks.lower_bars: {hooks.lower_bars} bars of {side} leave no room between them over "
             f"lower_length_m = {hooks.lower_length_m:g} m; use fewer"
         )
-        raise ValueError(msg)
-    if hooks.lower_height_m < hooks.side_m / 2:
-        msg = (
-            f"hooks.lower_height_m: {hooks.lower_height_m:g} m puts bars of side_m = {hooks.side_m:g} m into the "
-            f"floor; use at least {hooks.side_m / 2:g} m"
+    if lower < hooks.side_m / 2:
+        yield (
+            f"hooks.lower_height_m: {lower:g} m puts bars of {side} into the floor; use at least {hooks.side_m / 2:g} m"
         )
-        raise ValueError(msg)
-    if hooks.upper_height_m < hooks.lower_height_m + hooks.side_m * (1 - TOLERANCE):
-        least = hooks.lower_height_m + hooks.side_m
-        msg = (
+    if hooks.upper_height_m < lower + hooks.side_m * (1 - TOLERANCE):
+        yield (
             f"hooks.upper_height_m: {hooks.upper_height_m:g} m is not above the lower hook, whose top is at "
-            f"{hooks.lower_height_m + hooks.side_m / 2:g} m; use at least {least:g} m"
+            f"{lower + hooks.side_m / 2:g} m; use at least {lower + hooks.side_m:g} m"
         )
-        raise ValueError(msg)
 
 
-def _check_room(scene: SceneView, hooks: Hooks) -> None:
+def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
     cylinder, top = scene.cylinder, hooks.upper_height_m + hooks.side_m / 2
     pulled = next((k for k, phase in enumerate(scene.phases) if phase.raises), None)
     highest = scene.ample_height()
     if pulled is not None and top - hooks.side_m > highest:
-        msg = (
+        yield (
             f"hooks.upper_height_m: {hooks.upper_height_m:g} m is above all that {scene.count} smarticles can reach "
             f"while they are poured, {highest:.3g} m, so that phases.{pulled} (pull-hook) would feel nothing; lower it"
         )
-        raise ValueError(msg)
     if top > cylinder.height:
-        msg = (
+        yield (
             f"hooks.upper_height_m: {hooks.upper_height_m:g} m is outside the container, whose wall ends at "
             f"{cylinder.height:g} m; use at most {cylinder.height - hooks.side_m / 2:g} m"
         )
-        raise ValueError(msg)
     # A tier is narrower than those below it: what fits into the highest one that a hook reaches fits into all.
     raised = sum(phase.raises for phase in scene.phases)
     free = float(cylinder.inner_radii(np.array([top + raised]))[0])
@@ -217,8 +197,34 @@ def _check_room(scene: SceneView, hooks: Hooks) -> None:
         beyond = hooks.side_m / 2 if cross.count > 1 else 0.0
         if cross.reach + beyond >= room:
             most = 2 * math.sqrt(max(0.0, (room - 2 * beyond) ** 2 - (hooks.side_m / 2) ** 2))
-            msg = (
+            yield (
                 f"hooks.{key}: {cross.length:g} m is inside the wall, whose flats are {room:.4g} m from the axis; use "
                 f"less than {most:.4g} m"
             )
-            raise ValueError(msg)
+
+
+def foreign(scene: SceneView) -> Iterator[str]:
+    """Yield key and name of all that other simulators cannot do: they have passive chains of spheres in a cylinder."""
+    if scene.plane is not None:
+        yield "plane: motion in a plane"
+    if scene.hooks is not None:
+        yield "hooks"
+    if scene.cylinder.upper:
+        yield "container.tiers"
+    for index, phase in enumerate(scene.phases):
+        if isinstance(phase, RemoveContainer) and phase.speed_m_per_s is not None:
+            yield f"phases.{index}.speed_m_per_s: a wall that is lifted (use null, gone at once)"
+        elif phase.actuates:
+            yield f"phases.{index} ({phase.kind}): motors"
+
+
+def _of_lammps(scene: SceneView) -> Iterator[str]:
+    found = list(foreign(scene))
+    if scene.recording.energy:
+        found.append("recording.energy: the work of the container is not added up")
+    if scene.recording.dissipation_interval_s is not None:
+        found.append("recording.dissipation_interval_s: what contacts dissipate is not added up")
+    if scene.recording.contact_forces:
+        found.append("recording.contact_forces: forces at contacts are not read from it")
+    if found:
+        yield f"engine: lammps cannot compute {'; '.join(found)}; leave that out, or use engine: yade or links"

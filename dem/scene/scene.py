@@ -1,7 +1,6 @@
-"""The scene: a validated, frozen description of one run; everything that decides its result.
+"""The scene: validated, frozen description of one run.
 
-What is given is in `dem.setting`, what happens in `dem.phases`; this module joins them, and `dem.scene.rules` checks
-them against each other.
+`dem.setting` has what is given, `dem.phases` what happens; `dem.scene.rules` checks them against each other.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
-from dem.scene.carried import check_carried
 from dem.scene.rules import check
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
@@ -114,9 +112,7 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        check(self)
-        if self.engine == "lammps":
-            check_carried(self)
+        check(self, self.engine)
         return self
 
     @cached_property
@@ -137,13 +133,10 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Height [m] of a wall that is enough for the loosest pile, hooks in it, and a layer being poured.
+        """Return the height [m] of a wall for the loosest pile, hooks with their top at `hooks_top`, and a layer.
 
         A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0,
         0.7 and 1.4, with d the mean width of the section); half of that is taken as the loosest.
-
-        Args:
-            hooks_top: height of the hooks' top [m]; 0 without hooks.
         """
         # What is poured may come to lie on a hook.
         pile = self._height_at(1.2)
@@ -151,7 +144,7 @@ class Scene(Part):
 
     @property
     def loose_height(self) -> float:
-        """About the height [m] of the poured pile, by the packing that `ample_height` tells.
+        """Approximate height [m] of the poured pile, by the packing that `ample_height` states.
 
         Of 9 piles of 100 to 160, l/w 0.4 and 0.7, half of the smarticles end below 0.6 to 0.7 of it, and the highest at
         1.2 to 1.7 of it.
@@ -159,7 +152,7 @@ class Scene(Part):
         return self._height_at(2.4)
 
     def _height_at(self, factor: float) -> float:
-        """Height [m] of a pile of φ = `factor` d/L in the container."""
+        """Return the height [m] of a pile of φ = `factor` d/L in the container."""
         boxes = self.smarticle.boxes
         filling = factor * self.sphere_diameter / float(boxes.lengths.sum())
         return self.count * boxes.volume / (math.pi * self.container.radius_m**2 * filling)
@@ -182,8 +175,12 @@ class Scene(Part):
         return smarticle.thickness_in_plane_m
 
     def seed_for(self, purpose: str) -> int:
-        """See `derive_seed`."""
-        return derive_seed(self.seed, purpose)
+        """Derive a 64-bit seed for one purpose, from the scene's seed alone.
+
+        Scenes that differ in fidelity only get the same poses, so that fidelities are compared on equal terms.
+        """
+        digest = hashlib.sha256(f"{self.seed}/{purpose}".encode()).digest()
+        return int.from_bytes(digest[:8], "big")
 
     @property
     def torque_limit(self) -> float:
@@ -220,7 +217,7 @@ class Scene(Part):
         return tuple(phase.pulled_by for phase in self.phases if phase.pulled_by is not None)
 
     def calls_for(self, effect: EffectName) -> bool:
-        """Whether a phase calls for an effect."""
+        """Return whether a phase calls for an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))
 
     @cached_property
@@ -230,12 +227,3 @@ class Scene(Part):
         pitch = SMOOTH_PITCH if self.smooth else self.fidelity.pitch
         chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=pitch * diameter)
         return Particle(self.smarticle.boxes, chain)
-
-
-def derive_seed(seed: int, purpose: str) -> int:
-    """A 64-bit seed for one purpose, from the scene's seed alone.
-
-    Scenes that differ in fidelity only get the same poses, so that fidelities are compared on equal terms.
-    """
-    digest = hashlib.sha256(f"{seed}/{purpose}".encode()).digest()
-    return int.from_bytes(digest[:8], "big")

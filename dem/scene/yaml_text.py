@@ -25,23 +25,21 @@ _OWN = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
 
 
 class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no types
-    """SafeLoader that refuses a key given twice and reads `1e-3` as a number."""
+    """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Build a mapping; a repeated key is an error, not the last one's victory."""
+        """Build a mapping; a repeated key is an error."""
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()
             for key_node, _ in node.value:
                 key = self.construct_object(key_node, deep=True)
                 try:
-                    repeated = key in seen
+                    problem = f"key {key!r} is given twice; keep one of the two" if key in seen else ""
                     seen.add(key)
                 except TypeError:
                     problem = f"a key must be plain text or a number: got {key!r}"
-                    raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark) from None
-                if repeated:
-                    problem = f"key {key!r} is given twice; keep one of the two"
+                if problem:
                     raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
         return mapping
@@ -56,14 +54,10 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """What a YAML text says.
-
-    Args:
-        text: the YAML.
-        loader: the loader class.
+    """Return what a YAML text holds.
 
     Raises:
-        yaml.YAMLError: the text is not YAML; `parse_yaml` says so to users.
+        yaml.YAMLError: the text is not YAML; `parse_yaml` explains it to users.
     """
     try:
         # A SafeLoader underneath: no Python objects can be made.
@@ -80,12 +74,7 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """What a YAML text says, to users.
-
-    Args:
-        text: the YAML.
-        source: what error messages call it.
-        loader: the loader class.
+    """Return what a YAML text holds; `source` is its name in messages.
 
     Raises:
         InputError: the text is not YAML; the message names the line.
@@ -99,7 +88,6 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
         if "'\\t'" in problem:
             problem = "a tab; YAML is indented and spaced by blanks"
         msg = f"{source}{where}: not valid YAML: {problem}" + ("" if ";" in problem else "; correct this line")
-        raise InputError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
-        raise InputError(msg) from None
+    raise InputError(msg)

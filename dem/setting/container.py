@@ -44,12 +44,12 @@ class Container(Part):
     @model_validator(mode="before")
     @classmethod
     def _size_of_tiers(cls, data: Any) -> Any:
-        # What needs one radius and one height takes the widest and the whole one.
+        # Where one radius and one height are needed, they are the widest and the whole one.
         try:
             radii, heights = ([0.0 + tier[key] for tier in data["tiers"]] for key in ("radius_m", "height_m"))
             size = {"radius_m": radii[0], "height_m": math.fsum(heights)}
         except (KeyError, IndexError, TypeError):
-            return data  # there are none, or validation says what is wrong with them
+            return data  # no tiers, or validation reports what is wrong with them
         if min(*radii, *heights) <= 0:
             return data
         return size | {key: value for key, value in data.items() if value is not None}
@@ -69,10 +69,8 @@ class Container(Part):
                 raise ValueError(msg)
         if tiers:
             whole = math.fsum(tier.height_m for tier in tiers)
-            for key, given, own in (
-                ("radius_m", self.radius_m, tiers[0].radius_m),
-                ("height_m", self.height_m, whole),
-            ):
+            for key, own in (("radius_m", tiers[0].radius_m), ("height_m", whole)):
+                given = getattr(self, key)
                 if given is not None and not math.isclose(given, own, rel_tol=1e-9):
                     msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
                     raise ValueError(msg)
@@ -106,7 +104,7 @@ class Cylinder:
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
-        """The same of a tier with a radius [m]."""
+        """Return the distance [m] of the wall's edges from the axis, of a tier with a radius [m]."""
         turn = 2 * math.pi / self.facets
         return radius * math.sqrt(turn / math.sin(turn))
 
@@ -121,11 +119,11 @@ class Cylinder:
         return -0.1 * self.radius
 
     def radii(self, heights: Array) -> Array:
-        """Radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
+        """Return the radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
         found: Array = np.array(radii)[np.searchsorted(steps, heights, side="left")]
         return found
 
     def inner_radii(self, heights: Array) -> Array:
-        """The same for the distances [m] of the flats from the axis."""
+        """Return the distances [m] of the flats from the axis, at heights above the floor [m]."""
         return self.radii(heights) * (self.inner_radius / self.radius)

@@ -1,4 +1,4 @@
-"""Accuracy against cost: knobs, and the names of settings of them."""
+"""Accuracy against cost: knobs, and named sets of their values."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class Fidelity(Part):
         None,
         ge=1e-12,
         le=1,
-        description="time step [s] by hand; refused above the stable one; default: from the fraction",
+        description="time step [s] by hand; rejected above the stable one; default: from the fraction",
     )
     wall_facets: int = Field(64, ge=16, le=512, description="flat facets around the cylinder's wall [1]")
     control_interval_s: float = Field(
         ...,
         ge=1e-9,
         le=1,
-        description="time between two looks of the motor control [s]; the paper's time step is 2e-4 s",
+        description="time between two control updates of the motors [s]; the paper's time step is 2e-4 s",
     )
     hinge_stiffness_N_per_m: Stiffness = Field(
         ..., description="stiffness of the pin that holds the two links of a hinge together [N/m]"
@@ -56,50 +56,35 @@ class Fidelity(Part):
 
 # The pin of standard and reference gives way by 1 % of a sphere's diameter under a pull of 100 times the own weight, up
 # to l/w = 1; the softer one of draft allows longer time steps and gives way by as much in a pile that is actuated.
+_STANDARD = {
+    "rows": 1,
+    "pitch": 1.0,
+    "stiffness_N_per_m": 500.0,
+    "time_step_fraction": 0.9,
+    "control_interval_s": 2e-4,
+    "hinge_stiffness_N_per_m": 14500.0,
+}
 FIDELITIES: Mapping[str, Mapping[str, Any]] = {
-    "draft": {
-        "rows": 1,
-        "pitch": 1.3,
-        "stiffness_N_per_m": 250.0,
-        "time_step_fraction": 0.9,
-        "control_interval_s": 2e-4,
-        "hinge_stiffness_N_per_m": 5000.0,
-    },
-    "standard": {
-        "rows": 1,
-        "pitch": 1.0,
-        "stiffness_N_per_m": 500.0,
-        "time_step_fraction": 0.9,
-        "control_interval_s": 2e-4,
-        "hinge_stiffness_N_per_m": 14500.0,
-    },
-    "reference": {
-        "rows": 2,
-        "pitch": 1.0,
-        "stiffness_N_per_m": 500.0,
-        "time_step_fraction": 0.9,
-        "control_interval_s": 2e-4,
-        "hinge_stiffness_N_per_m": 14500.0,
-    },
+    "draft": {**_STANDARD, "pitch": 1.3, "stiffness_N_per_m": 250.0, "hinge_stiffness_N_per_m": 5000.0},
+    "standard": _STANDARD,
+    "reference": {**_STANDARD, "rows": 2},
 }
 
-# On the links engine, chosen by results/accuracy-links. What has no meaning there is as in `FIDELITIES`. Its stable
+# On the links engine, chosen by results/accuracy-links; pitch and hinge stiffness have no meaning there. Its stable
 # step may be used to the full (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
-_ON_LINKS: Mapping[str, Mapping[str, Any]] = {
-    "draft": {"rows": 1, "stiffness_N_per_m": 250.0, "time_step_fraction": 0.92},
-    "standard": {"rows": 1, "stiffness_N_per_m": 500.0, "time_step_fraction": 0.92},
-    "reference": {"rows": 2, "stiffness_N_per_m": 1000.0, "time_step_fraction": 0.92},
-}
-_IDLE = FIDELITIES["standard"]
+_LINKS = {**_STANDARD, "time_step_fraction": 0.92}
 _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "links": {name: {**_IDLE, **knobs} for name, knobs in _ON_LINKS.items()}
+    "links": {
+        "draft": {**_LINKS, "stiffness_N_per_m": 250.0},
+        "standard": _LINKS,
+        "reference": {**_LINKS, "rows": 2, "stiffness_N_per_m": 1000.0},
+    }
 }
 
 
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
-    """The named fidelities of an engine, from coarse to fine: the same names on all, about the same errors.
+    """Return the named fidelities of an engine as in `Scene.engine`, from coarse to fine; of YADE for an unknown one.
 
-    Args:
-        engine: as in `Scene.engine`; those of YADE for one that is not known.
+    A name means about the same errors on all engines.
     """
     return _BY_ENGINE.get(engine, FIDELITIES)

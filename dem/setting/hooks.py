@@ -57,13 +57,13 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
-    """Data of `Hooks` with the keys filled in that follow from the smarticle; anything else is left to validation."""
+    """Fill in the keys of `Hooks` that follow from the smarticle; leave the rest to validation."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
-    """Data with keys filled in that are so many widths w and thicknesses t2 by default."""
+    """Fill in keys whose defaults are multiples of width w and thickness t2."""
     if not isinstance(data, Mapping):
         return data
     w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m
@@ -71,7 +71,7 @@ def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle:
 
 
 class Bar(NamedTuple):
-    """One bar of a hook: where its middle is from the axis, (x, y), and its half edges along x, y, z [m]."""
+    """One bar of a hook: (x, y) of its middle from the axis, and half edges along x, y, z [m]."""
 
     middle: tuple[float, float]
     half: tuple[float, float, float]
@@ -104,19 +104,13 @@ class Cross:
         return tuple(found)
 
     @property
-    def half_extents(self) -> tuple[tuple[float, float, float], ...]:
-        """Half edges of the bars along x, y, z [m]."""
-        return tuple(bar.half for bar in self.bars)
-
-    @property
     def reach(self) -> float:
         """Largest distance [m] of the bars from the axis: that of the corners at their ends."""
         return max(math.hypot(abs(x) + a, abs(y) + b) for (x, y), (a, b, _) in self.bars)
 
     def obstacles(self, diameter: float) -> Array:
-        """(n, 3) points [m] such that a sphere of `diameter` [m] centred a diameter from all touches no bar."""
-        # A grid through the bars. No point of a bar is farther than √3/2 of the spacing from the grid, which is less
-        # than the radius that spheres keep away beyond their own.
+        """Return (n, 3) points [m]: a sphere of `diameter` [m] at least a diameter from all of them touches no bar."""
+        # No point of a bar is farther than √3/2 of the spacing from the grid, less than the radius that is kept away.
         points: list[tuple[float, ...]] = []
         for bar in self.bars:
             axes = [

@@ -10,16 +10,89 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dem.setting.course import Array, BaseMotion, Course, Leg, SimpleMotion
-from dem.setting.part import Duration, Frequency, HingeAngle, Turning
+from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
+
+Array = NDArray[np.float64]
+
+Angles = Array | float
+Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One stretch of a motion that is no sequence.
+
+    Args:
+        key: of the motion below the one that it is a leg of, "" or e.g. "steps.1".
+        motion: the motion of this stretch.
+        start: angles [rad] at its beginning.
+        home: angles [rad] at the beginning of the phase.
+        until: its length [s].
+    """
+
+    key: str
+    motion: SimpleMotion
+    start: Array
+    home: Array
+    until: float
+
+    def extent(self) -> tuple[Array, Array, float]:
+        """Return the lowest and the highest angle [rad] for each start, and the greatest speed [rad/s] over all."""
+        low, high, speed = self.motion.extent(self.start, self.home, self.until)
+        return low + np.zeros_like(self.start), high + np.zeros_like(self.start), float(np.max(speed))
+
+
+class BaseMotion(Part):
+    """What all motions have in common."""
+
+    type: str
+
+    @property
+    def duration(self) -> float:
+        """Length [s]; inf: as long as its phase."""
+        raise NotImplementedError
+
+    @property
+    def period(self) -> float | None:
+        """Time [s] after which the motion repeats itself; None: it does not."""
+        return None
+
+    def course(self, start: Array, home: Array) -> Course:
+        """Return the motion from angles `start` [rad] on, in a phase that began at angles `home` [rad]."""
+        raise NotImplementedError
+
+    def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
+        """Yield the stretches of the motion up to the time `until` [s]; of repetitions only those that differ."""
+        raise NotImplementedError
+
+    def end(self, start: Array, home: Array) -> Array:
+        """Return the angles [rad] at the end of a motion of finite length."""
+        return self.course(start, home)(np.array(self.duration))
+
+
+class SimpleMotion(BaseMotion):
+    """A motion that is no sequence of others."""
+
+    pace: ClassVar[tuple[str, str]] = ("duration_s", "s")  # the key that sets the speed, and its unit
+
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
+        """Return lowest and highest angle [rad] and greatest speed [rad/s] up to the time `until` [s].
+
+        A jump does not count for the speed: the motor follows it at its speed limit.
+        """
+        raise NotImplementedError
+
+    def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
+        yield Leg("", self, start, home, until)
 
 
 class _Endless(SimpleMotion):
@@ -29,7 +102,6 @@ class _Endless(SimpleMotion):
 
     @property
     def duration(self) -> float:
-        """See `BaseMotion.duration`."""
         return math.inf if self.duration_s is None else self.duration_s
 
 
@@ -39,16 +111,10 @@ class Hold(_Endless):
     type: Literal["hold"]
 
     def course(self, start: Array, home: Array) -> Course:
-        """See `BaseMotion.course`."""
         return lambda times: start
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
-        """See `SimpleMotion.bounds`."""
-        return start, start
-
-    def speeds(self, start: Array, home: Array) -> float:
-        """See `SimpleMotion.speeds`."""
-        return 0.0
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
+        return start, start, 0.0
 
 
 class _Straight(SimpleMotion):
@@ -58,7 +124,6 @@ class _Straight(SimpleMotion):
 
     @property
     def duration(self) -> float:
-        """See `BaseMotion.duration`."""
         return self.duration_s
 
     def goal(self, home: Array) -> Array:
@@ -66,7 +131,6 @@ class _Straight(SimpleMotion):
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:
-        """See `BaseMotion.course`."""
         goal, length = self.goal(home), self.duration_s
 
         def at(times: Array) -> Array:
@@ -76,14 +140,9 @@ class _Straight(SimpleMotion):
 
         return at
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[Array, Array]:
-        """See `SimpleMotion.bounds`."""
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         last = self.course(start, home)(np.array(until))
-        return np.minimum(start, last), np.maximum(start, last)
-
-    def speeds(self, start: Array, home: Array) -> Array:
-        """See `SimpleMotion.speeds`."""
-        return np.abs(self.goal(home) - start) / self.duration_s
+        return np.minimum(start, last), np.maximum(start, last), np.abs(self.goal(home) - start) / self.duration_s
 
 
 class Ramp(_Straight):
@@ -93,7 +152,6 @@ class Ramp(_Straight):
     to_deg: HingeAngle = Field(..., description="angle at the end [deg]")
 
     def goal(self, home: Array) -> Array:
-        """See `_Straight.goal`."""
         return np.array(math.radians(self.to_deg))
 
 
@@ -103,7 +161,6 @@ class Return(_Straight):
     type: Literal["return"]
 
     def goal(self, home: Array) -> Array:
-        """See `_Straight.goal`."""
         return home
 
 
@@ -125,21 +182,23 @@ class _Wave(_Endless):
 
     @property
     def period(self) -> float:
-        """See `BaseMotion.period`."""
         return 1 / self.frequency
 
+    @property
+    def fastest(self) -> float:
+        """Greatest speed [rad/s], reached in every half cycle."""
+        raise NotImplementedError
+
     def swing(self, cycles: Array) -> Array:
-        """Distance from the centre over the amplitude [1] after a number of cycles."""
+        """Return the distance from the centre over the amplitude [1] after a number of cycles."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:
-        """See `BaseMotion.course`."""
         centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
         frequency, offset = self.frequency, self.cycles_offset
         return lambda times: centre + amplitude * self.swing(frequency * times + offset)
 
-    def bounds(self, start: Array, home: Array, until: float) -> tuple[float, float]:
-        """See `SimpleMotion.bounds`."""
+    def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         first = self.cycles_offset
         last = first + self.frequency * until
         ends = self.swing(np.array([first, last] if math.isfinite(last) else [first]))
@@ -147,7 +206,7 @@ class _Wave(_Endless):
         high = 1.0 if np.floor(last - 0.25) >= np.ceil(first - 0.25) else float(ends.max())
         low = -1.0 if np.floor(last - 0.75) >= np.ceil(first - 0.75) else float(ends.min())
         centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
-        return centre + amplitude * low, centre + amplitude * high
+        return centre + amplitude * low, centre + amplitude * high, self.fastest
 
 
 _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
@@ -183,15 +242,13 @@ class Sine(_Wave):
 
     @property
     def frequency(self) -> float:
-        """See `_Wave.frequency`."""
         return self.frequency_hz
 
     def swing(self, cycles: Array) -> Array:
-        """See `_Wave.swing`."""
         return sine_of(cycles)
 
-    def speeds(self, start: Array, home: Array) -> float:
-        """See `SimpleMotion.speeds`; the bound 2πfA, met in every half cycle."""
+    @property
+    def fastest(self) -> float:
         return 2 * math.pi * self.frequency_hz * math.radians(self.amplitude_deg)
 
 
@@ -205,16 +262,14 @@ class Triangle(_Wave):
 
     @property
     def frequency(self) -> float:
-        """See `_Wave.frequency`."""
         return self.speed_rad_per_s / (4 * math.radians(self.amplitude_deg))
 
     def swing(self, cycles: Array) -> Array:
-        """See `_Wave.swing`."""
         quarter = cycles - 0.25
         return 4 * np.abs(quarter - np.floor(quarter) - 0.5) - 1
 
-    def speeds(self, start: Array, home: Array) -> float:
-        """See `SimpleMotion.speeds`."""
+    @property
+    def fastest(self) -> float:
         return self.speed_rad_per_s
 
 
@@ -248,12 +303,11 @@ class Sequence(BaseMotion):
 
     @property
     def duration(self) -> float:
-        """See `BaseMotion.duration`."""
         return math.inf if self.repeat is None else self.repeat * sum(self._lengths)
 
     @property
     def period(self) -> float | None:
-        """See `BaseMotion.period`; the first time through may differ, as it starts elsewhere."""
+        # The first time through may differ, as it starts elsewhere.
         return None if self.repeat == 1 else sum(self._lengths)
 
     def _courses(self, start: Array, home: Array) -> list[Course]:
@@ -265,13 +319,12 @@ class Sequence(BaseMotion):
         return courses
 
     def end(self, start: Array, home: Array) -> Array:
-        """See `BaseMotion.end`; however often the steps are gone through, as each time ends alike."""
+        # However often the steps are repeated: each time ends alike.
         for step in self.steps:
             start = step.end(start, home)
         return start
 
     def course(self, start: Array, home: Array) -> Course:
-        """See `BaseMotion.course`."""
         count, length, repeated = len(self.steps), sum(self._lengths), self.repeat != 1
         begins = [0.0, *accumulate(self._lengths[:-1])]
         courses = self._courses(start, home)
@@ -288,7 +341,7 @@ class Sequence(BaseMotion):
             return courses[step + count * (cycle > 0)](times - (begun + begins[step]))
 
         def at(times: Array) -> Array:
-            if times.size == 1:  # as for smarticles that move together, at every look of the motor control
+            if times.size == 1:  # as for smarticles that move together, at every control update
                 return at_one(times.item(), times)
             cycles = np.maximum(np.ceil(times / length) - 1, 0) if repeated else np.zeros_like(times)
             local = times - cycles * length if repeated else times
@@ -301,7 +354,6 @@ class Sequence(BaseMotion):
         return at
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
-        """See `BaseMotion.legs`."""
         begun = 0.0
         for _ in range(1 if self.repeat == 1 else 2):
             for number, step in enumerate(self.steps):

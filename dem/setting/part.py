@@ -1,4 +1,4 @@
-"""What every part of a scene is made of: frozen models, and the kinds of numbers that several parts share."""
+"""Frozen parts of a scene, and the kinds of numbers that several of them share."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Part(Strict):
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """The way out for an unknown key: a key of this part that is spelt alike, or of the part it belongs in."""
+        """Return the way out for an unknown key: a key of this part that is spelt alike, or the part it belongs in."""
         # Most often the unit, or the second half of a name, was left out.
         here = [field for field in cls.model_fields if field.startswith(f"{key}_")]
         here = here or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
@@ -35,13 +35,13 @@ class Part(Strict):
 
     @classmethod
     def tag(cls) -> str:
-        """What a scene file calls this part: the value of its `type`, or its key."""
+        """Return the name of this part in a scene file: the value of its `type`, or its key."""
         kind = cls.model_fields.get("type")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
 
 
 def in_hinge_range(angle: float) -> float:
-    """The angle [deg], refused outside the range of the hinges."""
+    """Return the angle [deg]; reject one outside the range of the hinges."""
     low, high = HINGE_RANGE
     if not low <= angle <= high:
         msg = f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges"
@@ -49,8 +49,8 @@ def in_hinge_range(angle: float) -> float:
     return angle
 
 
-def refuse_wrong_unit(value: float) -> float:
-    """The length [m], refused where it can only be millimetres."""
+def reject_wrong_unit(value: float) -> float:
+    """Return the length [m]; reject one that can only be millimetres."""
     if value > LONGEST_LENGTH:
         msg = (
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
@@ -60,9 +60,9 @@ def refuse_wrong_unit(value: float) -> float:
     return value
 
 
-# Limits of what is physical, wide: beyond them stands a slip of the keyboard, and numbers that no sum survives.
+# Wide physical limits: beyond them are slips of the keyboard, and numbers that no sum survives.
 Length = Annotated[
-    float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(refuse_wrong_unit)
+    float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(reject_wrong_unit)
 ]
 Duration = Annotated[float, Field(ge=1e-6, le=1e6)]
 Speed = Annotated[float, Field(ge=1e-9, le=1e3)]  # m/s

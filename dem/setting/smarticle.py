@@ -49,39 +49,30 @@ class Smarticle(Part):
         return (in_hinge_range(value[0]), in_hinge_range(value[1]))
 
     @model_validator(mode="after")
-    def _thinner_than_long(self) -> Self:
-        thickest = max(self.thickness_normal_m, self.thickness_in_plane_m, self.middle_thickness_in_plane_m or 0.0)
+    def _thin_links_apart(self) -> Self:
+        barbs, middle = self.thickness_in_plane_m, self.middle_thickness_in_plane_m
+        thickest, msg = max(self.thickness_normal_m, barbs, middle or 0.0), ""
         if thickest > self.middle_length_m / 2:
             msg = (
                 f"thickness {thickest:g} m is more than half of middle_length_m = {self.middle_length_m:g} m; "
                 "a smarticle is a chain of thin links"
             )
-            raise ValueError(msg)
-        return self
-
-    @model_validator(mode="after")
-    def _body_holds_barbs(self) -> Self:
-        middle, barbs = self.middle_thickness_in_plane_m, self.thickness_in_plane_m
-        if middle is not None and middle < barbs:
+        elif middle is not None and middle < barbs:
             msg = (
                 f"middle_thickness_in_plane_m: {middle:g} m is less than thickness_in_plane_m = {barbs:g} m, that of "
                 "the barbs; use as much at least, or leave it out"
             )
-            raise ValueError(msg)
-        return self
-
-    @model_validator(mode="after")
-    def _barbs_apart(self) -> Self:
-        if self.tip_clearance(self.angles_deg) < 0:
+        elif self.tip_clearance(self.angles_deg) < 0:
             msg = (
                 f"angles_deg: at {self.angles_deg[0]:g}° and {self.angles_deg[1]:g}° the barbs of l/w = "
                 f"{self.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
             )
+        if msg:
             raise ValueError(msg)
         return self
 
     def tip_clearance(self, angles_deg: tuple[float, float]) -> float:
-        """Free distance [m] between the barb tips at angles [deg] beyond 90°; negative: the barbs cross."""
+        """Return the free distance [m] between the barb tips at angles [deg] beyond 90°; negative: the barbs cross."""
         inward = -sum(math.cos(math.radians(angle)) for angle in angles_deg if angle > 90)
         return self.middle_length_m * (1 - self.aspect_ratio * inward) - self.thickness_in_plane_m
 

@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest
-from dem.refusal import refusals
-from dem.strict import Strict
+from dem.strict import Strict, explained
 from templates.sweep.sweep_file import read_text
 
 SHIPPED = Path(__file__).parent / "clusters"
@@ -184,7 +183,7 @@ def load_cluster(reference: str) -> Cluster:
     try:
         cluster = Cluster.model_validate(content)
     except ValidationError as error:
-        msg = f"{path}: {refusals(error, content, described=str(SHIPPED / 'example-large.toml'))}"
+        msg = f"{path}: {explained(error, content, described=str(SHIPPED / 'example-large.toml'))}"
         raise InputError(msg) from error
     if cluster.template is not None:
         cluster = cluster.model_copy(update={"template": str(path.parent / cluster.template)})

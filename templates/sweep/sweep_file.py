@@ -18,9 +18,8 @@ import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest, shown
-from dem.refusal import refusals
 from dem.scene.yaml_text import parse_yaml
-from dem.strict import Strict
+from dem.strict import Strict, explained
 from templates.sweep.render import Value
 
 SEED = "seed"
@@ -214,7 +213,7 @@ def load_sweep(path: Path) -> Sweep:
     try:
         content = SweepFile.model_validate(data)
     except ValidationError as error:
-        msg = f"{path}: {refusals(error, data, described='`smarticles sweep --help`')}"
+        msg = f"{path}: {explained(error, data, described='`smarticles sweep --help`')}"
         raise InputError(msg) from error
     template = path.parent / content.template
     table, table_text = _read_table(path, content.points.table)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.gaits.drive import actuated
+from dem.phases.actuated import ActuatedPhase
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
@@ -204,10 +204,10 @@ def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
 
 def test_types_of_phase_that_actuate_are_those_of_the_simulator(tmp_path: Path) -> None:
     phase = scene_of(tmp_path, OSCILLATION).phases[-1]
-    assert actuated(phase)
+    assert isinstance(phase, ActuatedPhase)
     assert phase.type in ACTUATED
     shaken = scene_of(tmp_path).phases[-1]
-    assert not actuated(shaken)
+    assert not isinstance(shaken, ActuatedPhase)
     assert shaken.type in ACTIVITIES - ACTUATED
 
 

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from scenes import W, make_boxes
 from scipy.spatial.transform import Rotation
 
-from dem.body.fitting import fitted_poses
 from dem.body.particle import Boxes
-from dem.body.placement import Poses
+from dem.body.placement import Poses, fitted_poses
 from dem.body.state import State
 
 COUNT = 40

@@ -38,7 +38,7 @@ def test_no_two_smarticles_overlap_nor_the_wall(ratio: float, count: int) -> Non
     assert placed[..., 2].min() - particle.radius >= BOTTOM * (1 - 1e-9)
 
 
-def test_obstacles_are_kept_clear_of() -> None:
+def test_layers_keep_off_obstacles() -> None:
     particle = make_particle()
     # A grid that fills the lower half of the slab but for gaps, so that unhindered poses would hit it.
     grid = np.stack(np.meshgrid(*[np.arange(-0.02, 0.0201, 0.005)] * 2, [BOTTOM + 0.003]), -1).reshape(-1, 3)

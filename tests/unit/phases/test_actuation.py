@@ -1,4 +1,4 @@
-"""Actuated phases: presets and what they are short for, who moves, where it begins, target angles over time."""
+"""Actuated phases: presets, which smarticles move, where they begin, target angles over time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import small
 
-from dem.phases.gaits.drive import Drive, actuated, drive
+from dem.phases.actuated import ActuatedPhase, Drive, drive
 from dem.scene.scene import Scene
 from dem.setting.motion import Triangle
 
@@ -65,7 +65,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
     def wave(**changes: Any) -> Triangle:
         scene = active({**OSCILLATION, **changes}, smarticle__aspect_ratio=ratio, motor__speed_limit_rad_per_s=4)
         phase = scene.phases[1]
-        assert actuated(phase)
+        assert isinstance(phase, ActuatedPhase)
         motion = phase.gait(scene.smarticle, scene.motor).motions[1]
         assert isinstance(motion, Triangle)
         return motion
@@ -76,7 +76,7 @@ def test_amplitude_rule_keeps_the_arc_of_the_tip(active: Active, ratio: float, a
     assert wave().amplitude_deg * ratio == pytest.approx(5 * 0.7)  # times w in radians: the arc
 
 
-# -- who moves, from where, when -----------------------------------------------------------------------------------
+# -- which smarticles move, from where, when -------------------------------------------------------------------------
 
 
 def test_inactive_smarticles_keep_their_last_target(active: Active) -> None:

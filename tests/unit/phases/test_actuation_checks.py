@@ -1,4 +1,4 @@
-"""A motion that a smarticle cannot do is refused with one line: what, where, the value with its unit, the way out."""
+"""A motion that a smarticle cannot do is rejected with one line: what, where, the value with its unit, the way out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dem.errors import InputError
-from dem.phases.gaits.checks import actuation_warnings, overshoot
+from dem.phases.actuated import actuation_warnings, overshoot
 from dem.plan.outlook import plan
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -35,7 +35,7 @@ def checked(data: SceneData, *phases: dict[str, Any], **changes: Any) -> Scene:
     return parse_scene(data({"phases": [{"type": "deposit"}, *phases], **dotted}), source="bad.yaml")
 
 
-def refused(data: SceneData, *phases: dict[str, Any], **changes: Any) -> str:
+def rejected(data: SceneData, *phases: dict[str, Any], **changes: Any) -> str:
     with pytest.raises(InputError) as caught:
         checked(data, *phases, **changes)
     message = str(caught.value)
@@ -57,12 +57,12 @@ def test_speed_depends_on_where_the_phase_before_ended(scene_data: SceneData) ->
     there = actuate({**RAMP, "duration_s": 0.5})
     back = actuate({"type": "ramp", "to_deg": 90, "duration_s": 0.2})
     checked(scene_data, back)  # stays at 90°
-    assert refused(scene_data, there, {"type": "relax"}, back).startswith(
+    assert rejected(scene_data, there, {"type": "relax"}, back).startswith(
         "phases.3.barbs.duration_s: 0.2 s makes 7.854 rad/s, faster than motor.speed_limit_rad_per_s = 6 rad/s"
     )
     # One smarticle that moved before is enough.
     some = {**there, "active_fraction": 0.1}
-    assert refused(scene_data, some, back).startswith("phases.2.barbs.duration_s: 0.2 s makes 7.854 rad/s")
+    assert rejected(scene_data, some, back).startswith("phases.2.barbs.duration_s: 0.2 s makes 7.854 rad/s")
 
 
 def test_crossing_barbs(scene_data: SceneData) -> None:
@@ -70,13 +70,13 @@ def test_crossing_barbs(scene_data: SceneData) -> None:
     message = (
         "phases.1: at 105° and 105° the barbs of l/w = 2 cross; use angles nearer to 90° or a smaller aspect_ratio"
     )
-    assert refused(scene_data, inward, smarticle__aspect_ratio=2, container__radius_m=0.05) == message
+    assert rejected(scene_data, inward, smarticle__aspect_ratio=2, container__radius_m=0.05) == message
     checked(scene_data, inward, smarticle__aspect_ratio=1.8, container__radius_m=0.05)
     # One barb at a time is no way around: a motor that halts may be late.
     once = [{"type": "ramp", "to_deg": 105, "duration_s": 1}, {"type": "return", "duration_s": 1}]
     rest = {"type": "hold", "duration_s": 2}
     turns = actuate(barb_1=sequence(*once, rest), barb_2=sequence(rest, *once))
-    assert refused(scene_data, turns, smarticle__aspect_ratio=2, container__radius_m=0.05) == message
+    assert rejected(scene_data, turns, smarticle__aspect_ratio=2, container__radius_m=0.05) == message
 
 
 NARROW = {"rows": 1, "diameter_m": 1.17e-3}  # ten diameters along the middle link
@@ -91,34 +91,34 @@ def test_first_sphere_of_a_barb_against_the_middle_link(scene_data: SceneData) -
     assert math.sqrt(1.01**2 + 0.4**2 - 2 * 1.01 * 0.4 * math.sin(math.radians(15))) == pytest.approx(0.9854, abs=1e-4)
     fidelity = {**NARROW, "pitch": 0.4}
     # (1.01² + 0.4² - 1) / (2 · 1.01 · 0.4) = 0.22290 = -cos 102.88°
-    assert refused(scene_data, inward_to(105), fidelity=fidelity) == (
+    assert rejected(scene_data, inward_to(105), fidelity=fidelity) == (
         "fidelity.pitch: with 0.4 the middle link's spheres are 0.4 diameters apart, and the first sphere of a barb "
         "touches them at the 105° of phases.1; stay below 102° or use a pitch of at least 0.51"
     )
     checked(scene_data, inward_to(102.87), fidelity=fidelity)
-    refused(scene_data, inward_to(102.89), fidelity=fidelity)
+    rejected(scene_data, inward_to(102.89), fidelity=fidelity)
     checked(scene_data, inward_to(105), fidelity={**NARROW, "pitch": 0.51})
     checked(scene_data, SHAPE_CHANGE, fidelity=fidelity)  # never above 90°
     # With spheres 0.05 d apart it is the third, not the first, that is in the way:
     # (1.01² + 0.15² - 1) / (2 · 1.01 · 0.15) = 0.14059 = -cos 98.08°
     finest = {**NARROW, "pitch": 0.05}
-    assert "stay below 98°" in refused(scene_data, inward_to(99), fidelity=finest)
+    assert "stay below 98°" in rejected(scene_data, inward_to(99), fidelity=finest)
     checked(scene_data, inward_to(98), fidelity=finest)
 
 
-# -- what is not refused, but said ---------------------------------------------------------------------------------
+# -- what is accepted with a warning ---------------------------------------------------------------------------------
 
 
-def test_motors_that_one_look_takes_far_beyond_their_limit_are_warned_of(scene_data: SceneData) -> None:
+def test_motors_that_exceed_their_limit_in_one_control_update_are_warned_of(scene_data: SceneData) -> None:
     quick = {"motor__speed_limit_rad_per_s": 60}
     scene = checked(scene_data, SHAPE_CHANGE, **quick)
     # k ω Δt = 3e-3 · 60 · 2e-4 N m over the paper's 1.607e-5 N m.
     assert overshoot(scene) == pytest.approx(3e-3 * 60 * 2e-4 / 1.607e-5, rel=1e-3)
     (warning,) = actuation_warnings(scene)
     assert warning == (
-        "motor.torque_limit_N_m: τ_max = 1.61e-05 N m, but within one look of fidelity.control_interval_s = 0.0002 s "
-        "at motor.speed_limit_rad_per_s = 60 rad/s a motor can go beyond it by 2.24 τ_max; use control_interval_s: "
-        "4e-05 or stiffness_N_m_per_rad: 0.000669, or law: slip"
+        "motor.torque_limit_N_m: τ_max = 1.61e-05 N m, but within one control update of fidelity.control_interval_s = "
+        "0.0002 s at motor.speed_limit_rad_per_s = 60 rad/s a motor can exceed it by 2.24 τ_max; use "
+        "control_interval_s: 4e-05 or stiffness_N_m_per_rad: 0.000669, or law: slip"
     )
     planned = plan(scene)
     assert planned.warnings == (warning,)

@@ -1,4 +1,4 @@
-"""Scenes with hooks, a wall that is removed, or a mould of tiers: what they say by default, and what is refused."""
+"""Scenes with hooks, a wall that is removed, or a mould of tiers: their defaults."""
 
 from __future__ import annotations
 

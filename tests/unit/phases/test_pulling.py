@@ -8,26 +8,27 @@ import pytest
 from double import EngineDouble
 from scenes import small
 
-from dem.phases.phase import CHECK_INTERVAL
-from dem.phases.pull_hook import HELD_FAST, PullHook, Pulling
+from dem.phases.phase import CHECK_INTERVAL, Stage
+from dem.phases.pull_hook import HELD_SECONDS, PullHook
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004
 ARRIVAL = DISTANCE / SPEED
 
 
-def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDouble, float, Pulling]:
+def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDouble, float, Stage]:
     """An engine without smarticles, whose hook takes `stiffness` N for each metre; how far it was raised, the stage.
 
     With `anew` the stage is made again from what it remembers at every look.
     """
     phase = PullHook(type="pull-hook", distance_m=DISTANCE, speed_m_per_s=SPEED, **keys)
-    engine, pulling = EngineDouble.of(small({"hooks": {}}), DT), Pulling(phase)
+    scene = small({"hooks": {}})
+    engine, pulling = EngineDouble.of(scene, DT), phase.begin(scene, 1)
     engine.boundaries.hook_stiffness = stiffness
     start = engine.boundaries.upper_height
     while wait := pulling.proceed(engine):
         engine.advance(max(1, round(wait / DT)))
         if anew:
-            memory, pulling = pulling.memory, Pulling(phase)
+            memory, pulling = pulling.memory, phase.begin(scene, 1)
             pulling.memory = dict(memory)
     assert engine.told == [("raise_upper", SPEED), ("stop",)]
     return engine, engine.boundaries.upper_height - start, pulling
@@ -42,16 +43,16 @@ def test_a_hook_that_is_not_held_arrives(limit: float | None) -> None:
     assert "warning" not in pulling.memory
 
 
-def test_a_hook_that_is_held_stops_at_the_first_look_with_a_mean_above_its_limit() -> None:
+def test_a_held_hook_stops_at_the_first_check_with_a_mean_above_its_limit() -> None:
     engine, raised, _ = pull(10.0, force_limit_N=0.02)
     # A look's mean is that of the force half a look before.
     reached = 0.02 / 10.0 / SPEED + CHECK_INTERVAL / 2
     assert reached - 2 * DT <= raised / SPEED <= reached + CHECK_INTERVAL + 2 * DT
     assert raised < 0.6 * DISTANCE
-    assert engine.time == pytest.approx(raised / SPEED + HELD_FAST, abs=2 * DT)
+    assert engine.time == pytest.approx(raised / SPEED + HELD_SECONDS, abs=2 * DT)
 
 
-def test_what_a_pull_remembers_is_enough_to_go_on() -> None:
+def test_what_a_pull_remembers_is_enough_to_resume() -> None:
     straight, raised, _ = pull(10.0, force_limit_N=0.02, duration_s=ARRIVAL)
     again, too, _ = pull(10.0, anew=True, force_limit_N=0.02, duration_s=ARRIVAL)
     assert (again.steps, too) == (straight.steps, raised)

@@ -1,4 +1,4 @@
-"""Each phase while it runs, against an engine in memory: what it tells the engine and when, and how long it takes."""
+"""Each phase while it runs, against an engine in memory: its calls of the engine, and how long it takes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ PHASES: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("phase", PHASES, ids=[phase["type"] for phase in PHASES])
-def test_a_phase_takes_the_time_that_it_says_and_remembers_all_that_it_needs(phase: dict[str, Any]) -> None:
+def test_a_phase_takes_its_known_duration_and_remembers_all_that_it_needs(phase: dict[str, Any]) -> None:
     ends = []
     for anew in (False, True):
         scene, engine = begin(phase, hooks={})
@@ -93,7 +93,7 @@ def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> N
     assert engine.positions[:, 2] == pytest.approx(engine.stands)
 
 
-def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
+def test_a_resumed_pour_draws_the_same_poses() -> None:
     poses = []
     for anew in (False, True):
         scene = small({"count": 12})
@@ -111,7 +111,7 @@ def test_a_pour_draws_the_same_poses_whenever_it_is_gone_on_with() -> None:
     ("drift", "unbalanced", "said"),
     [(0.1, 0.0, "speed 0.1 m/s (limit 0.02 m/s)"), (0.0, 0.3, "unbalanced force 0.3 (limit 0.05)")],
 )
-def test_a_pile_that_does_not_settle_is_told_with_its_residuals(
+def test_a_pile_that_does_not_settle_is_reported_with_its_residuals(
     monkeypatch: pytest.MonkeyPatch, drift: float, unbalanced: float, said: str
 ) -> None:
     # Each of the two by itself keeps a pile from counting as settled.
@@ -152,7 +152,7 @@ def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     assert bottoms[-1] < top < bottoms[-1] + 0.1 * CHECK_INTERVAL * 1.01
 
 
-def test_a_wall_that_is_not_clear_stays_and_a_shake_after_it_is_refused() -> None:
+def test_a_wall_that_is_not_clear_stays_and_a_later_shake_fails() -> None:
     scene, engine = begin({"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, {"type": "shake"})
     run_phase(scene, engine)
     assert engine.told == [("lift_wall", 0.01), ("stop",)]
@@ -164,7 +164,7 @@ def test_a_wall_that_is_not_clear_stays_and_a_shake_after_it_is_refused() -> Non
 # -- motors and strings ------------------------------------------------------------------------------------------------
 
 
-def test_motors_look_once_in_each_control_period_and_once_more_at_the_end() -> None:
+def test_motors_update_once_in_each_control_period_and_once_more_at_the_end() -> None:
     ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
     scene, engine = begin({"type": "actuate", "barbs": ramp})
     assert run_phase(scene, engine) == pytest.approx(0.01, abs=DT)
@@ -195,7 +195,7 @@ def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> 
 
 
 @pytest.mark.parametrize("at_once", [2, 7, 64])
-def test_looks_that_are_told_at_once(at_once: int) -> None:
+def test_several_control_updates_in_one_call(at_once: int) -> None:
     ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
     ends = []
     for looks in (1, at_once):

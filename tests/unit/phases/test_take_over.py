@@ -1,4 +1,4 @@
-"""Another run's smarticles taken over: how a scene names them, what is refused, and what the stage tells an engine."""
+"""Another run's smarticles taken over: how a scene names them, what is rejected, what the stage does to an engine."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from scenes import SMALL, changed
 
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
-from dem.phases.take_over import STRIDE, TakeOver
+from dem.phases.take_over import STRIDE, TakeOver, _in_cross
 from dem.record.frame import Frame
 from dem.record.frames import read_frames
 from dem.run.run import run_scene
 from dem.run.simulation import Simulation
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
+from dem.setting.hooks import Cross
 
 DT = 2e-4
 RECORDING = {"series_interval_s": 0.004, "frame_interval_s": 0.02, "checkpoint_interval_s": 0.04}
@@ -66,7 +67,7 @@ def scene_of(run: Path | str, more: dict[str, Any] | None = None, **changes: Any
     return parse_scene(data_of(run, more, **changes), source="bad.yaml")
 
 
-def refused(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> str:
+def rejected(run: Path | str, more: dict[str, Any] | None = None, **changes: Any) -> str:
     with pytest.raises(InputError) as caught:
         scene_of(run, more, **changes)
     line = str(caught.value)
@@ -164,7 +165,7 @@ def test_a_directory_is_seen_from_the_scene_s_file(pour: Path, tmp_path: Path, m
     )
 
 
-def test_a_run_goes_on_from_its_checkpoint_without_its_source(
+def test_a_run_is_resumed_from_its_checkpoint_without_its_source(
     pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = scene_of(pour)
@@ -185,23 +186,23 @@ def test_a_run_goes_on_from_its_checkpoint_without_its_source(
     assert np.array_equal(*ends)
 
 
-# -- what is refused ---------------------------------------------------------------------------------------------------
+# -- what is rejected --------------------------------------------------------------------------------------------------
 
 
 def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     frames = read_frames(pour)
-    assert refused(tmp_path / "none").startswith("phases.0.run: cannot read run directory")
+    assert rejected(tmp_path / "none").startswith("phases.0.run: cannot read run directory")
     (tmp_path / "sweep").mkdir()
     (tmp_path / "sweep" / "sweep.json").write_text("{}")
-    assert "it is a sweep; give one of its runs" in refused(tmp_path / "sweep")
-    assert refused(pour, {"frame": 99}) == (
+    assert "it is a sweep; give one of its runs" in rejected(tmp_path / "sweep")
+    assert rejected(pour, {"frame": 99}) == (
         f"phases.0.frame: 99, but the frames of {pour} are 0 … {len(frames) - 1}; use one of them, or last"
     )
     for bad, told in (("first", "'first'"), (-1, "-1"), (1.5, "1.5"), (True, "true"), (None, "null")):
-        assert told in (line := refused(pour, {"frame": bad})), bad
+        assert told in (line := rejected(pour, {"frame": bad})), bad
         assert line.startswith("phases.0")
-    assert refused(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
-    assert refused(pour, {"run": ""}).startswith("phases.0.run: ")
+    assert rejected(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
+    assert rejected(pour, {"run": ""}).startswith("phases.0.run: ")
 
 
 @pytest.mark.parametrize(
@@ -220,7 +221,7 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     ],
 )
 def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) -> None:
-    told = refused(pour, **changes)
+    told = rejected(pour, **changes)
     assert told.startswith(line)
     assert "; " in told
 
@@ -276,3 +277,12 @@ def test_what_never_comes_apart_fails(pour: Path) -> None:
     ):
         perform(scene, engine)
     assert engine.time < 0.11
+
+
+def test_links_in_any_bar_of_a_hook_are_found() -> None:
+    cross = Cross(height=0.01, side=1e-3, length=0.02, count=2)
+    upright = np.zeros((1, 4, 3))
+    upright[..., 2] = [0.005, 0.006, 0.014, 0.015]
+    assert not _in_cross(cross, upright).any()  # between the bars
+    for bar in cross.bars:
+        assert _in_cross(cross, upright + np.array([*bar.middle, 0.0])).all()

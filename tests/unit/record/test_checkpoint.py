@@ -50,14 +50,16 @@ def test_everything_comes_back_and_the_one_before_is_kept(tmp_path: Path) -> Non
         ({"made_by": ("yade", "1.2")}, "engine double 1.2, here is yade 1.2"),
     ],
 )
-def test_one_of_another_scene_or_engine_is_refused(tmp_path: Path, wanted: dict[str, object], told: str) -> None:
+def test_a_checkpoint_of_another_scene_or_engine_is_rejected(
+    tmp_path: Path, wanted: dict[str, object], told: str
+) -> None:
     write_checkpoint(tmp_path, checkpoint())
     with pytest.raises(InputError, match=rf"checkpoint\.zip: made with {told}; .*start anew"):
         read_checkpoint(tmp_path, **({"scene_sha256": "abc", "made_by": MADE_BY} | wanted))
 
 
 @pytest.mark.parametrize("format_", [4, 3])
-def test_one_of_before_engines_had_names_is_of_yade(tmp_path: Path, format_: int) -> None:
+def test_a_checkpoint_without_an_engine_name_is_of_yade(tmp_path: Path, format_: int) -> None:
     columns = io.BytesIO()
     np.savez(columns, time_s=np.array([0.0]))
     state = {"format": format_, "yade": "2023.02a", "scene_sha256": "abc", "engine": {"steps": 7}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import meshio
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
-from dem.record.frame import frame_mesh, sphere_mesh
+from dem.record.frame import centreline_mesh, motor_fields, sphere_mesh
 from dem.record.frames import FrameWriter
 
 W, RATIO = 0.0117, 0.7
@@ -30,6 +31,15 @@ def make_state(seed: int = 0, boxes: Boxes = BOXES) -> State:
         rng.normal(size=(COUNT, 3)),
         rng.normal(size=(COUNT, 3)) * 40,
     )
+
+
+def frame_mesh(state: State, time: float = 0.0, floor: float = 0.0, phase: int = 0, **more: Any) -> meshio.Mesh:
+    values = {
+        "contacts": np.zeros(COUNT, dtype=np.int64),
+        "velocities": state.link_velocities,
+        "spins": state.link_spins,
+    }
+    return centreline_mesh(state.vertices, time=time, floor=floor, phase=phase, **{**values, **more})
 
 
 def written(folder: Path, state: State) -> meshio.Mesh:
@@ -85,9 +95,9 @@ def test_scenes_with_motors_carry_angle_torque_work_and_halts_of_each_barb(tmp_p
     angles = np.linspace(0.2, 1.1, 2 * COUNT).reshape(COUNT, 2)
     halted = np.zeros((COUNT, 2), dtype=bool)
     halted[1, 0] = True
-    state, common = make_state(), {"contacts": np.zeros(COUNT, dtype=np.int64), "time": 0, "floor": 0, "phase": 0}
-    for at_work in ({"torques": angles + 1, "work": angles + 2, "halted": halted}, {}):
-        FrameWriter(tmp_path).write(frame_mesh(state, hinged=True, **at_work, **common), 0)
+    state = make_state()
+    for at_work in ((angles + 1, angles + 2, halted), ()):
+        FrameWriter(tmp_path).write(frame_mesh(state, extra=motor_fields(state.angles, *at_work)), 0)
         mesh = meshio.read(tmp_path / "frames" / "frame_000000.vtu")
         data = {name: values[0].reshape(COUNT, 3) for name, values in mesh.cell_data.items() if values[0].ndim == 1}
         assert data["angle_rad"][:, [0, 2]] == pytest.approx(np.full((COUNT, 2), math.pi / 2))
@@ -120,7 +130,7 @@ def test_velocities_are_those_of_the_link_centres(tmp_path: Path) -> None:
 
 def test_bar_without_barbs_still_has_four_points(tmp_path: Path) -> None:
     boxes = Boxes(middle_length=W, barb_length=0.0, thickness_normal=1.27e-3, thickness_in_plane=0.5e-3, density=7850)
-    mesh = frame_mesh(make_state(boxes=boxes), contacts=np.zeros(COUNT, dtype=np.int64), time=0, floor=0, phase=0)
+    mesh = frame_mesh(make_state(boxes=boxes))
     FrameWriter(tmp_path).write(mesh, 0)
     points = meshio.read(tmp_path / "frames" / "frame_000000.vtu").points.reshape(COUNT, 4, 3)
     assert np.array_equal(points[:, 0], points[:, 1])
@@ -131,7 +141,7 @@ def test_collection_lists_all_frames_in_time_order(tmp_path: Path) -> None:
     writer = FrameWriter(tmp_path)
     times = [0.0, 0.04, 0.08, 123.456]
     for k, time in enumerate(times):
-        mesh = frame_mesh(make_state(k), contacts=np.zeros(COUNT, dtype=np.int64), time=time, floor=0, phase=0)
+        mesh = frame_mesh(make_state(k), time=time)
         writer.write(mesh, time)
         listed = ElementTree.parse(tmp_path / "frames.pvd").getroot().findall("Collection/DataSet")
         assert [float(row.attrib["timestep"]) for row in listed] == pytest.approx(times[: k + 1], rel=1e-8)

@@ -62,14 +62,14 @@ def test_status(files: dict[str, dict[str, object]], wanted: tuple[object, ...],
     assert (status.state, status.cause, status.time_s, status.checkpoint_s) == wanted
 
 
-def test_a_run_goes_on_while_a_process_holds_it(tmp_path: Path) -> None:
+def test_a_run_is_running_while_a_process_holds_its_lock(tmp_path: Path) -> None:
     with (tmp_path / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert Run(tmp_path).status.state == "running"
     assert Run(tmp_path).status.state == "stopped"
 
 
-def test_it_can_go_on_from_a_checkpoint_unless_it_failed(tmp_path: Path) -> None:
+def test_a_run_can_be_resumed_from_a_checkpoint_unless_it_failed(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
     assert not Run(tmp_path).can_resume
     (tmp_path / "checkpoint.zip").write_text("")

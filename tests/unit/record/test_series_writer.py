@@ -60,7 +60,7 @@ def test_writing_twice_replaces_the_file_and_restoring_cuts_it_back(tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["series.h5"]
 
 
-def test_a_row_with_other_columns_is_refused(tmp_path: Path) -> None:
+def test_a_row_with_other_columns_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"other columns than the series: .*'count'.*'more'"):
         writer_of(tmp_path).add(dict.fromkeys(COLUMNS.keys() - {"count"}, 0.0) | {"more": 1.0})
 

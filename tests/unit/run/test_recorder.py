@@ -1,4 +1,4 @@
-"""What is due at a sample: rows, frames, spheres, and the watchdog's looks; from an engine in memory."""
+"""What is due at a sample: rows, frames, spheres, and checks of the watchdog; from an engine in memory."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_frames_and_spheres_are_taken_every_so_many_samples_where_there_is_somet
         assert file["count"][:].tolist() == [0] * 3 + [1] * 10
 
 
-def test_it_goes_on_from_its_memory_and_takes_away_what_came_after(tmp_path: Path) -> None:
+def test_restoring_its_memory_removes_later_files(tmp_path: Path) -> None:
     scene, engine, recorder = start(tmp_path)
     take(engine, recorder, 8)
     memory, columns, saved = json.loads(json.dumps(recorder.memory)), recorder.series.columns, engine.save(tmp_path)
@@ -121,7 +121,7 @@ def test_forces_are_asked_for_and_written_with_each_frame_where_the_scene_wants_
     assert len(list((wanting / "forces").iterdir())) == 2
 
 
-def test_the_watchdog_looks_every_so_many_steps_and_after_the_frame_is_written(tmp_path: Path) -> None:
+def test_the_watchdog_checks_at_intervals_and_after_the_frame_is_written(tmp_path: Path) -> None:
     _, engine, recorder = start(tmp_path, heights=[0.02] * 3)
     every = round(WATCH_STEPS * DT / 0.004)
     assert every > 10
@@ -135,7 +135,7 @@ def test_the_watchdog_looks_every_so_many_steps_and_after_the_frame_is_written(t
     assert len(files(tmp_path)["frames"]) == frames + 1
 
 
-def test_where_a_glance_is_enough_nobody_is_asked_but_the_energy(
+def test_where_extremes_are_enough_only_the_energy_is_checked_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, engine, recorder = start(tmp_path)

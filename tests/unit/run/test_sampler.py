@@ -35,11 +35,11 @@ def sample(sampler: Sampler, engine: EngineDouble) -> dict[str, np.ndarray]:
     """A row, and the sampler as a run that goes on from here has it."""
     row = sampler.sample(engine, engine.state(), 2)
     assert list(row) == list(sampler.described)
-    sampler.restore(json.loads(json.dumps(sampler.memory)))
+    sampler.memory = json.loads(json.dumps(sampler.memory))
     return row
 
 
-def test_columns_hold_what_the_engine_says() -> None:
+def test_columns_hold_what_the_engine_reports() -> None:
     engine = engine_with([0.01, 0.03, 0.02], time=0.5, floor=-0.002)
     engine.boundaries.velocity = 0.1
     engine.velocities[:] = [[3, 0, 4], [0, 1, 0], [0, 0, 0]]
@@ -108,7 +108,7 @@ def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside(
     assert math.isnan(sample(sampler, engine)["packing_fraction"])
 
 
-def test_motors_tell_what_they_hold_while_at_work_and_nothing_while_welded() -> None:
+def test_motors_report_while_articulated_and_not_while_welded() -> None:
     scene = small({"phases": [{"type": "deposit"}, {"type": "shape-change"}]})
     sampler, engine = Sampler(RADIUS, {EffectName.MOTORS}), engine_with([0.01, 0.02], scene=scene)
     row = sample(sampler, engine)
@@ -134,7 +134,7 @@ def test_motors_tell_what_they_hold_while_at_work_and_nothing_while_welded() -> 
     assert math.isnan(sample(sampler, engine)["motor_torque_N_m"])
 
 
-def test_the_account_of_energies_closes_over_fall_impact_and_shaking() -> None:
+def test_the_energy_ledger_closes_over_fall_impact_and_shaking() -> None:
     effects = {EffectName.ENERGIES, EffectName.ENERGY_ACCOUNT}
     sampler, engine = Sampler(RADIUS, effects), engine_with([0.05, 0.08])
     scale = sample(sampler, engine)["added_energy_J"]

@@ -117,9 +117,7 @@ def test_deep_contacts_are_named() -> None:
         (("the upper hook", "the wall"), "give the hook more room: a smaller hooks.length_m or a wider container"),
     ],
 )
-def test_who_is_held_by_two_boundaries_is_named_and_stiffness_is_no_way_out(
-    between: tuple[str, str], way_out: str
-) -> None:
+def test_a_smarticle_held_by_two_boundaries_is_named(between: tuple[str, str], way_out: str) -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
     deep = np.array([False, True, False, True])
     with pytest.raises(RunError) as caught:
@@ -170,7 +168,7 @@ def content(raised: float | None = 0.0, dog: Watchdog = STRICT, **changes: float
     return dog.content(glance, floor=1.0, raised=raised)
 
 
-def test_extremes_within_all_limits_need_no_close_look() -> None:
+def test_extremes_within_all_limits_need_no_full_check() -> None:
     assert content()
     assert content(widest=1.0, highest=5.0, raised=None)  # nothing holds them
     assert not content(lowest=0.999, raised=None)
@@ -180,6 +178,6 @@ def test_extremes_within_all_limits_need_no_close_look() -> None:
     ("name", "value"),
     [("fastest", 5.1), ("lowest", 0.999), ("highest", 1.101), ("widest", 0.0236), ("gap", 3e-5), ("deepest", 3e-4)],
 )
-def test_an_extreme_beyond_a_limit_or_no_number_needs_one(name: str, value: float) -> None:
+def test_an_extreme_beyond_a_limit_or_nan_needs_a_full_check(name: str, value: float) -> None:
     assert not content(**{name: value})
     assert not content(**{name: math.nan})

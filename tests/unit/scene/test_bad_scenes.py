@@ -45,11 +45,8 @@ def sequence(*steps: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 SCENE: Bad = [
     ({"smarticle.middle_length_m": -0.0117}, "smarticle.middle_length_m", "-0.0117"),
-    ({"smarticle.thickness_normal_m": 0.0}, "smarticle.thickness_normal_m", "0.0"),
     ({"smarticle.middle_thickness_in_plane_m": 0.001}, "smarticle.middle_thickness_in_plane_m", "0.001 m"),
-    ({"container.radius_m": -0.02}, "container.radius_m", "-0.02"),
     ({"smarticle.middle_length_m": math.nan}, "smarticle.middle_length_m", "nan"),
-    ({"smarticle.aspect_ratio": 2.5}, "smarticle.aspect_ratio", "2.5"),
     ({"smarticle.angles_deg": [120, 90]}, "smarticle.angles_deg", "120"),
     ({"smarticle.thickness_normal_m": 0.008}, "smarticle", "0.008 m"),
     ({"smarticle.middle_length_m": 11.7}, "smarticle.middle_length_m", "11.7"),
@@ -59,15 +56,11 @@ SCENE: Bad = [
     ({"count": 0}, "count", "0"),
     ({"count": "ten"}, "count", "got the text 'ten'"),
     ({"count": True}, "count", "got the boolean true"),
-    ({"seed": -1}, "seed", "-1"),
     ({"contact.friction_wall": -0.1}, "contact.friction_wall", "-0.1"),
-    ({"contact.restitution": 1.5}, "contact.restitution", "1.5"),
-    ({"phases.2.frequency_hz": 0}, "phases.2.frequency_hz", "0"),
     ({"gravity_m_per_s2": 0}, "gravity_m_per_s2", "0 m/s²"),
     ({"smarticle.aspect_ration": 0.5}, "smarticle", "unknown key 'aspect_ration'"),
     ({"cont": 3}, "", "unknown key 'cont'"),
     ({"phases.0.settle.timeout": 3}, "phases.0.settle", "unknown key 'timeout'"),
-    ({"container.height_m": 117.0}, "container.height_m", "117"),
     ({"smarticle.aspect_ratio": "0.5"}, "smarticle.aspect_ratio", "got the text '0.5'"),
     ({"fidelity": {"base": ["draft"]}}, "fidelity", "unknown fidelity ['draft']"),
     ({"smarticle.aspect_ratio": 2, "smarticle.angles_deg": [105, 105]}, "smarticle.angles_deg", "105"),
@@ -79,44 +72,29 @@ SCENE: Bad = [
     ({"phases": [{"type": "relax"}]}, "phases", "got relax"),
     ({"protocol": "paper"}, "protocol", "'paper'"),
     ({"container": {"tiers": [TIER], "packing_radius_m": 0.02}}, "container.packing_radius_m", "0.02 m"),
-    ({"phases.0.every_s": 0}, "phases.0.every_s", "0"),
     ({"phases": [{"type": "deposit"}, {"type": "deposit"}]}, "phases", "got deposit"),
     ({"phases.1.type": "rest"}, "phases.1.type", "'rest'"),
     ({"phases.1": {"duration_s": 1}}, "phases.1.type", "missing"),
     ({"phases.1": "relax"}, "phases.1", "'relax'"),
     ({"smarticle.angles_deg": [90]}, "smarticle.angles_deg.1", "missing"),
     ({"container": {"tiers": [{"radius_m": 0.03}]}}, "container.tiers.0.height_m", "missing"),
-    ({"smarticle.thickness_in_plane_m": 0.5}, "smarticle", "0.5 m"),
     ({"recording.dissipation_interval_s": 10}, "recording.dissipation_interval_s", "10"),
     ({"recording.frame_interval_s": 0.05}, "recording.frame_interval_s", "0.05"),
-    ({"recording.frame_interval_s": 0.001}, "recording.frame_interval_s", "0.001"),
     ({"phases.1.duration_s": 0.001}, "phases.1.duration_s", "0.001"),
     ({"container": {"tiers": []}}, "container.tiers", "an empty list"),
     ({"container": {"tiers": [TIER, {**TIER, "height_m": -1}]}}, "container.tiers.1.height_m", "-1"),
     ({"phases": []}, "phases", "an empty list"),
     ({"phases.1": {"type": "relax", "duration_s": "1 s"}}, "phases.1.duration_s", "got the text '1 s'"),
-    ({"phases.2.frequency_hz": 3000}, "phases.2.frequency_hz", "3000"),
-    ({"phases.0.layer_height_w": 11}, "phases.0.layer_height_w", "11"),
     ({"phases.1": BOUNCING}, "phases.1.barbs.steps", "3"),
     ({"smarticle.angles_deg": [90, 90, 90]}, "smarticle.angles_deg", "[90, 90, 90]"),
     ({"name": 5}, "name", "5"),
     ({"count": 1e300}, "count", "1e+300"),
     ({"recording": {"energy": "yes"}}, "recording.energy", "'yes'"),
     ({"hooks": {"side_m": None}}, "hooks.side_m", "null"),
-    ({"motor": {"law": "servo", "damping_N_m_s_per_rad": -1}}, "motor.damping_N_m_s_per_rad", "-1"),
-    (
-        {"hooks": {}, "phases": [DEPOSIT, {"type": "pull-hook", "speed_m_per_s": None}]},
-        "phases.1.speed_m_per_s",
-        "null",
-    ),
-    ({"phases": [DEPOSIT, {"type": "remove-container", "parts": None}]}, "phases.1.parts", "null"),
-    ({"phases": [{"type": "arrange", "gap_m": -1}]}, "phases.0.gap_m", "-1"),
 ]
 
 HOOKS: Bad = [
     ({"phases": [DEPOSIT, PULL]}, "phases.1", "pull-hook"),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "speed_m_per_s": 0}]}, "phases.1.speed_m_per_s", "0 m/s"),
-    ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 0}]}, "phases.1.distance_m", "0"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m", "23.4"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which", "'lower'"),
     ({"phases": [DEPOSIT, {**REMOVE, "speed_m_per_s": -0.1}]}, "phases.1.speed_m_per_s", "-0.1 m/s"),
@@ -125,7 +103,6 @@ HOOKS: Bad = [
     ({"phases": [REMOVE, DEPOSIT]}, "phases", "got remove-container"),
     ({"hooks": {"length_m": 0.048}}, "hooks.length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.048, "lower_bars": 3}}, "hooks.lower_length_m", "0.048"),
-    ({"hooks": {"lower_length_m": 0.04, "lower_bars": 50}}, "hooks.lower_bars", "50"),
     ({"hooks": {"lower_length_m": 0.01, "lower_bars": 12}}, "hooks.lower_bars", "no room between them"),
     ({"hooks": {"lower_height_m": 2e-4}}, "hooks.lower_height_m", "0.0002"),
     ({"hooks": {"upper_height_m": 0.0054}}, "hooks.upper_height_m", "0.0054"),
@@ -165,10 +142,8 @@ ACTUATED: Bad = [
         "random",
     ),
     (on(actuate(HOLD, duration_s=2, offsets="random")), "phases.1.offsets", "random"),
-    (on(actuate(RAMP, offsets="some")), "phases.1.offsets", "'some'"),
     (on(actuate(RAMP, active_fraction=0.04)), "phases.1.active_fraction", "0.04"),
     (on(actuate({**RAMP, "to_deg": 110})), "phases.1.barbs.to_deg", "110"),
-    (on({**SHAPE_CHANGE, "straight_deg": -16}), "phases.1.straight_deg", "-16"),
     (on(actuate({**SINE, "amplitude_deg": 20}, duration_s=2)), "phases.1.barbs.amplitude_deg", "20"),
     (
         on(
@@ -194,20 +169,10 @@ ACTUATED: Bad = [
     (on(actuate(sequence(RAMP, {"type": "ramp", "to_deg": 3}))), "phases.1.barbs.steps.1.duration_s", "missing"),
     (on(actuate({"type": "jump"})), "phases.1.barbs.type", "'jump'"),
     (on(actuate(sequence(HOLD, RAMP))), "phases.1.barbs.steps.0", "hold has no end"),
-    (on({"type": "internal-oscillation"}), "phases.1.theta_deg", "missing"),
-    ({**on(SHAPE_CHANGE), "motor.torque_limit_N_m": 0}, "motor.torque_limit_N_m", "0"),
-    ({**on(SHAPE_CHANGE), "motor.speed_limit_rad_per_s": 0}, "motor.speed_limit_rad_per_s", "0 rad/s"),
-    ({**on(SHAPE_CHANGE), "motor.stiffness_N_m_per_rad": -1}, "motor.stiffness_N_m_per_rad", "-1"),
     ({**on(SHAPE_CHANGE), "motor.law": "brake"}, "motor.law", "'brake'"),
-    ({**on(SHAPE_CHANGE), "motor.torque_limit_N_m": "1e-5"}, "motor.torque_limit_N_m", "got the text '1e-5'"),
     ({**on(SHAPE_CHANGE), "fidelity": {"control_interval_s": 0.005}}, "fidelity.control_interval_s", "0.005"),
     ({**on(SHAPE_CHANGE), "fidelity": {"control_interval_s": 3e-4}}, "fidelity.control_interval_s", "0.0003"),
     ({**on(SHAPE_CHANGE), "smarticle.aspect_ratio": 0}, "smarticle.aspect_ratio", "0"),
-    (
-        {**on(SHAPE_CHANGE), "smarticle.aspect_ratio": 0.05, "fidelity": {"diameter_m": 1.2e-3}},
-        "smarticle.aspect_ratio",
-        "0.05",
-    ),
     (
         {**on(SHAPE_CHANGE), "smarticle.aspect_ratio": 0.15, "fidelity": {"diameter_m": 1.2e-3}},
         "smarticle.aspect_ratio",
@@ -228,9 +193,7 @@ CHAINS: Bad = [
     ({"hooks": {}}, "hooks", "they lie out of the plane"),
     ({"container": {"radius_m": 0.1}}, "container", "a plane has none but two walls"),
     ({"smarticle.angles_deg": [80, 90]}, "smarticle.angles_deg", "a chain is laid out of U shapes"),
-    ({"phases.1.distance_m": 100}, "phases.1.distance_m", "100"),
     ({"motor.law": "halt", "motor.damping_N_m_s_per_rad": 1e-3}, "motor.damping_N_m_s_per_rad", "0.001"),
-    ({"motor.strength_spread": 1.0}, "motor.strength_spread", "1.0"),
     ({"fidelity.rows": 2, "fidelity.diameter_m": 0.004}, "fidelity.rows", "2"),
     ({THICK: 0.009}, THICK, "0.009 m"),
     ({THICK: 0.024}, "smarticle", "0.024 m"),
@@ -244,7 +207,7 @@ CHAINS: Bad = [
 WAY_OUT = re.compile(r"; \S|\bexpected \S|° … ")
 
 
-def refused(good: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
+def rejected(good: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
     with pytest.raises(InputError) as caught:
         parse_scene(changed(good, changes), source="bad.yaml")
     return str(caught.value).removeprefix("bad.yaml: ")
@@ -263,7 +226,7 @@ def test_they_are_good_before_the_change(good: dict[str, Any]) -> None:
 def test_one_line_with_key_value_and_way_out(
     good: dict[str, Any], changes: dict[str, Any], key: str, value: str
 ) -> None:
-    line = refused(good, changes)
+    line = rejected(good, changes)
     assert len(line.splitlines()) == 1
     assert line.startswith(f"{key}: " if key else value)
     told = line.removeprefix(f"{key}: ")
@@ -273,10 +236,10 @@ def test_one_line_with_key_value_and_way_out(
 
 
 def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
-    line = refused(SMALL, {"hooks": {"length_m": 11.7}})
+    line = rejected(SMALL, {"hooks": {"length_m": 11.7}})
     assert line.startswith("hooks.length_m: 11.7 means 11.7 m")
     assert line.count("11.7 means") == 1
     # Told twice where the file says it twice.
-    both = refused(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
+    both = rejected(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
     assert both.count("11.7 means") == 2
     assert "; also hooks.lower_length_m: 11.7 means" in both

@@ -1,4 +1,4 @@
-"""Files and overrides that are no scene, and refusals that take a number from it; see `test_bad_scenes.py`."""
+"""Files and overrides that are no scene, and errors; see `test_bad_scenes.py`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ W_IN_MM = (
 )
 
 
-def test_several_errors_are_told_together(scene_data: SceneData) -> None:
+def test_several_errors_are_reported_together(scene_data: SceneData) -> None:
     with pytest.raises(InputError) as caught:
         parse_scene(scene_data({"seed": -1, "count": 0}), source="bad.yaml")
     both = "seed: -1 is out of range; use at least 0; also count: 0 is out of range; use at least 1"
@@ -58,8 +58,8 @@ def test_file_that_is_no_mapping(data: Any, kind: str) -> None:
     assert str(caught.value) == f"bad.yaml: a scene is a mapping of keys to values, got {kind}"
 
 
-def refused(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
-    """The message with which a file is refused, the folder cut off."""
+def rejected(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
+    """The message with which a file is rejected, the folder cut off."""
     path = folder / "bad.yaml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(InputError) as caught:
@@ -72,21 +72,21 @@ def refused(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -
 def test_key_given_twice(tmp_path: Path) -> None:
     line = GOOD.count("\n") + 1
     told = f"bad.yaml, line {line}, column 1: not valid YAML: key 'seed' is given twice; keep one of the two"
-    assert refused(tmp_path, GOOD + "seed: 2\n") == told
+    assert rejected(tmp_path, GOOD + "seed: 2\n") == told
     nested = GOOD + "smarticle: {aspect_ratio: 0.4, aspect_ratio: 0.7}\n"
-    assert "key 'aspect_ratio' is given twice" in refused(tmp_path, nested)
+    assert "key 'aspect_ratio' is given twice" in rejected(tmp_path, nested)
 
 
 def test_file_that_is_no_yaml(tmp_path: Path) -> None:
-    message = refused(tmp_path, "a: [1\nb")
+    message = rejected(tmp_path, "a: [1\nb")
     assert message.startswith("bad.yaml, line 2, column 2: not valid YAML: expected ',' or ']'")
     assert message.endswith("; correct this line")
     for tabbed in (GOOD + "\tname: x\n", GOOD + "name:\tx\n", GOOD + "motor:\n\tlaw: slip\n"):
         line = tabbed[: tabbed.index("\t")].count("\n") + 1
-        told = refused(tmp_path, tabbed)
+        told = rejected(tmp_path, tabbed)
         assert told.startswith(f"bad.yaml, line {line}, column ")
         assert told.endswith(": not valid YAML: a tab; YAML is indented and spaced by blanks")
-    assert "could not determine a constructor" in refused(tmp_path, GOOD + "name: !!python/object:os.system x\n")
+    assert "could not determine a constructor" in rejected(tmp_path, GOOD + "name: !!python/object:os.system x\n")
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
             "phases.3.duration_s=1",
             "--set phases.3.duration_s=1: there is no '3' in the scene; lists are numbered from 0",
         ),
-        ("count.x=1", "--set count.x=1: there is no 'x' to set; lists are numbered from 0"),
+        ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
         ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
         ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
@@ -118,12 +118,12 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     ],
 )
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
-    message = refused(tmp_path, GOOD, [override])
+    message = rejected(tmp_path, GOOD, [override])
     assert message.startswith(expected) if expected.endswith(": ") else message == expected
 
 
 @pytest.mark.parametrize("overrides", [[], ["seed=1"]])
 def test_empty_file(tmp_path: Path, overrides: list[str]) -> None:
-    assert refused(tmp_path, "", overrides) == (
+    assert rejected(tmp_path, "", overrides) == (
         "bad.yaml: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
     )

@@ -29,12 +29,12 @@ def test_the_code_differs_where_the_file_of_the_papers_code_says_so() -> None:
     assert scene.phases[1].moves == "floor"
 
 
-def test_the_text_is_what_a_scene_has_that_says_nothing() -> None:
+def test_the_text_is_the_default_of_a_scene() -> None:
     said, unsaid = scene_with(protocol="text"), scene_with()
     assert said.model_copy(update={"protocol": None}) == unsaid
 
 
-def test_what_the_scene_says_stands_and_is_told() -> None:
+def test_keys_of_the_scene_have_priority_and_are_reported() -> None:
     scene = scene_with(protocol="code", contact={"friction_wall": 0.3}, motor={"speed_limit_rad_per_s": 3.0})
     assert (scene.contact.friction_smarticle, scene.contact.friction_wall, scene.motor.law) == (0.2, 0.3, "ease")
     first, second = protocol_lines(scene)

@@ -1,0 +1,396 @@
+"""Phases in which motors move the barbs or hold them: their gait, its target angles, what is checked, their stage.
+
+Each is short for a `Gait`. `drive` compiles it into target angles: which smarticles move is drawn from the scene's
+seed, and where they begin follows from the phases before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.particle import HINGE_CLEARANCE
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.phases.phase import Memory, Phase, SceneView, Stage
+from dem.setting.hooks import TOLERANCE
+from dem.setting.motion import Course, Motion, SimpleMotion, Sine, Triangle
+from dem.setting.motor import Motor
+from dem.setting.part import HINGE_RANGE
+from dem.setting.smarticle import Smarticle
+
+Array = NDArray[np.float64]
+
+BARBS = 2
+BARB_LINKS = (0, 2)
+MOST_PARTS = 100  # parts of the series interval that are tried: one of them has few digits, unless there are very many
+# Share of τ_max that a motor may gain within one control update before it notices and halts. The defaults gain 0.22.
+MOST_OVERSHOOT = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """What the barbs of smarticles do in a phase.
+
+    Args:
+        motions: of barb 1 and of barb 2.
+        keys: of the motions in a phase of type actuate.
+        duration: length of the phase [s].
+        active_fraction: share of the smarticles that move [1].
+        offsets: "random": each begins at another point of the period.
+    """
+
+    motions: tuple[Motion, Motion]
+    keys: tuple[str, str] = ("barbs", "barbs")
+    duration: float
+    active_fraction: float = 1.0
+    offsets: Literal["none", "random"] = "none"
+
+    @property
+    def period(self) -> float | None:
+        """Return the longer period [s] of the motions; None if they have none."""
+        return max((motion.period for motion in self.motions if motion.period is not None), default=None)
+
+    def active_count(self, count: int) -> int:
+        return round(self.active_fraction * count)
+
+
+class ActuatedPhase(Phase):
+    """A phase in which motors move the barbs or hold them."""
+
+    planar: ClassVar[bool | None] = None
+    actuates: ClassVar[bool] = True
+
+    def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
+        """Return the gait that the phase is short for."""
+        raise NotImplementedError
+
+    def own(self, key: str) -> tuple[str, float | None]:
+        """Return the key of this phase that sets `key` of the gait, and its value."""
+        raise NotImplementedError
+
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        if not any(before.actuates for before in scene.phases[:index]):
+            yield from _of_barbs(scene, index)
+            yield from _of_control(scene)
+        yield from _of_active(scene, index)
+        highest = yield from _of_motions(scene, index)
+        # A motor that halts is late, so that barbs may meet although their highest angles are not asked for at one
+        # time.
+        if scene.smarticle.tip_clearance(highest) < 0:
+            yield (
+                f"phases.{index}: at {highest[0]:.4g}° and {highest[1]:.4g}° the barbs of l/w = "
+                f"{scene.smarticle.aspect_ratio:g} cross; use angles nearer to 90° or a smaller aspect_ratio"
+            )
+        yield from _of_first_spheres(scene, index, max(highest))
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        return actuation_warnings(scene)
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        return {EffectName.ARTICULATION: str(index)}
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"look": 0}
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        return self.follow(stage, engine)
+
+    def follow(self, stage: Stage, engine: Engine, halt_every: int | None = None) -> float:
+        """Let the motors follow the schedule, one control update per period; smarticles are articulated meanwhile.
+
+        After each `halt_every` updates it returns, so that the caller can check the pile.
+        """
+        look: int = stage.memory["look"]
+        if look == 0:
+            engine.motors.articulate()
+        schedule: Drive = stage.prepared
+        interval = stage.scene.fidelity.control_interval_s
+        last = math.ceil(schedule.duration / interval - 1e-9)
+        every = halt_every or last
+        # The last update only adds up the work since the one before.
+        stop = min(look + engine.motors.looks_at_once, (look // every + 1) * every, last)
+        looks = range(look, max(look + 1, stop))
+        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in looks]
+        engine.motors.actuate(np.stack(targets), interval)
+        stage.memory["look"] = looks.stop
+        period = max(1, round(interval / engine.time_step)) * engine.time_step
+        return len(looks) * period if look < last else 0.0
+
+    def prepare(self, scene: SceneView, index: int) -> Drive:
+        return drive(scene, index)
+
+
+# -- target angles -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """One motion, of all barbs that follow it.
+
+    Args:
+        span: the K entries of `Drive` that it sets.
+        course: the motion from K starts.
+        shifts: (1,) or (K,) time that the motion is ahead at the beginning of the phase [s].
+    """
+
+    span: slice
+    course: Course
+    shifts: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Target angles of an actuated phase over time.
+
+    Args:
+        duration: length of the phase [s].
+        active: (N,) bool, smarticles that move.
+        start: (N, 2) target angles at the end of the actuated phase before, or the smarticle's own [rad].
+    """
+
+    duration: float
+    active: NDArray[np.bool_]
+    start: Array
+    # Barbs that always have one target share an entry: `_entries` has those of barbs that do not move, then those of
+    # each track; `_which` (N, 2) is the entry of each barb.
+    _entries: Array
+    _tracks: tuple[_Track, ...]
+    _which: NDArray[np.int64]
+
+    def targets(self, time: float) -> Array:
+        """Return (N, 2) target angles [rad] at a time [s] after the phase began; beyond its end those of its end."""
+        time = min(max(time, 0.0), self.duration)
+        entries = self._entries.copy()
+        for track in self._tracks:
+            entries[track.span] = track.course(time + track.shifts)
+        return entries[self._which]
+
+
+def _gait(scene: SceneView, index: int) -> Gait:
+    phase = scene.phases[index]
+    assert isinstance(phase, ActuatedPhase)  # the caller has checked
+    return phase.gait(scene.smarticle, scene.motor)
+
+
+def drive(scene: SceneView, index: int) -> Drive:
+    """Compile the actuated phase `scene.phases[index]`."""
+    gait, start = _gait(scene, index), _starting_angles(scene, index)
+    # The first ones of one random order: at one seed a larger share contains all smarticles of a smaller one.
+    rng = np.random.default_rng(scene.seed_for(f"active/{index}"))
+    active = np.zeros(scene.count, dtype=np.bool_)
+    active[rng.permutation(scene.count)[: gait.active_count(scene.count)]] = True
+    shifts = np.zeros(1)
+    if gait.offsets == "random":
+        rng = np.random.default_rng(scene.seed_for(f"offsets/{index}"))
+        shifts = (rng.random(scene.count) * (gait.period or 0.0))[active]
+
+    resting, which_resting = np.unique(start[~active], return_inverse=True)
+    which = np.empty((scene.count, BARBS), dtype=np.int64)
+    which[~active] = which_resting.reshape(-1, BARBS)
+    tracks, size = [], resting.size
+    one, other = gait.motions
+    for columns, motion in [([0, 1], one)] if one == other else [([0], one), ([1], other)]:
+        begun = start[active][:, columns]
+        if shifts.size > 1:
+            each, inverse = np.ravel(begun), np.arange(begun.size)
+            ahead = np.repeat(shifts, len(columns))
+        else:
+            each, inverse = np.unique(begun, return_inverse=True)
+            ahead = shifts
+        tracks.append(_Track(slice(size, size + each.size), motion.course(each, each), ahead))
+        which[np.flatnonzero(active)[:, None], columns] = size + inverse.reshape(begun.shape)
+        size += each.size
+    entries = np.concatenate([resting, np.zeros(size - resting.size)])
+    return Drive(gait.duration, active, start, entries, tuple(tracks), which)
+
+
+def _starting_angles(scene: SceneView, index: int) -> Array:
+    """Return (N, 2) final targets of the actuated phase before, or the smarticle's own angles [rad]."""
+    for before in range(index - 1, -1, -1):
+        if scene.phases[before].actuates:
+            last = drive(scene, before)
+            return last.targets(last.duration)
+    return np.tile(np.radians(scene.smarticle.angles_deg), (scene.count, 1))
+
+
+# -- whether smarticles can do it --------------------------------------------------------------------------------------
+
+
+def overshoot(scene: SceneView) -> float:
+    """Return the torque over τ_max [1] that a motor can gain in one control update; 0 where it is capped."""
+    motor = scene.motor
+    added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
+    return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
+
+
+def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
+    """Return what a scene that actuates should change, one line each.
+
+    A motor that is quick and stiff for its torque limit exceeds it. That is no reason to reject a scene: it exceeds it
+    by no more than this, then halts, and motors that can hardly move anything are a case worth running.
+    """
+    share = overshoot(scene)
+    if share <= MOST_OVERSHOOT:
+        return ()
+    motor, series, less = scene.motor, scene.recording.series_interval_s, MOST_OVERSHOOT / share
+    interval = _whole_fraction(series, math.ceil(series / (scene.fidelity.control_interval_s * less)))
+    return (
+        f"motor.torque_limit_N_m: τ_max = {scene.torque_limit:.3g} N m, but within one control update of "
+        f"fidelity.control_interval_s = {scene.fidelity.control_interval_s:g} s at motor.speed_limit_rad_per_s = "
+        f"{motor.speed_limit_rad_per_s:g} rad/s a motor can exceed it by {share:.3g} τ_max; use "
+        f"control_interval_s: {interval} or stiffness_N_m_per_rad: "
+        f"{_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
+    )
+
+
+def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
+    ratio, width, diameter = scene.smarticle.aspect_ratio, scene.smarticle.middle_length_m, scene.sphere_diameter
+    if ratio == 0:
+        yield (
+            f"smarticle.aspect_ratio: 0 means no barbs, which phases.{index} ({scene.phases[index].kind}) is to move; "
+            "use a larger aspect_ratio or leave the phase out"
+        )
+    has_spheres = np.isin(BARB_LINKS, scene.particle.links).all()
+    if not has_spheres or _first_station(scene) < diameter * (1 - TOLERANCE):
+        # The first sphere begins where the hinge's ends, and the last one ends at the tip.
+        least = (1.5 + HINGE_CLEARANCE) * diameter
+        yield (
+            f"smarticle.aspect_ratio: {ratio:g} means barbs of {ratio * width:.4g} m, too short for a sphere of their "
+            f"own of {diameter:.4g} m beside the hinge's, which phases.{index} ({scene.phases[index].kind}) needs; use "
+            f"at least {_up(least / width)} or a smaller fidelity.diameter_m"
+        )
+
+
+def _first_station(scene: SceneView) -> float:
+    """Return the distance [m] of the barbs' first spheres from the hinge, along the barb."""
+    particle = scene.particle
+    barb = particle.centres[particle.links == BARB_LINKS[0]] - particle.boxes.vertices[1]
+    return float(np.hypot(barb[:, 0], barb[:, 1]).min())
+
+
+def _of_control(scene: SceneView) -> Iterator[str]:
+    interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
+    updates = series / interval
+    if updates >= 1 - 1e-6 and abs(updates - round(updates)) <= 1e-6:
+        return
+    wrong = "longer than" if updates < 1 - 1e-6 else "not a whole fraction of"
+    yield (
+        f"fidelity.control_interval_s: {interval:g} s is {wrong} recording.series_interval_s = {series:g} s; use e.g. "
+        f"{_whole_fraction(series, max(1, math.ceil(updates * (1 - TOLERANCE))))} s"
+    )
+
+
+def _whole_fraction(whole: float, parts: int) -> str:
+    """Return a time [s] over `parts` or a few more, such that it has few digits."""
+    for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
+        text = f"{whole / more:.3g}"
+        if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
+            return text
+    return repr(whole / parts)
+
+
+def _of_active(scene: SceneView, index: int) -> Iterator[str]:
+    gait = _gait(scene, index)
+    if not gait.active_count(scene.count):
+        yield (
+            f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
+            f"use e.g. {_up(1 / scene.count)}"
+        )
+
+
+def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:
+    """Check range and speed of the motions; return the highest angle [deg] of either barb, moving or not."""
+    phase, gait, driven = scene.phases[index], _gait(scene, index), drive(scene, index)
+    assert isinstance(phase, ActuatedPhase)
+    # With random offsets the motion covers up to one more period than the phase is long.
+    until = driven.duration + ((gait.period or 0.0) if gait.offsets == "random" else 0.0)
+    highest = np.degrees(driven.start.max(axis=0))
+    for barb in range(BARBS):
+        start = driven.start[driven.active, barb]
+        for leg in gait.motions[barb].legs(start, start, until):
+            key = ".".join(filter(None, (gait.keys[barb], leg.key)))
+            lows, highs, speed = leg.extent()
+            low, high = np.degrees(lows), np.degrees(highs)
+            if isinstance(leg.motion, Sine | Triangle):
+                # All other angles are checked where they are read: only a swing can leave the range.
+                own, present = phase.own(f"{key}.amplitude_deg")
+                assert present is not None  # a swing has an amplitude
+                yield from _of_range(
+                    f"phases.{index}.{own}", present, leg.motion, (float(low.min()), float(high.max()))
+                )
+            highest[barb] = max(highest[barb], high.max())
+            own, _ = phase.own(f"{key}.{leg.motion.pace[0]}")
+            yield from _of_speed(f"phases.{index}.{own}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
+    return float(highest[0]), float(highest[1])
+
+
+def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> Iterator[str]:
+    """Reject a swing that leaves the range of the hinges; `present` [deg] is what sets it at `place`."""
+    lowest, highest = HINGE_RANGE
+    too_low, too_high = lowest - reached[0], reached[1] - highest
+    beyond = max(too_low, too_high)
+    if beyond <= TOLERANCE:
+        return
+    smaller = 1 - beyond / swing.amplitude_deg
+    way_out = f"use at most {_down(present * smaller)}° or another centre" if smaller > TOLERANCE else "move its centre"
+    yield (
+        f"{place}: {present:g}° makes the barbs reach {reached[too_high > too_low]:.4g}°, outside {lowest:g}° … "
+        f"{highest:g}°, the range of the hinges; {way_out}"
+    )
+
+
+def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> Iterator[str]:
+    factor = speed / limit
+    if factor <= 1 + TOLERANCE:
+        return
+    key, unit = motion.pace
+    present = getattr(motion, key)
+    way_out = f"at least {_up(present * factor)}" if key == "duration_s" else f"at most {_down(present / factor)}"
+    yield (
+        f"{place}: {present:g} {unit} makes {speed:.4g} rad/s, faster than motor.speed_limit_rad_per_s = "
+        f"{limit:g} rad/s; use {way_out} {unit}"
+    )
+
+
+def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[str]:
+    """Check that the first sphere of a barb beyond 90° does not touch the spheres of the middle link.
+
+    At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
+    sphere at m, so that they are clear of each other while -cos α ≤ (s² + m² - d²) / (2 s m).
+    """
+    if angle <= 90 or scene.smooth:
+        return
+    particle, d = scene.particle, scene.sphere_diameter
+    s = _first_station(scene)
+    arms = particle.centres[particle.links == 1] - particle.boxes.vertices[1]
+    m = np.unique(np.round(np.hypot(arms[:, 0], arms[:, 1]) / d, 9))[1:] * d  # the first is the hinge's own
+    inward = float(((s**2 + m**2 - d**2) / (2 * s * m)).min())
+    if -math.cos(math.radians(angle)) <= inward + TOLERANCE:
+        return
+    # Spheres are spread evenly, and so may be nearer than the pitch, by up to one more among those of the link.
+    near, inwards = s / d, -math.cos(math.radians(angle))
+    apart = near * inwards + math.sqrt(max(0.0, (near * inwards) ** 2 + 1 - near**2))
+    wider = apart / (1 - apart * d / scene.smarticle.middle_length_m)
+    yield (
+        f"fidelity.pitch: with {scene.fidelity.pitch:g} the middle link's spheres are {m[0] / d:.3g} diameters apart, "
+        f"and the first sphere of a barb touches them at the {angle:.4g}° of phases.{index}; stay below "
+        f"{_down(math.degrees(math.acos(-inward)))}° or use a pitch of at least {_up(wider, 2)}"
+    )
+
+
+def _up(value: float, digits: int = 3) -> str:
+    """Round a number up to some significant digits."""
+    scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
+    return f"{math.ceil(value * scale * (1 - TOLERANCE)) / scale:g}"
+
+
+def _down(value: float, digits: int = 3) -> str:
+    """Round a positive number down to some significant digits."""
+    scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
+    return f"{math.floor(value * scale * (1 + TOLERANCE)) / scale:g}"
