@@ -11,30 +11,25 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, seeds_of, told_number
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from studies.framework.figures import Analysis, Drawing
-from studies.framework.findings import Finding, Outcome, Verdict
-from studies.framework.plots import draw_means, finished, marker
+from studies.framework.figures import POOLED, Means, one_by_one
+from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, ENGINE, Row, duration
+from studies.framework.runs import Row, duration, last_columns
 from studies.framework.study import Study
+from studies.framework.tables import DEFINITION, ENGINE, Key, Quantity
 from studies.ladder import ACTIVITIES, BASE, Rung
 
 VARIANT, KNOB, VALUE, UNIT, REFERENCE, VERDICT = "variant", "knob", "value", "unit", "reference", "verdict"
@@ -70,11 +65,9 @@ _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure what a run cost, and what is compared.
+    """Measure what a run, named SETTING_seedN, cost, and what is compared.
 
-    Args:
-        run: A finished run, named SETTING_seedN.
-        expected_s: Expected wall time by name of the run directory, where it is known [s].
+    The expected wall time is given by name of the run directory, where it is known [s].
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
@@ -117,8 +110,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
         **_of_series(run),
         "escaped at the end [-]": after["escaped [-]"],
         "frames averaged [-]": int(table["frames averaged"].min()),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -148,17 +140,12 @@ def _of_series(run: Run) -> dict[str, float]:
 
 
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
-    """Compare each rung with its knob's reference: cost, means over seeds, errors.
+    """Compare each rung with its knob's reference: cost, means over seeds, errors; rungs go from coarse to fine.
 
-    Args:
-        runs: Table of runs.
-        rungs: Each knob's from coarse to fine; one without runs has NaN.
-
-    Returns:
-        One row per rung. `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `…
-        error 95 % [%]` its seed-to-seed band: the half-width of the interval of confidence by Student's t, with the
-        scatter pooled over all settings. The error of the reference itself is 0 by definition, its band that of its
-        own mean. `… resolved` says whether the error is beyond the band, `verdict` whether any is.
+    `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `… error 95 % [%]` its
+    seed-to-seed band: the half-width of the interval of confidence by Student's t, with the scatter pooled over all
+    settings. The error of the reference itself is 0 by definition, its band that of its own mean. `… resolved` says
+    whether the error is beyond the band, `verdict` whether any is. A rung without runs has NaN.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -229,7 +216,7 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
     if reference["sensitivity"]:
         clear = [f"{_label(row)} ({_errors(row)})" for _, row in judged[judged[VERDICT] == RESOLVED].iterrows()]
         note = f"a matter of what is modelled; against {_label(reference)} resolved: {', '.join(clear) or 'none'}"
-        return Outcome(note=note, verdict=Verdict.FOUND if clear else Verdict.NOT_RESOLVED)
+        return Outcome(note=note, verdict=decide(bool(clear)))
     cheap = judged[judged[COST] < reference[COST]].sort_values(COST)
     enough = cheap[cheap[VERDICT] == NOT_RESOLVED]
     if enough.empty:
@@ -258,52 +245,6 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
     )
 
 
-def _draw(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw errors against costs, a panel for each quantity, a series for each knob."""
-    table = analysis.tables["work_precision"]
-    names = [name for name, column in COMPARED.items() if name != "hook_force" or table[column].notna().any()]
-    figure = style.blank_figure(2 * style.COLUMN_WIDTH, 4.6)
-    panels = list(figure.subplots(-(-len(names) // 2), 2, sharex=True).flat)
-    for axes in panels[len(names) :]:
-        axes.remove()
-    for axes, name in zip(panels, names, strict=False):
-        _draw_panel(axes, name, table)
-    handles, labels = panels[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
-    told = "Hollow: references. Band: median of the error bars."
-    return finished(figure, path, [told], analysis.footer, pooled=True)
-
-
-def _draw_panel(axes: Any, name: str, table: pd.DataFrame) -> None:
-    errors, bands = f"{name} error [%]", f"{name} error 95 % [%]"
-    typical = table.loc[table[VERDICT] != IS_REFERENCE, bands].median()
-    if math.isfinite(typical):
-        axes.axhspan(-typical, typical, color=style.SKY, alpha=0.25, linewidth=0, label="seed-to-seed band, 95 %")
-    axes.axhline(0.0, color=style.GREY, linewidth=0.6)
-    knobs = list(dict.fromkeys(table[KNOB]))
-    colours = style.sequence(len(knobs), last=0.85)
-    for place, (knob, colour, shape) in enumerate(zip(knobs, colours, "os^vPDX<", strict=False)):
-        rows = table[(table[KNOB] == knob) & table[COST].notna() & table[errors].notna()]
-        # The scene itself is a rung of every knob: knobs stand side by side, by a factor in the cost.
-        cost = rows[COST] * 1.05 ** (place - (len(knobs) - 1) / 2)
-        axes.plot(cost, rows[errors], color=colour, linewidth=0.5, alpha=0.6)
-        own = rows[VERDICT] == IS_REFERENCE
-        for part, face, label in ((~own, colour, knob), (own, "white", "_nolegend_")):
-            if part.any():
-                look = marker(shape, colour, face) | {"linestyle": "none"}
-                # A reference has no error of its own: its scatter is in the bands of the others.
-                high = rows.loc[part, bands].where(~own[part]).to_numpy()
-                wide = rows.loc[part, marked(COST, "95 %")].to_numpy()
-                draw_means(axes, cost[part], rows.loc[part, errors], high, across=wide, look=look, label=label)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("processor time per simulated time [s/s]")
-    axes.set_ylabel(f"error of {SYMBOLS[name]} [%]")
-
-
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
     """Make the study of a ladder.
 
@@ -317,6 +258,17 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         table = work_precision(runs, rungs)
         return {"points": table, "work_precision": table}
 
+    errors = [
+        Quantity(
+            column=f"{name} error [%]",
+            label=f"{symbol} error % (95 %)",
+            form="+.1f",
+            bar="95 %",
+            axis=f"error of {symbol} [%]",
+            meaning=f"of {symbol} against the knob's reference",
+        )
+        for name, symbol in SYMBOLS.items()
+    ]
     return Study(
         name="accuracy",
         title="What accuracy costs in time",
@@ -329,19 +281,22 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         ),
         quantities=(
             Quantity(column=COST, label="cpu s per s", meaning="processor time of the last activity, one thread"),
-            *(
-                Quantity(
-                    column=f"{name} error [%]",
-                    label=f"{symbol} error % (95 %)",
-                    form="+.1f",
-                    bar="95 %",
-                    meaning=f"of {symbol} against the knob's reference",
-                )
-                for name, symbol in SYMBOLS.items()
-            ),
+            *errors,
         ),
         findings=[_finding(knob, sensitivity=sensitivity) for knob, sensitivity in knobs.items()],
-        figures=(Drawing(name="accuracy", of=_draw),),
+        figures=(
+            Means(
+                name="accuracy",
+                table="work_precision",
+                quantities=errors,
+                x=COST,
+                x_label="processor time per simulated time [s/s]",
+                log_x=True,
+                split=one_by_one(KNOB, str),
+                levels=lambda _: {"reference": 0.0},
+                bars=POOLED,
+            ),
+        ),
         extra=tables,
         order=(),
         same_count=(),

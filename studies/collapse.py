@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.resources import files
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,17 +33,15 @@ from postprocess.measures.collapse import (
     height_with_the_wall,
     vibration,
 )
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, mean_columns, told_number
 from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_seeds, slope_within
-from studies.framework.figures import Analysis, Drawing, Histories, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, within
-from studies.framework.plots import ASPECT_LABEL, History, draw_bounds, draw_means, finished, marker
+from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity, sort_rows
-from studies.framework.runs import Row, duration
+from studies.framework.runs import Row, duration, last_columns
 from studies.framework.study import Study
+from studies.framework.tables import Key, Quantity, sort_rows
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, DEFINITION, TIME = "container radius [m]", "definition", "tau [s]"
@@ -71,10 +67,14 @@ KEYS = (
 )
 
 
-def read_gravish() -> pd.DataFrame:
-    """Read Gravish's digitised points: columns `l_over_w` [-] and `delta` [-]; compared at equal l/w only."""
-    with _DIGITISED.open(encoding="utf-8") as file:
-        return pd.read_csv(file)
+_GRAVISH = pd.read_csv(str(_DIGITISED))  # `l_over_w` [-] and `delta` [-]; compared at equal l/w only
+DELTA_OF_POINT = Quantity(
+    column=ACTIVATION,
+    label="Δ",
+    form=".2f",
+    axis=r"activation $\Delta$ [-]",
+    meaning="slope of ln(fτ) against 1/Γ through the origin",
+)
 
 
 def measure(run: Run) -> Sequence[Row]:
@@ -113,8 +113,7 @@ def measure(run: Run) -> Sequence[Row]:
                 "fall [-]": found.fall,
                 LOG: logarithm,
                 DELTA: shaken.acceleration * logarithm,
-                "scene_sha256": run.manifest.scene_sha256,
-                "run": run.path.name,
+                **last_columns(run),
             }
         )
     return rows
@@ -147,7 +146,7 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
     not hold. Where there is no such acceleration Δ is empty, and there is only what it is at least.
     """
     found = []
-    every, gravish = times(runs), read_gravish().set_index("l_over_w")["delta"]
+    every, gravish = times(runs), _GRAVISH.set_index("l_over_w")["delta"]
     for (definition, aspect), group in runs.groupby([DEFINITION, ASPECT], sort=False):
         own = every[(every[DEFINITION] == definition) & (every[ASPECT] == aspect)]
         used = own.loc[own[CENSORED] == 0, GAMMA].tolist()
@@ -207,13 +206,6 @@ def _law(runs: pd.DataFrame) -> Outcome:
     )
 
 
-def _cell(row: pd.Series) -> str:
-    """Δ with its standard error, or what it is at least."""
-    if math.isnan(row[ACTIVATION]):
-        return f"≥ {row[AT_LEAST]:.1f}"
-    return told_number(row[ACTIVATION], ".2f", row[marked(ACTIVATION, "SE")])
-
-
 def _greatest_between(table: pd.DataFrame) -> Outcome:
     own = table[table[DEFINITION] == REMAINING].set_index(ASPECT)
     means = {
@@ -228,21 +220,12 @@ def _greatest_between(table: pd.DataFrame) -> Outcome:
     verdict = Verdict.NO_DATA
     if INTERMEDIATE in list(means)[1:-1]:
         gaps = [difference(means[INTERMEDIATE], means[end]) for end in (min(means), max(means))]
-        verdict = all_of(
-            Verdict.NO_DATA
-            if math.isnan(gap.value)
-            else Verdict.NOT_RESOLVED
-            if not gap.clear
-            else Verdict.FOUND
-            if gap.value > 0
-            else Verdict.NOT_FOUND
-            for gap in gaps
-        )
-    parts = [
-        f"by {name}: " + ", ".join(f"{row[ASPECT]:g}: {_cell(row)}" for _, row in part.iterrows())
-        for name, part in table.groupby(DEFINITION, sort=False)
+        verdict = all_of(decide(gap.clear and gap.value > 0, gap.clear, data=not math.isnan(gap.value)) for gap in gaps)
+    cells = [
+        f"{aspect:g}: " + (told_number(mean.value, ".2f", mean.standard_error) if mean.count else "a bound")
+        for aspect, mean in means.items()
     ]
-    return Outcome(note=f"Δ {'; '.join(parts)}", verdict=verdict)
+    return Outcome(note=f"Δ by {REMAINING}: {', '.join(cells)}", verdict=verdict)
 
 
 def _as_gravish(table: pd.DataFrame) -> Outcome:
@@ -297,54 +280,14 @@ _HISTORIES = Histories(
     panel=r"$l/w$ = {:g}",
     level=1 / math.e,
     x_label="time since the vibration began [s]",
-    y_label=r"height remaining $h/h_0$ [-]",
+    quantities={"": r"height remaining $h/h_0$ [-]"},
     told=["Level: 1/e, which a stretched exponential to 0 crosses at τ whatever its exponent."],
 )
 
 
-def _draw_open(axes: Any, x: pd.Series, least: pd.Series, look: Mapping[str, Any]) -> None:
-    """Draw lower bounds: open markers with an arrow upwards."""
-    draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={"markersize": 3.4, **look, "markerfacecolor": "white"})
-
-
-def _draw_law(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw ln(fτ) against 1/Γ, with the law's line for each l/w that has a Δ."""
-    figure, axes = style.new_figure(height=2.9)
-    levels, deltas = (table[table[DEFINITION] == REMAINING] for table in (analysis.tables["times"], analysis.points))
-    end = 1.12 / levels[GAMMA].min()
-    slopes = deltas.set_index(ASPECT)[ACTIVATION]
-    for series in one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(levels):
-        part, look = series.rows, {**series.look, "linestyle": "none"}
-        seen = part[part[CENSORED] == 0]
-        draw_means(axes, 1 / seen[GAMMA], seen[LOG], seen[marked(LOG, "95 %")], look=look, label=series.label)
-        _draw_open(axes, 1 / part[GAMMA], part[LOG].where(part[CENSORED] > 0), look)
-        axes.plot([0, end], [0, slopes[part[ASPECT].iloc[0]] * end], color=look["color"], linewidth=0.7)
-    axes.set_xlim(0, end)
-    axes.set_ylim(0, None)
-    axes.set_xlabel(r"inverse peak acceleration $1/\Gamma$ [-]")
-    axes.set_ylabel(r"collapse time $\ln(f\tau)$ [-]")
-    axes.legend(loc="upper left")
-    told = "By the height `remaining`. Lines: τ = (1/f) exp(Δ/Γ). Open, with an arrow: a run did not collapse, a bound."
-    return finished(figure, path, [told], analysis.footer)
-
-
-def _draw_activations(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw Δ against l/w by each definition, on Gravish's points."""
-    figure, axes = style.new_figure(height=2.9)
-    gravish = read_gravish()
-    axes.plot(gravish["l_over_w"], gravish["delta"], "D", color=style.BLACK, markerfacecolor="white", label="Gravish")
-    looks = {REMAINING: ("o", style.BLUE), COM: ("s", style.ORANGE), CORE: ("^", style.SKY)}
-    for number, (name, (shape, colour)) in enumerate(looks.items()):
-        part = analysis.points[analysis.points[DEFINITION] == name]
-        x, look = part[ASPECT] + 0.012 * (number - 1), marker(shape, colour, colour)
-        draw_means(axes, x, part[ACTIVATION], part[marked(ACTIVATION, "95 %")], look=look, label=name)
-        _draw_open(axes, x, part[AT_LEAST].where(part[ACTIVATION].isna()), look)
-    axes.set_ylim(0, None)
-    axes.set_xlabel(ASPECT_LABEL)
-    axes.set_ylabel(r"activation $\Delta$ [-]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    told = "Open, with an arrow: no acceleration at which all runs collapsed, a bound."
-    return finished(figure, path, [told, f"{STUDY.reference.statement}."], analysis.footer)
+def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
+    own = table[table[DEFINITION] == REMAINING]
+    return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
 
 
 STUDY = Study(
@@ -352,14 +295,35 @@ STUDY = Study(
     title="Collapse of columns against the findings of Gravish et al.",
     measure=measure,
     keys=KEYS,
-    quantities=(
-        Quantity(column=ACTIVATION, label="Δ", form=".2f", meaning="slope of ln(fτ) against 1/Γ through the origin"),
-    ),
+    quantities=(DELTA_OF_POINT,),
     findings=FINDINGS,
     figures=(
         _HISTORIES,
-        Drawing(name="time_acceleration", of=_draw_law),
-        Drawing(name="delta_aspect", of=_draw_activations),
+        Means(
+            name="time_acceleration",
+            table="times",
+            quantities=[Quantity(column=LOG, axis=r"collapse time $\ln(f\tau)$ [-]")],
+            x=GAMMA,
+            transform=lambda gamma: 1 / gamma,
+            x_label=r"inverse peak acceleration $1/\Gamma$ [-]",
+            rows=_with_bounds,
+            bounds={LOG: AT_LEAST},
+            split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
+            told=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
+        ),
+        Means(
+            name="delta_aspect",
+            quantities=[DELTA_OF_POINT],
+            x=ASPECT,
+            x_label=ASPECT_LABEL,
+            split=one_by_one(DEFINITION, str),
+            bounds={ACTIVATION: AT_LEAST},
+            reference={ACTIVATION: (_GRAVISH["l_over_w"], _GRAVISH["delta"])},
+            told=[
+                "Open, with an arrow: no acceleration at which all runs collapsed, a bound.",
+                "Experiment: Gravish et al., PRL 108, 208001 (2012), digitised.",
+            ],
+        ),
     ),
     extra=lambda runs: {"times": times(runs), "points": activations(runs)},
     order=(ASPECT, GAMMA, SEED),

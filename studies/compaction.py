@@ -11,27 +11,30 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Analysis, Drawing
+from studies.framework.figures import Histories, one_by_one
 from studies.framework.findings import Effect, Finding
-from studies.framework.plots import BAND, finished
-from studies.framework.provenance import GRAVISH, SHAKE_TIME
-from studies.framework.quantities import Key, Quantity
 from studies.framework.runs import Row
-from studies.framework.shaken import FRICTION, common_friction, packing_history, timed_row, while_shaken
+from studies.framework.shaken import (
+    FRICTION,
+    GRAVISH,
+    SHAKE_TIME,
+    common_friction,
+    packing_history,
+    timed_row,
+    while_shaken,
+)
 from studies.framework.study import Study
+from studies.framework.tables import Key, Quantity
 
 Array = NDArray[np.float64]
 
@@ -156,14 +159,6 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
     return Finding(id=name, says=says, outcome=outcome, found_if="mean over runs > 0")
 
 
-def _residuals(runs: pd.DataFrame) -> pd.Series:
-    return -100 * np.log(runs[of(STRETCHED, RESIDUAL)] / runs[of(LOGARITHMIC, RESIDUAL)])
-
-
-def _misses(runs: pd.DataFrame) -> pd.Series:
-    return 1e3 * (runs[of(LOGARITHMIC, MISSED)].abs() - runs[of(STRETCHED, MISSED)].abs())
-
-
 FINDINGS = (
     positive(
         "still-grows",
@@ -180,54 +175,16 @@ FINDINGS = (
     positive(
         "stretched-leaves-less",
         "A stretched exponential leaves less than an inverse logarithm",
-        _residuals,
+        lambda runs: -100 * np.log(runs[of(STRETCHED, RESIDUAL)] / runs[of(LOGARITHMIC, RESIDUAL)]),
         "ln of the ratio of what they leave {} %",
     ),
     positive(
         "stretched-predicts",
         f"It tells the end better, fitted to the first {100 * EARLY:g} % of the time",
-        _misses,
+        lambda runs: 1e3 * (runs[of(LOGARITHMIC, MISSED)].abs() - runs[of(STRETCHED, MISSED)].abs()),
         "nearer by {}e-3",
     ),
 )
-
-
-def _draw(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw φ against time with both laws, and what these leave."""
-    figure = style.blank_figure(6.4, 2.9)
-    left, right = figure.subplots(1, 2)
-    lines = {STRETCHED: "solid", LOGARITHMIC: (0, (4, 2))}
-    colours = (style.BLUE, style.ORANGE, style.GREEN)
-    for (friction, runs), colour in zip(analysis.runs.groupby(FRICTION), colours, strict=False):
-        piles = []
-        for name in runs["run"]:
-            try:
-                shaken = while_shaken(analysis.manifests[name])
-            except (InputError, KeyError):
-                continue
-            piles.append(spread_out(shaken.times, shaken.values))
-        if not piles:
-            continue
-        times, values = piles[0][0], np.stack([packing for _, packing in piles])
-        mean = values.mean(axis=0)
-        left.fill_between(times, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0)
-        left.plot(times, mean, "o", color=colour, markersize=2.2, label=rf"$\mu = {friction:g}$")
-        for law, line in lines.items():
-            found = fit(law, times, mean).at(times)
-            left.plot(times, found, color=colour, linestyle=line, linewidth=0.9, label=f"{law}, {friction:g}")
-            right.plot(times, 1e3 * (mean - found), color=colour, linestyle=line, linewidth=0.9)
-    if not left.lines:
-        return []
-    left.axvline(SHAKE_TIME, color=style.GREY, linewidth=0.6, linestyle=":")
-    right.axhline(0.0, color=style.GREY, linewidth=0.6)
-    left.set_ylabel(r"packing fraction $\phi$ [-]")
-    right.set_ylabel(r"$\phi$ less the law [$10^{-3}$]")
-    for axes in (left, right):
-        axes.set_xscale("log")
-        axes.set_xlabel("time since shaking began [s]")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    told = f"Points: mean over seeds, {BAND}; lines: laws fitted to it; dotted: Gravish's {SHAKE_TIME:g} s."
-    return finished(figure, path, [told], analysis.footer)
 
 
 STUDY = Study(
@@ -243,7 +200,16 @@ STUDY = Study(
         *(Quantity(column=of(law, name), meaning=f"{law}: {_MEANINGS[name]}") for law in LAWS for name in _MEANINGS),
     ),
     findings=FINDINGS,
-    figures=(Drawing(name="phi_time", of=_draw),),
+    figures=(
+        Histories(
+            name="phi_time",
+            history=while_shaken,
+            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
+            log=True,
+            x_label="time since shaking began [s]",
+            quantities={"": r"packing fraction $\phi$ [-]"},
+        ),
+    ),
     order=(ASPECT, FRICTION, SEED),
     one_engine=True,
     remarks=(

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import pandas as pd
 
@@ -20,19 +19,27 @@ from dem.record.run import Run
 from postprocess.measures import strain
 from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
-from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import mean_columns
 from postprocess.statistics.seeds import difference, mean_over_seeds
-from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
-from studies.framework.figures import Analysis, Drawing
+from studies.framework.figures import Means, Rows, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, within
-from studies.framework.plots import draw_means, finished, marker
-from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
+from studies.framework.procedures import (
+    CROSSINGS,
+    ENERGY,
+    EXTERNAL,
+    HEIGHT,
+    INTERNAL,
+    PHI,
+    PHI_ACTIVE,
+    SHAPE,
+    STATIC,
+    procedure_row,
+)
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import ENGINE, Row
+from studies.framework.runs import Row, last_columns, run_columns
 from studies.framework.study import Study
+from studies.framework.tables import ENGINE, Key, Quantity, declare
 
 CASE, VARIANT, PITCH = "case", "variant", "pitch [-]"
 LINKS, YADE = "links", "yade"
@@ -41,21 +48,19 @@ ACTIVE = (EXTERNAL, SHAPE, INTERNAL)
 
 PHI_0, CROSSINGS_0 = f"{STATIC} {PHI}", f"{STATIC} {CROSSINGS}"
 PEAK, TAU, FORCE = "peak force over n W_s [-]", "tau [s]", "peak force [N]"
-QUANTITIES = (
-    Quantity(column=PHI_0, label="φ_0", meaning="packing fraction at rest after the pour"),
-    Quantity(column=CROSSINGS_0, label="⟨N⟩_0", meaning="⟨N⟩ at rest after the pour"),
-    Quantity(column=PHI_ACTIVE, label="φ_f", meaning="packing fraction at the end of the activity, in motion"),
-    Quantity(column=PHI, meaning="packing fraction at rest after the activity"),
-    Quantity(column=CROSSINGS, label="⟨N⟩", meaning="⟨N⟩ at rest after the activity"),
-    Quantity(column=HEIGHT, label="h/h0", meaning="height of the centre of mass after the activity, over that before"),
-    Quantity(column=ENERGY, meaning="work of the motors, or of the shaken container, on the smarticles"),
-    Quantity(column=PEAK, label="hook", meaning="largest force that raises the hook, over the weight of all"),
-    Quantity(
-        column=TAU,
-        label="τ [s]",
-        meaning="time in which a free column on a shaking floor collapses, by those that remain; empty where it stood",
-    ),
-    Quantity(column=FORCE, label="chain [N]", meaning="largest force of the string that pulls the chain"),
+QUANTITIES = declare(
+    {
+        PHI_0: ("φ_0", "", "packing fraction at rest after the pour"),
+        CROSSINGS_0: ("⟨N⟩_0", "", "⟨N⟩ at rest after the pour"),
+        PHI_ACTIVE: ("φ_f", "", "packing fraction at the end of the activity, in motion"),
+        PHI: ("", "", "packing fraction at rest after the activity"),
+        CROSSINGS: ("⟨N⟩", "", "⟨N⟩ at rest after the activity"),
+        HEIGHT: ("h/h0", "", "height of the centre of mass after the activity, over that before"),
+        ENERGY: ("", "", "work of the motors, or of the shaken container, on the smarticles"),
+        PEAK: ("hook", "", "largest force that raises the hook, over the weight of all"),
+        TAU: ("τ [s]", "", "time in which a free column on a shaking floor collapses; empty where it stood"),
+        FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
+    }
 )
 """What is measured; a case leaves empty what it does not have."""
 
@@ -141,16 +146,12 @@ def measure(run: Run) -> Row:
         CASE: case,
         VARIANT: variant,
         ENGINE: run.manifest.engine,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-        **dict.fromkeys((one.column for one in QUANTITIES), math.nan),
+        **run_columns(run),
+        **dict.fromkeys(QUANTITIES, math.nan),
         **_measured(run, case),
         "processor time [s]": sum(phase.cpu_s or math.nan for phase in run.phases),
         "simulated [s]": run.status.time_s,
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -263,52 +264,6 @@ def _finding(one: Compared) -> Finding:
     )
 
 
-def _draw_differences(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw a row per quantity: the difference with its error over the band of its margin."""
-    table = analysis.tables["equivalence"]
-    shown = table[table["pairs [-]"] > 0] if len(table) else table
-    colours = {"equivalent": style.GREEN, "different": style.ORANGE}
-    figure, axes = style.new_figure(height=0.8 + 0.19 * len(shown))
-    for place, (_, row) in enumerate(shown.iterrows()):
-        margin, colour = row["margin [%]"], colours.get(row["verdict"], style.GREY)
-        axes.barh(place, 2 * margin, left=-margin, height=0.62, color=style.SKY, alpha=0.3, linewidth=0)
-        look = {**marker("o", colour, colour), "linestyle": "none"}
-        across = [row["difference 95 % [%]"]]
-        draw_means(axes, [row["difference [%]"]], [place], None, across=across, look=look, label="_nolegend_")
-    for verdict in shown["verdict"].unique() if len(shown) else ():
-        axes.plot([], [], "o", color=colours.get(verdict, style.GREY), markersize=3.4, label=verdict)
-    axes.axvline(0.0, color=style.BLACK, linewidth=0.6)
-    axes.set_yticks(range(len(shown)), shown["quantity"] if len(shown) else [])
-    axes.set_ylim(len(shown) - 0.4, -0.6)
-    axes.set_xlabel("links less YADE over YADE [%]")
-    if len(shown):
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    return finished(figure, path, ["Bands: margins, chosen beforehand."], analysis.footer)
-
-
-def _draw_pitch(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw means against pitch over those of links, which stand at 0."""
-    figure, axes = style.new_figure(height=2.6)
-    table = analysis.tables["pitch"]
-    colours = style.sequence(len(REFINED), last=0.85)
-    for place, (one, shape, colour) in enumerate(zip(REFINED, "oDs^v", colours, strict=True)):
-        part = table[(table["quantity"] == one.label) & table["mean [-]"].notna()] if len(table) else table
-        if part.empty or not (part[PITCH] == 0).any():
-            continue
-        part = part.sort_values(PITCH)
-        limit = float(part["mean [-]"].iloc[0])
-        x, values, errors = part[PITCH] + 0.012 * (place - 2), part["mean [-]"] / limit, part["mean 95 % [-]"] / limit
-        draw_means(axes, x, values, errors.to_numpy(), look=marker(shape, colour, colour), label=one.label)
-    axes.axhline(1.0, color=style.GREY, linewidth=0.6)
-    axes.set_xlabel("pitch over sphere diameter; links at 0 [-]")
-    axes.set_ylabel("mean over that of links [-]")
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    return finished(
-        figure, path, ["Set apart sideways; the error bar of links' own mean stands at 0."], analysis.footer
-    )
-
-
 STUDY: Study = Study(
     name="engines",
     title="Two engines, the same seeds",
@@ -317,9 +272,27 @@ STUDY: Study = Study(
         Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)),
         Key(column=VARIANT, label="variant"),
     ),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=tuple(map(_finding, COMPARED)),
-    figures=(Drawing(name="differences", of=_draw_differences), Drawing(name="pitch", of=_draw_pitch)),
+    figures=(
+        Rows(
+            name="differences",
+            table="equivalence",
+            quantities=[Quantity(column="difference [%]", axis="links less YADE over YADE [%]")],
+            row="quantity",
+            rows=lambda table: table[table["pairs [-]"] > 0],
+            margin="margin [%]",
+            told=["Bands: margins, chosen beforehand."],
+        ),
+        Means(
+            name="pitch",
+            table="pitch",
+            quantities=[Quantity(column="less links [%]", axis="less that of links, over it [%]")],
+            x=PITCH,
+            x_label="pitch over sphere diameter [-]",
+            split=one_by_one("quantity", str),
+        ),
+    ),
     extra=lambda runs: {
         "points": STUDY.points(runs),
         "equivalence": equivalence(runs),

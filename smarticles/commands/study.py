@@ -136,7 +136,7 @@ def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study]) ->
     if not study.from_tables:
         msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
         raise InputError(msg)
-    from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
+    from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     wanted = {
         entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries

@@ -33,8 +33,9 @@ from studies.accuracy import (
     work_precision,
 )
 from studies.framework.findings import Outcome
-from studies.framework.runs import ENGINE
-from studies.framework.study import Report, read_runs
+from studies.framework.runs import read_runs
+from studies.framework.study import Report
+from studies.framework.tables import ENGINE
 from studies.ladder import Rung
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"

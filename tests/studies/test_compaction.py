@@ -26,7 +26,7 @@ from studies.compaction import (
     of,
     spread_out,
 )
-from studies.framework.plots import History
+from studies.framework.figures import History
 
 TRUE = {law: Fit(law=law, begin=0.11, end=0.17, tau=4.0, power=0.5, residual=0.0) for law in LAWS}
 

@@ -35,8 +35,7 @@ from studies.contacts import (
     points,
     risen,
 )
-from studies.framework.provenance import read_reference, reference_at
-from studies.framework.shaken import FRICTION
+from studies.framework.shaken import FRICTION, gravish_at
 
 RATIOS = (0.4, 0.7, 1.0)
 NOISE = 0.003
@@ -67,8 +66,7 @@ def verdicts(runs: pd.DataFrame) -> dict[str, str]:
 
 
 def gravish(runs: pd.DataFrame) -> pd.Series:
-    reference = read_reference()
-    return runs[ASPECT].map({ratio: reference_at(reference, ratio, "phi_f") for ratio in RATIOS})
+    return runs[ASPECT].map({ratio: gravish_at(ratio, "phi_f") for ratio in RATIOS})
 
 
 def test_effects_are_those_put_in_and_what_a_seed_shares_is_no_scatter() -> None:
@@ -119,7 +117,7 @@ def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     assert by_seed(runs[runs[FRICTION] == 0.4], PHI_F, FRICTION).empty
     row = points(runs).iloc[0]
     own = row[PHI_F.replace(" [", " 95 % [")]
-    known = float(reference_at(read_reference(), row[ASPECT], "phi_f"))
+    known = gravish_at(row[ASPECT], "phi_f")
     assert row[DEVIATION.replace(" [", " 95 % [")] == pytest.approx(100 * np.hypot(own, 0.003) / known)
 
 

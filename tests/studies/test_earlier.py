@@ -12,8 +12,7 @@ from synthetic import write_run
 from dem.errors import InputError
 from dem.scene.reading import dump_scene
 from smarticles.main import main
-from studies.framework.earlier import Wanted, earlier_runs
-from studies.framework.runs import MeasuredRun, collect_runs
+from studies.framework.runs import MeasuredRun, Wanted, collect_runs, earlier_runs
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep

@@ -17,17 +17,17 @@ from matplotlib.figure import Figure
 import studies
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
-from studies.framework.plots import draw_bounds, draw_means, finished, marker
-from studies.framework.provenance import told_gaps, told_reference
-from studies.framework.runs import BARS, told_numbers
+from studies.framework.figures import BARS, POOLED, draw_bounds, draw_means, finish, marker
+from studies.framework.shaken import gravish_note
+from studies.framework.study import format_numbers
 
 LOOK = {**marker("o", figures.BLUE, "white"), "linestyle": "none"}
 ORIGIN = ("Study toy: 2 of 2 runs.", "More: toy.md.")
 
 
-def finish(figure: Figure, tmp_path: Path, *, told: Sequence[str] = (), pooled: bool = False) -> str:
-    """What stands below a figure."""
-    finished(figure, tmp_path / "figure", told, ORIGIN, pooled=pooled)
+def footer(figure: Figure, tmp_path: Path, *, told: Sequence[str] = (), bars: str = BARS) -> str:
+    """Finish a figure and return what stands below it."""
+    finish(figure, tmp_path / "figure", told, ORIGIN, bars=bars)
     return figure.texts[-1].get_text().replace("\n", " ")
 
 
@@ -42,29 +42,29 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [0.1, np.nan])
     points(axes, [1.5, 2.5], [0.1, 0.1])
-    assert finish(figure, tmp_path, told=["Told."]) == f"Told. {BARS}. {' '.join(ORIGIN)}"
+    assert footer(figure, tmp_path, told=["Told."]) == f"Told. {BARS}. {' '.join(ORIGIN)}"
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, look=LOOK)
-    assert finish(figure, tmp_path) == " ".join(ORIGIN)
+    assert footer(figure, tmp_path) == " ".join(ORIGIN)
 
 
 def test_scatter_that_points_share_is_told(tmp_path: Path) -> None:
     figure, axes = figures.new_figure()
     points(axes, [1.0], [0.1])
-    assert f"{BARS}, scatter pooled over all points. " in finish(figure, tmp_path, pooled=True)
+    assert f"{BARS}, scatter pooled over all points. " in footer(figure, tmp_path, bars=POOLED)
 
 
 def test_error_bars_may_lie_across(tmp_path: Path) -> None:
     figure, axes = figures.new_figure()
     draw_means(axes, [3.0], [0], None, across=[0.5], look=LOOK, label="one")
-    assert BARS in finish(figure, tmp_path)
+    assert BARS in footer(figure, tmp_path)
     (bars,) = axes.containers
     assert np.concatenate(bars.lines[2][0].get_segments())[:, 0].tolist() == [2.5, 3.5]
 
 
 def test_no_study_draws_error_bars_by_itself() -> None:
-    """So that all are of one kind: `framework.plots` draws those of 95 %, and names them."""
+    """So that all are of one kind: `framework.figures` draws those of 95 %, and names them."""
     own = []
     for path in Path(studies.__file__).parent.rglob("*.py"):
         called = {
@@ -74,7 +74,7 @@ def test_no_study_draws_error_bars_by_itself() -> None:
         }
         if called & {"errorbar", "savefig", "add_footer"}:
             own.append("/".join(path.parts[-2:]))
-    assert own == ["framework/plots.py"]
+    assert own == ["framework/figures.py"]
 
 
 # -- limits ----------------------------------------------------------------------------------------------------------
@@ -86,7 +86,7 @@ def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:
     axes.fill_between([0, 1], [0.4, 0.5], [0.6, 1.4], alpha=0.2)
     axes.set_xlim(left=0.5)
     axes.set_ylim(0, 1)
-    assert "cut" not in finish(figure, tmp_path)
+    assert "cut" not in footer(figure, tmp_path)
     assert axes.get_ylim()[0] < -0.2
     assert axes.get_ylim()[1] > 1.4
     assert axes.get_xlim()[0] < 0
@@ -122,7 +122,7 @@ def test_what_a_logarithmic_axis_cannot_show_is_told(
     points(axes, [1.0, 1.5, 2.0], half_widths)
     axes.set_yscale("log")
     axes.set_ylim(1.4, 1.6)
-    said = finish(figure, tmp_path)
+    said = footer(figure, tmp_path)
     assert (told in said) if told else "cut" not in said
     assert axes.get_ylim()[1] > 2 + half_widths[2]
 
@@ -165,12 +165,10 @@ def figures_module_footer(figure: Figure, lines: Sequence[str]) -> None:
 
 
 def test_references_tell_where_they_have_no_point() -> None:
-    assert told_gaps({"φ_0": [0.5, 0.8], "φ_f": []}) == "no φ_0 at l/w = 0.5, 0.8"
-    assert told_gaps({"φ_0": [0.55], "φ_f": [0.55]}) == "no φ_0 at l/w = 0.55; no φ_f at l/w = 0.55"
-    assert told_reference([0.4, 0.7], ("phi_0", "phi_f")).endswith("at every l/w shown.")
-    assert told_reference([0.4, 0.5, 0.85], ("phi_f",)).endswith("no φ_f at l/w = 0.85.")
+    assert gravish_note([0.4, 0.7]).endswith("at every l/w shown.")
+    assert gravish_note([0.4, 0.5, 0.55]).endswith("no φ_0 at l/w = 0.5, 0.55; no φ_f at l/w = 0.55.")
 
 
 def test_seeds_that_follow_each_other_are_told_as_a_range() -> None:
-    assert told_numbers([3, 1, 2, 2]) == "1 2 3"
-    assert told_numbers([*range(1, 21), 30]) == "1 to 20 30"
+    assert format_numbers([3, 1, 2, 2]) == "1 2 3"
+    assert format_numbers([*range(1, 21), 30]) == "1 to 20 30"

@@ -14,8 +14,7 @@ from synthetic import SyntheticRun, write_run
 
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.seeds import Scatter
-from studies.framework.provenance import DIGITISING_ERROR
-from studies.framework.shaken import FRICTION, phi
+from studies.framework.shaken import DIGITISING_ERROR, FRICTION, phi
 from studies.friction import GROWTHS, STUDY, Curve
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study friction --out friction"}

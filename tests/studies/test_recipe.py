@@ -17,7 +17,8 @@ from dem.errors import InputError
 from postprocess.report import figures
 from studies.claims.verdicts import claims
 from studies.framework.figures import Analysis
-from studies.framework.study import Study, read_runs
+from studies.framework.runs import read_runs
+from studies.framework.study import Study
 from studies.registry import STUDIES, Script
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep

@@ -119,7 +119,7 @@ class World:
         self.pairs: Pairs = pairs_for(0, self.kinds, 256)
         self.cells: Cells = cells_for(0, 0, 256)
         self.kept = no_contacts(0, END_SLOTS)
-        self.ledger: Array | None = np.zeros((256, LEDGER)) if self.ledger else None
+        self.ledger: Array | None = np.zeros((256, LEDGER)) if self.keep_ledger else None
         self.meeting, self.plane = np.zeros((meeting.ROWS, meeting.COLUMNS)), np.zeros(PLANE)
         diameter = 2 * self.shape.radius
         self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])
