@@ -202,7 +202,9 @@ class Means:
                 if column in self.bounds:
                     least = scale * series.rows[self.bounds[column]].where(series.rows[column].isna())
                     draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={**look, "markerfacecolor": "white"})
-        axes.set_ylabel(quantity.axis or column)
+        place = axes.get_subplotspec()
+        if not self.share_y or place is None or place.is_first_col():
+            axes.set_ylabel(quantity.axis or column)
         axes.set_xlabel(self.x_label)
         if self.ticks:
             places = self.transform(np.unique(table[self.x].dropna()))
@@ -251,7 +253,7 @@ class Rows:
         own = table[self.row] if isinstance(self.row, str) else table.apply(self.row, axis=1)
         names = {name: place for place, name in enumerate(own.unique())}
         places = own.map(names)
-        height = 0.6 + 0.2 * max(len(names), 3)
+        height = max(0.6 + 0.2 * len(names), 2.2)
         figure, grid = panels(len(self.quantities), columns=self.columns, height=height, width=_PAGE, sharey=True)
         for axes, quantity in zip(grid, self.quantities, strict=True):
             column, split = quantity.column, self.split(table)

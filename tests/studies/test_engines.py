@@ -103,7 +103,7 @@ def verdict_of(rng: np.random.Generator, apart: float, scatter: float, seeds: in
     rows = []
     for variant, factor in (("links", 1 + apart), ("yade", 1.0)):
         for seed in range(seeds):
-            row = {one.column: math.nan for one in QUANTITIES} | {CASE: "chain", VARIANT: variant, SEED: seed}
+            row = {name: math.nan for name in QUANTITIES} | {CASE: "chain", VARIANT: variant, SEED: seed}
             rows.append(row | {FORCE: factor * (1 + scatter * rng.standard_normal())})
     return str(equivalence(pd.DataFrame(rows))["verdict"].iloc[0])
 

@@ -52,7 +52,7 @@ def table(
 ) -> pd.DataFrame:
     """A row per run: laws at l/w = 0.7, and about the threshold piles that span by a logistic function."""
     random = np.random.default_rng(3)
-    names = [one.column for one in QUANTITIES]
+    names = list(QUANTITIES)
     noise = 0.03 * random.normal(size=(len(names), len(COUNTS))) * COUNTS**-0.5
     laws = dict(zip(names, 0.15 + slope * COUNTS**-power + noise, strict=True))
     rows: list[dict[str, Any]] = []

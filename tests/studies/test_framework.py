@@ -96,10 +96,10 @@ def test_every_output_names_its_origin(runs: list[Path], tmp_path: Path) -> None
     assert first.startswith(
         "Study toy, fidelity draft: 2 of 7 runs, 5 missing; l/w 0.7, 12 smarticles, seeds 1 2 (2 per"
     )
-    assert report.footer[-2:] == (
+    assert report.footer[-2:] == [
         "Note: only 2 of 7 runs of what is planned: the full study as shipped",
         "Versions: smarticles 0.1.0; git 0e4b151; yade 2023.02a. Command: smarticles study toy --out 'my toy'",
-    )
+    ]
     for name in ("runs.csv", "points.csv", "missing.csv", "findings.md"):
         assert all(line in report.files[name].read_text() for line in report.footer)
     origin = json.loads(report.files["provenance.json"].read_text())
