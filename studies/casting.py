@@ -127,12 +127,7 @@ def _pour_fills(runs: pd.DataFrame) -> Outcome:
 
 
 FINDINGS = (
-    Finding(
-        id="pour-fills",
-        says="The mould is filled by pouring (shown in a picture)",
-        outcome=_pour_fills,
-        found_if=f"more than {FULL:g} of each tier is inside the pile as poured",
-    ),
+    Finding(id="pour-fills", says="The mould is filled by pouring (shown in a picture)", outcome=_pour_fills),
     # A pile that packs denser sinks, and leaves the upper tier; the lower one is where it has enough to fill with.
     above(
         "internal-fills",

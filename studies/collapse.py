@@ -240,7 +240,6 @@ FINDINGS = (
     Finding(
         id="gentler-is-later",
         says="Columns collapse the later the gentler the vibration",
-        found_if="slope of ln(fτ) against 1/Γ > 0, within runs of the same l/w and seed",
         outcome=lambda runs: _by_definition(runs, "slope of ln(fτ) against 1/Γ", rise),
     ),
     Finding(

@@ -156,7 +156,7 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
         text = told.format(told_number(mean.value, "+.2f", mean.half_width))
         return [Effect(label="mean over runs, ± 95 %:", value=mean, text=f"{text} (n = {mean.count})")]
 
-    return Finding(id=name, says=says, outcome=outcome, found_if="mean over runs > 0")
+    return Finding(id=name, says=says, outcome=outcome)
 
 
 FINDINGS = (

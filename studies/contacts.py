@@ -41,11 +41,7 @@ WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
 FACTORS: dict[str, tuple[float, float]] = {FRICTION: (0.4, 0.8), WALL: (0.4, 0.8), RESTITUTION: (0.7, 0.3)}
 """From the paper's values to others."""
 
-CALLED = {
-    FRICTION: "friction between smarticles",
-    WALL: "friction at the container",
-    RESTITUTION: "restitution",
-}
+CALLED = {FRICTION: "friction between smarticles", WALL: "friction at the container", RESTITUTION: "restitution"}
 RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
 PHI_0, PHI_F, PHI_RELAXED = (phi(stage) for stage in ("phi_0", "phi_f", "phi_f relaxed"))
 QUANTITIES = declare(
@@ -148,8 +144,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
         effect = Effect(label="effect, ± 95 %,", value=means[""], sign=sign, text=text)
         return Outcome(effects=[effect], note="by l/w " + ", ".join(f"{one:g}: {text}" for one, text in texts.items()))
 
-    found_if = f"mean of paired differences {'<' if sign < 0 else '>'} 0"
-    return Finding(id=name, says=says, outcome=outcome, found_if=found_if)
+    return Finding(id=name, says=says, outcome=outcome)
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:

@@ -75,7 +75,6 @@ def effect(quantity: str, factor: str) -> Finding:
         id=f"{quantity.split(maxsplit=1)[0]}-{name}",
         says=f"(ours) {symbol} after a shape change is {'raised' if sign > 0 else 'lowered'} by {text}",
         outcome=outcome,
-        found_if=f"mean of paired differences {'>' if sign > 0 else '<'} 0",
     )
 
 

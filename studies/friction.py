@@ -414,7 +414,7 @@ def _grows_more(grown: pd.DataFrame) -> list[Effect]:
 
 
 def _growing(name: str, says: str, outcome: Callable[[pd.DataFrame], list[Effect]]) -> Finding:
-    return Finding(id=name, says=says, outcome=outcome, tables=("growth",), found_if="beyond the scatter over points")
+    return Finding(id=name, says=says, outcome=outcome, tables=("growth",))
 
 
 _LATE = f"between {TIMES[-2]:g} and {TIMES[-1]:g} s"

@@ -271,7 +271,6 @@ def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, F
             says=f"{says}the energy has a local maximum at l/w = {PEAK:g}{how}",
             outcome=partial(_local_maximum, quantity=quantity),
             rows=part,
-            found_if="above that at either neighbouring l/w, seed by seed, mean over seeds",
         ),
     )
 
@@ -287,7 +286,6 @@ PACKING = (
         says="External oscillation: φ changes with l/w faster than linearly",
         outcome=_bend,
         rows=only(EXTERNAL, PHI_ACTIVE),
-        found_if="φ_f against l/w is convex: bend > 0, that is a fall that is steeper at small l/w",
     ),
     mean(
         "shaken-compacts",
@@ -353,7 +351,6 @@ PACKING = (
         id="largest-theta-gains-little",
         says="Internal oscillation: the largest amplitude packs only marginally denser than static",
         outcome=_largest_gains_little,
-        found_if=f"below {MARGINAL:g}, within runs of the same l/w and seed",
     ),
     above(
         "internal-densest",
@@ -383,14 +380,11 @@ ENERGIES = (
         id="shape-change-costs-ten-times",
         says="Shape change costs more than 10 times the energy of internal oscillation",
         outcome=_shape_change_costs,
-        found_if=f"geometric mean of the ratio > {FACTOR:g}, paired by l/w and seed, θ = {AMPLITUDE:g}°",
     ),
     Finding(
         id="shape-change-costs-ten-times-sampled",
         says=f"Shape change costs more than 10 times the energy of internal oscillation{BY_SAMPLES}",
         outcome=_costs_by_samples,
-        found_if="the mean of the difference > 0, paired by l/w and seed; no ratio, since a sum over samples can be "
-        "zero or negative",
     ),
     above(
         "internal-costs-least",
@@ -409,18 +403,12 @@ ENERGIES = (
         id="internal-costs-a-little-less",
         says="External and internal oscillation need similar energies, internal slightly less",
         outcome=_little_less,
-        found_if="geometric mean of the ratio between 1/2 and 1, paired by l/w and seed",
     ),
 )
 
 ENTANGLEMENT = (
     above(
-        "static-least-entangled",
-        "⟨N⟩ is lowest for static",
-        CROSSINGS,
-        STATIC,
-        (EXTERNAL, INTERNAL, SHAPE),
-        sign=-1,
+        "static-least-entangled", "⟨N⟩ is lowest for static", CROSSINGS, STATIC, (EXTERNAL, INTERNAL, SHAPE), sign=-1
     ),
     Finding(
         id="static-flat",
@@ -430,11 +418,7 @@ ENTANGLEMENT = (
         found_if=f"the straight line through all runs changes by less than {FLAT:.0%} of the mean, at 95 %",
     ),
     above(
-        "shape-change-most-entangled",
-        "⟨N⟩ is highest for shape change",
-        CROSSINGS,
-        SHAPE,
-        (STATIC, EXTERNAL, INTERNAL),
+        "shape-change-most-entangled", "⟨N⟩ is highest for shape change", CROSSINGS, SHAPE, (STATIC, EXTERNAL, INTERNAL)
     ),
     with_aspect("shape-change-rises", "⟨N⟩ of shape change rises with l/w", only(SHAPE), CROSSINGS),
     *(
@@ -461,7 +445,6 @@ ENTANGLEMENT = (
         id="crossings-peak-with-theta",
         says="Internal oscillation: ⟨N⟩ peaks at θ = 10° to 15° at larger l/w",
         outcome=_peaks_with_amplitude,
-        found_if="both differences > 0, within runs of the same l/w and seed, l/w > 0.5",
     ),
 )
 

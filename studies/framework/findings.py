@@ -114,7 +114,7 @@ class Finding:
     Attributes:
         id: Short name, unique in its study.
         says: The statement, as the paper has it or our own.
-        found_if: What makes it true.
+        found_if: What makes it true, where that is more than all effects beyond their thresholds.
         outcome: Effects of a table of runs or samples.
         rows: Applied to the table before.
         tables: Names of the study's tables that `outcome` takes instead, one argument each.
@@ -122,10 +122,10 @@ class Finding:
 
     id: str
     says: str
-    found_if: str
     outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
     rows: Rows = field(default=lambda table: table, repr=False)
     tables: Sequence[str] = ()
+    found_if: str = ""
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
         """Judge the finding by a table of samples, or by the study's tables that it names."""
@@ -136,7 +136,10 @@ class Finding:
         if outcome.verdict is not None:
             verdict, more = outcome.verdict, math.nan if outcome.verdict != verdict else more
         ours = "; ".join(filter(None, [*map(str, outcome.effects), outcome.note])) or "no data"
-        return Judged(finding=self, ours=ours, verdict=verdict, more=more)
+        sides = [
+            f"{one.label} {'>' if one.sign > 0 else '<'} {one.threshold:.4g}" for one in outcome.effects if one.sign
+        ]
+        return Judged(finding=self, ours=ours, verdict=verdict, more=more, criterion=self.found_if or "; ".join(sides))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,12 +151,14 @@ class Judged:
         ours: Our numbers; errors are standard errors.
         verdict: The verdict.
         more: How many times as many runs would resolve it; NaN where that does not apply.
+        criterion: What makes the finding true.
     """
 
     finding: Finding
     ours: str
     verdict: Verdict
     more: float = math.nan
+    criterion: str = ""
 
     @property
     def needed(self) -> str:
@@ -195,7 +200,7 @@ def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
             "finding in the paper": one.finding.says,
             "ours": one.ours,
             "verdict": str(one.verdict),
-            "criterion": one.finding.found_if,
+            "criterion": one.criterion,
             "needed": one.needed,
             "id": one.finding.id,
         }
@@ -256,8 +261,6 @@ def above(
         note = "; ".join(f"{symbol(column)}: {means_by(table, column, PROCEDURE, '.3g')}" for column in shown)
         return Outcome(effects=effects, note=note)
 
-    sides = " and ".join(f"{symbol(name)} {'above' if way > 0 else 'below'}" for name, way in signs.items())
-    found_if = found_if or f"{sides} that of {' and of '.join(others)}, paired by l/w and seed"
     return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
 
 
@@ -283,9 +286,7 @@ def slope(
         unit = unit_of(quantity) + (f" per{unit_of(against)}" if unit_of(against) else "")
         return Outcome(effects=[Effect(label=label, value=value, sign=sign, unit=unit)], note=note)
 
-    found_if = f"slope of {label} {'>' if sign > 0 else '<'} 0"
-    found_if += f", within runs of equal {' and '.join(map(symbol, within))}" if within else ""
-    return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
+    return Finding(id=name, says=says, outcome=outcome, rows=rows)
 
 
 def mean(
@@ -310,8 +311,7 @@ def mean(
         note = "; ".join(f"{symbol(column)}: {means_by(table, column, by, '.3g')}" for column in shown)
         return Outcome(effects=[effect], note=note)
 
-    found_if = f"{label} {'>' if sign > 0 else '<'} {threshold:g}, mean over runs"
-    return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
+    return Finding(id=name, says=says, outcome=outcome, rows=rows)
 
 
 def ranks(

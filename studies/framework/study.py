@@ -250,7 +250,7 @@ class Study:
     def text(self, tables: Mapping[str, pd.DataFrame], judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
         """Make the lines of the Markdown file."""
         findings = [
-            [one.finding.says, one.ours, f"**{one.verdict}**{one.needed and f'; {one.needed}'}", one.finding.found_if]
+            [one.finding.says, one.ours, f"**{one.verdict}**{one.needed and f'; {one.needed}'}", one.criterion]
             for one in judged
         ]
         return [
