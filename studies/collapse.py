@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 
@@ -22,7 +22,6 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.measures.collapse import (
     COM,
-    CORE,
     HEIGHTS,
     LEAST_FALL,
     REMAINING,
@@ -170,9 +169,9 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
     return sort_rows(pd.DataFrame(found), [DEFINITION, ASPECT], KEYS)
 
 
-def _used(runs: pd.DataFrame, definition: str) -> pd.DataFrame:
-    """Rows of one definition at those l/w and Γ at which every run collapsed."""
-    own = runs[runs[DEFINITION] == definition]
+def _used(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the rows by `REMAINING` at those l/w and Γ at which every run collapsed."""
+    own = runs[runs[DEFINITION] == REMAINING]
     return own[own[TIME].notna().groupby([own[ASPECT], own[GAMMA]]).transform("all")]
 
 
@@ -190,20 +189,14 @@ def change(used: pd.DataFrame) -> Slope:
     return slope_within(list(used[GAMMA] / span), list(relative), list(zip(used[ASPECT], used[SEED], strict=True)))
 
 
-def _by_definition(runs: pd.DataFrame, label: str, effect: Callable[[pd.DataFrame], Slope]) -> list[Effect]:
-    """The effect by `REMAINING`, which is judged, and by the other definitions."""
-    return [
-        Effect(label=f"{label}{' by ' + name if name != REMAINING else ''}", value=effect(_used(runs, name)), sign=sign)
-        for name, sign in ((REMAINING, 1), (COM, 0), (CORE, 0))
-    ]
+def _gentler(runs: pd.DataFrame) -> list[Effect]:
+    return [Effect(label="slope of ln(fτ) against 1/Γ", value=rise(_used(runs)))]
 
 
 def _law(runs: pd.DataFrame) -> Outcome:
-    effects = _by_definition(runs, "Γ ln(fτ) from the least Γ to the greatest, over its mean", change)
-    first = effects[0].value
-    return Outcome(
-        effects=[replace(one, sign=0) for one in effects], verdict=within(first.value, first.half_width, CONSTANT)
-    )
+    found = change(_used(runs))
+    effect = Effect(label="Γ ln(fτ) from the least Γ to the greatest, over its mean", value=found, sign=0)
+    return Outcome(effects=[effect], verdict=within(found.value, found.half_width, CONSTANT))
 
 
 def _greatest_between(table: pd.DataFrame) -> Outcome:
@@ -240,7 +233,7 @@ FINDINGS = (
     Finding(
         id="gentler-is-later",
         says="Columns collapse the later the gentler the vibration",
-        outcome=lambda runs: _by_definition(runs, "slope of ln(fτ) against 1/Γ", rise),
+        outcome=_gentler,
     ),
     Finding(
         id="law",

@@ -17,7 +17,7 @@ from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.factorial import paired_differences
-from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
+from postprocess.statistics.points import marked, mean_columns, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
@@ -94,15 +94,11 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 
 def points(runs: pd.DataFrame) -> pd.DataFrame:
     """Average over seeds, and set φ_f against Gravish's, errors of both included."""
-    rows = []
-    for key, group in runs.groupby([*FACTORS, ASPECT], sort=True):
-        combination = dict(zip((*FACTORS, ASPECT), key, strict=True))
-        row = {**combination, **seeds_of(group), **averaged(group, QUANTITIES)}
-        value = gravish_at(float(combination[ASPECT]), "phi_f")
-        row[DEVIATION] = 100 * (row[PHI_F] / value - 1)
-        row[marked(DEVIATION, "95 %")] = 100 * math.hypot(row[marked(PHI_F, "95 %")], DIGITISING_ERROR) / value
-        rows.append(row)
-    return pd.DataFrame(rows)
+    means = STUDY.points(runs)
+    values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
+    error = np.hypot(means[marked(PHI_F, "95 %")], DIGITISING_ERROR)
+    changes = {DEVIATION: 100 * (means[PHI_F] / values - 1), marked(DEVIATION, "95 %"): 100 * error / values}
+    return means.assign(**changes)
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
@@ -214,7 +210,7 @@ FINDINGS = (
     ),
 )
 
-STUDY = Study(
+STUDY: Study = Study(
     name="contacts",
     title="Friction between smarticles, friction at the container, restitution",
     measure=measure,

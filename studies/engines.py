@@ -9,8 +9,8 @@ And YADE's chains of spheres ever finer: pitch 1.3, 1.0, 0.5, 0.25, links being 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -65,12 +65,10 @@ QUANTITIES = declare(
 """What is measured; a case leaves empty what it does not have."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Compared:
+class Compared(NamedTuple):
     """A quantity that both engines give.
 
     Attributes:
-        label: What it is called.
         cases: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once.
         column: Of the table of runs.
         margin: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run.
@@ -87,12 +85,14 @@ class Compared:
 _PHI_WHY = "half of the 10 % within which the study gravish calls φ near Gravish's"
 _CROSSINGS_WHY = "⟨N⟩ of procedures differ by tens of per cent; it is a count of few"
 _ENERGY_WHY = "the paper compares energies by factors, and the account closes within 1 %"
+_PEAK_WHY = "a largest value, which scatters by a third between seeds; the paper's procedures differ by factors"
+_TAU_WHY = "τ = exp(Δ/Γ)/f: at Γ = 2.5, 30 % of τ are 0.66 of Δ, 5 % of Gravish's 15"
 
 COMPARED: tuple[Compared, ...] = (
-    Compared(label="φ_0", cases=ACTIVE, column=PHI_0, margin=5.0, why=_PHI_WHY),
-    Compared(label="⟨N⟩ as poured", cases=ACTIVE, column=CROSSINGS_0, margin=10.0, why=_CROSSINGS_WHY),
+    Compared("φ_0", ACTIVE, PHI_0, 5.0, _PHI_WHY),
+    Compared("⟨N⟩ as poured", ACTIVE, CROSSINGS_0, 10.0, _CROSSINGS_WHY),
     *(
-        Compared(label=f"{label}, {case}", cases=(case,), column=column, margin=margin, why=why)
+        Compared(f"{label}, {case}", (case,), column, margin, why)
         for case in ACTIVE
         for label, column, margin, why in (
             ("φ_f in motion", PHI_ACTIVE, 5.0, _PHI_WHY),
@@ -102,27 +102,9 @@ COMPARED: tuple[Compared, ...] = (
             ("energy", ENERGY, 10.0, _ENERGY_WHY),
         )
     ),
-    Compared(
-        label="hook force",
-        cases=(HOOK,),
-        column=PEAK,
-        margin=20.0,
-        why="a largest value, which scatters by a third between seeds; the paper's procedures differ by factors",
-    ),
-    Compared(
-        label="collapse time",
-        cases=(COLLAPSE,),
-        column=TAU,
-        margin=30.0,
-        why="τ = exp(Δ/Γ)/f: at Γ = 2.5, 30 % of τ are 0.66 of Δ, 5 % of Gravish's 15",
-    ),
-    Compared(
-        label="chain force",
-        cases=(CHAIN,),
-        column=FORCE,
-        margin=10.0,
-        why="the servos of a chain differ from each other by 10 %",
-    ),
+    Compared("hook force", (HOOK,), PEAK, 20.0, _PEAK_WHY),
+    Compared("collapse time", (COLLAPSE,), TAU, 30.0, _TAU_WHY),
+    Compared("chain force", (CHAIN,), FORCE, 10.0, "the servos of a chain differ from each other by 10 %"),
 )
 """What is compared, in the order of tables and figures."""
 
@@ -226,21 +208,14 @@ def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     rows: list[dict[str, object]] = []
     for one in REFINED:
         limit = by_seed(shaken, one, LINKS)
-        base = abs(float(limit.mean())) if len(limit) else 0.0
-        scale = 100 / base if base else math.nan
+        scale = 100 / abs(float(limit.mean())) if len(limit) and limit.mean() else math.nan
         for variant in sorted(set(shaken[VARIANT]), key=pitch_of):
             values = by_seed(shaken, one, str(variant))
             effect = mean_over_seeds([] if variant == LINKS else (values - limit).dropna().tolist())
+            row = {"quantity": one.label, VARIANT: variant, PITCH: pitch_of(str(variant)), "seeds [-]": len(values)}
+            row |= mean_columns("mean [-]", mean_over_seeds(values.to_numpy()))
             rows.append(
-                {
-                    "quantity": one.label,
-                    VARIANT: variant,
-                    PITCH: pitch_of(str(variant)),
-                    "seeds [-]": len(values),
-                    **mean_columns("mean [-]", mean_over_seeds(values.to_numpy())),
-                    "less links [%]": scale * effect.value,
-                    "less links 95 % [%]": scale * effect.half_width,
-                }
+                row | {"less links [%]": scale * effect.value, "less links 95 % [%]": scale * effect.half_width}
             )
     return pd.DataFrame(rows)
 

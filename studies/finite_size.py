@@ -10,7 +10,6 @@ pile counts as spanned where a cluster joins floor and top, and one wall and wal
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -64,22 +63,22 @@ _TOLD_APART = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is told 
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Column of φ of a pile at rest."""
+    """Name the column of φ of a pile at rest."""
     return f"{STAGES[stage]} {definition} [-]"
 
 
 def crossings(stage: str) -> str:
-    """Column of ⟨N⟩."""
+    """Name the column of ⟨N⟩."""
     return f"crossings {stage} [-]"
 
 
 def share(stage: str) -> str:
-    """Column of the share of the smarticles in the largest entangled cluster."""
+    """Name the column of the share of the smarticles in the largest entangled cluster."""
     return f"largest cluster {stage} [-]"
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Column of whether a cluster spans the height, the width or, both of them, the pile."""
+    """Name the column of whether a cluster spans the height, the width or, both of them, the pile."""
     return f"spans {what} {stage} [-]"
 
 
@@ -170,39 +169,35 @@ def fitted(runs: pd.DataFrame, aspect: float, quantity: str) -> SizeLaw | None:
 
 def laws(runs: pd.DataFrame) -> pd.DataFrame:
     """Fit the law of every quantity at every l/w, whether it holds, and which power does."""
-    rows = []
-    for aspect in sorted(runs[ASPECT].unique()):
-        for quantity in SCALED:
-            law = fitted(runs, aspect, quantity)
-            if law is None:
-                continue
-            rows.append(
-                {
-                    ASPECT: aspect,
-                    "quantity": quantity,
-                    "sizes [-]": law.sizes,
-                    "runs [-]": law.runs,
-                    "bulk [-]": law.bulk,
-                    "bulk 95 % [-]": law.error(1, 0),
-                    "a [-]": law.slope,
-                    "a 95 % [-]": law.error(0, 1),
-                    "left over scatter [-]": law.excess,
-                    "p of the law [-]": law.refused,
-                    **dict(zip(("power [-]", "power from [-]", "power to [-]"), law.powers, strict=True)),
-                    "scatter falls as N to the [-]": law.scatter.fall,
-                }
-            )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        {
+            ASPECT: aspect,
+            "quantity": quantity,
+            "sizes [-]": law.sizes,
+            "runs [-]": law.runs,
+            "bulk [-]": law.bulk,
+            "bulk 95 % [-]": law.error(1, 0),
+            "a [-]": law.slope,
+            "a 95 % [-]": law.error(0, 1),
+            "left over scatter [-]": law.excess,
+            "p of the law [-]": law.refused,
+            **dict(zip(("power [-]", "power from [-]", "power to [-]"), law.powers, strict=True)),
+            "scatter falls as N to the [-]": law.scatter.fall,
+        }
+        for aspect in sorted(runs[ASPECT].unique())
+        for quantity in SCALED
+        if (law := fitted(runs, aspect, quantity)) is not None
+    )
 
 
-def _axes(stage: str) -> Mapping[str, str]:
-    """What spanning is set against: names and columns."""
-    return {"l/w": ASPECT, "⟨N⟩": crossings(stage)}
+def _column(stage: str, axis: str) -> str:
+    """Name the column that spanning is set against."""
+    return ASPECT if axis == "l/w" else crossings(stage)
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Where piles near the threshold begin to be spanned, by size."""
-    column = _axes(stage)[axis]
+    """Fit where piles near the threshold begin to be spanned, by size."""
+    column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:
         return {}
@@ -225,7 +220,7 @@ def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
             "width [-]": one.width,
         }
         for stage in STAGES
-        for axis in _axes(stage)
+        for axis in ("l/w", "⟨N⟩")
         for size, one in _profiles(runs, stage, axis).items()
     )
 
@@ -237,17 +232,9 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
         for aspect, part in runs.groupby(ASPECT):
             size, cluster = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
             slope = slope_within(size, cluster, [0] * len(part))
-            rows.append(
-                {
-                    "stage": stage,
-                    ASPECT: aspect,
-                    "runs [-]": slope.count,
-                    "power of N [-]": slope.value,
-                    "power of N 95 % [-]": slope.half_width,
-                    "falls as piles grow": str(judge(negative(slope))),
-                }
-            )
-    return pd.DataFrame(rows)
+            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(judge(negative(slope)))))
+    powers = ["power of N [-]", "power of N 95 % [-]"]
+    return pd.DataFrame(rows, columns=["stage", ASPECT, "runs [-]", *powers, "falls as piles grow"])
 
 
 def _bias(runs: pd.DataFrame, quantity: str) -> Outcome:
@@ -293,15 +280,13 @@ def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Ou
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
     chance = alike(_profiles(runs, stage, axis).values())
-    seen = runs.loc[runs[ASPECT] <= LARGEST, _axes(stage)[axis]]
+    seen = runs.loc[runs[ASPECT] <= LARGEST, _column(stage, axis)]
     cells = ", ".join(
         f"{row[COUNT]}: {row['half of piles span at [-]']:.3f} ({row['from [-]']:.3f} to {row['to [-]']:.3f})"
         for _, row in rows.iterrows()
     )
-    return Outcome(
-        note=f"N = {cells}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}",
-        verdict=decide(chance < _REFUSED),
-    )
+    note = f"N = {cells}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}"
+    return Outcome(note=note, verdict=decide(chance < _REFUSED))
 
 
 def _falls(table: pd.DataFrame, stage: str) -> Outcome:

@@ -135,18 +135,9 @@ def steps(runs: pd.DataFrame) -> pd.DataFrame:
             way = "falls" if difference < 0 else "rises"
             if not abs(difference) > half_width:
                 way = "no error bar" if math.isnan(half_width) else "within error bars"
-            rows.append(
-                {
-                    "stage": stage,
-                    "definition": DEFINITION,
-                    "from aspect ratio [-]": low,
-                    "to aspect ratio [-]": high,
-                    "difference [-]": difference,
-                    "combined 95 % [-]": half_width,
-                    "phi": way,
-                }
-            )
-    return pd.DataFrame(rows)
+            rows.append((stage, DEFINITION, low, high, difference, half_width, way))
+    ends = ["from aspect ratio [-]", "to aspect ratio [-]"]
+    return pd.DataFrame(rows, columns=["stage", "definition", *ends, "difference [-]", "combined 95 % [-]", "phi"])
 
 
 def falls(stage: str) -> Finding:

@@ -235,32 +235,29 @@ def _correlated(
     drawn = resampled(measures, blocks, strata, count=RESAMPLES, seed=DRAW)
     if few_blocks(blocks, strata):
         drawn[:] = np.nan
-    rho, slopes = values[: len(names)], values[len(names) :]
+    rho = values[: len(names)]
+    ends = [interval(float(value), column.tolist()) for value, column in zip(values, drawn.T, strict=True)]
     sizes = drawn[:, : len(names)] * np.sign(rho)
-    # Columns that are the same throughout have no correlation, and none is first.
+    # Columns that are constant have no correlation, and none is first.
     order = [int(k) for k in np.argsort(-np.abs(np.where(np.isfinite(rho), rho, 0)), kind="stable")]
     first = np.bincount(np.nanargmax(np.where(np.isfinite(sizes), sizes, -np.inf), axis=1), minlength=len(names))
     unknown = ~np.isfinite(sizes).any()
     spread = (table[names] - table[names].groupby(levels).transform("mean")).to_numpy(dtype=np.float64).std(axis=0)
-    found = []
-    for k in order:
-        ends = interval(float(rho[k]), drawn[:, k].tolist())
-        tilt = interval(float(slopes[k]), drawn[:, len(names) + k].tolist())
-        found.append(
-            {
-                PREDICTOR: names[k],
-                "runs [-]": len(table),
-                "trajectories [-]": len(np.unique(blocks)),
-                RHO: ends.value,
-                LOW: ends.low,
-                HIGH: ends.high,
-                "slope per unit of the measure": tilt.value,
-                "slope per SD [-]": tilt.value * spread[k],
-                "slope from [-]": tilt.low * spread[k],
-                "slope to [-]": tilt.high * spread[k],
-                FIRST: np.nan if unknown else first[k] / RESAMPLES,
-            }
-        )
+    found = [
+        {
+            PREDICTOR: names[k],
+            "runs [-]": len(table),
+            "trajectories [-]": len(np.unique(blocks)),
+            **dict(zip((RHO, LOW, HIGH), (own.value, own.low, own.high), strict=True)),
+            "slope per unit of the measure": tilt.value,
+            "slope per SD [-]": tilt.value * spread[k],
+            "slope from [-]": tilt.low * spread[k],
+            "slope to [-]": tilt.high * spread[k],
+            FIRST: np.nan if unknown else first[k] / RESAMPLES,
+        }
+        for k in order
+        for own, tilt in [(ends[k], ends[len(names) + k])]
+    ]
     best, *others = order
     compared = []
     for k in others:

@@ -93,13 +93,12 @@ def owes(name: str) -> Finding:
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         found = changes(runs, column)
+        clear = {variant: abs(change.value) > change.half_width for variant, change in found.items()}
         effects = []
         for variant, change in found.items():
-            clear = ", clear" if abs(change.value) > change.half_width else ""
-            text = f"{change.value:+.1f} ± {change.half_width:.1f} %{clear}"
+            text = f"{change.value:+.1f} ± {change.half_width:.1f} %{', clear' if clear[variant] else ''}"
             effects.append(Effect(label=variant, value=change, sign=0, text=text))
-        clear = any(effect.text.endswith("clear") for effect in effects)
-        return Outcome(effects=effects, verdict=decide(clear, data=bool(found)))
+        return Outcome(effects=effects, verdict=decide(any(clear.values()), data=bool(found)))
 
     return Finding(
         id=f"{name.replace(' ', '-').replace('_', '-')}-changes",

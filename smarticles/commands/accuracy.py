@@ -17,8 +17,7 @@ from smarticles.parsing import Commands, add_engine, add_scene, add_slots, engin
 from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
-    from studies.framework.study import Study
-    from studies.ladder import Ladder, Rung
+    from studies.accuracy import Ladder
     from templates.sweep.expand import Point
     from templates.sweep.sweep_file import Sweep
 
@@ -99,7 +98,7 @@ class _Expanded:
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """`smarticles accuracy`."""
-    from studies.ladder import BASE  # noqa: PLC0415
+    from studies.accuracy import BASE, study  # noqa: PLC0415
 
     expanded = _expanded(arguments)
     seeds = expanded.seeds
@@ -120,21 +119,15 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     return compute_and_analyse(
         folder,
         arguments,
-        partial(_load, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
+        partial(study, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
         note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
         pictured={"setting": BASE},
     )
 
 
-def _load(rungs: Sequence[Rung], expected_s: Mapping[str, float]) -> Study:
-    from studies.accuracy import study  # noqa: PLC0415
-
-    return study(rungs, expected_s)
-
-
 def _expanded(arguments: argparse.Namespace) -> _Expanded:
     from dem.scene.reading import load_scene  # noqa: PLC0415
-    from studies.ladder import (  # noqa: PLC0415
+    from studies.accuracy import (  # noqa: PLC0415
         affordable,
         build_ladder,
         default_seeds,

@@ -115,10 +115,8 @@ class Means:
     """Means with their error bars against a variable: a panel for each quantity and each value of a column.
 
     Attributes:
-        name: Of the files.
         x: Column of the variable.
         split: Makes the series.
-        table: Name of the table.
         rows: Selects what is drawn.
         panels: Column with a column of panels for each value; empty: none.
         panel: Title of a panel, with `{}` for its value.
@@ -129,7 +127,6 @@ class Means:
         levels: Horizontal lines of a panel's rows, by label.
         bounds: Lower bounds for the quantities without a mean, by column.
         reference: Published values by the column that they are set against: places and values.
-        told: Lines for the footer.
     """
 
     name: str
@@ -221,14 +218,11 @@ class Rows:
     """Means with their error bars across, a row for each name and a panel for each quantity.
 
     Attributes:
-        name: Of the files.
         row: Column with the names of the rows, or a function of a row of the table.
-        table: Name of the table.
         rows: Selects what is drawn, in the order of the rows.
         ends: Columns of the ends of the intervals; empty: means with half-widths.
         margin: Column with the half-width of a band about 0.
         levels: Value of a vertical line by column.
-        told: Lines for the footer.
     """
 
     name: str
@@ -281,7 +275,6 @@ class Histories:
     """Quantities of runs against time or another variable: means over seeds, lowest to highest seed as a band.
 
     Attributes:
-        name: Of the files.
         quantities: Label of the y axis by column of the table `times`, or "" for what `history` reads.
         history: Reads the history of a run; an InputError leaves the run out. None: the table `times`.
         x: Column of the time in the table `times`.
@@ -293,7 +286,6 @@ class Histories:
         unit: Of that width.
         log: Whether x and its intervals are logarithmic.
         level: Horizontal line.
-        told: Lines for the footer.
     """
 
     name: str
@@ -366,13 +358,11 @@ class Scatter:
     """A quantity against others, a panel each: every run as a small marker, means over seeds as large ones.
 
     Attributes:
-        name: Of the files.
         xs: Quantities across.
         y: Quantity upwards.
         split: Makes the series of runs and of points; its look has a marker and a colour.
         bounds: Column that is above 0 where y is a lower bound, drawn as an arrow.
         means: Whether means are drawn.
-        told: Lines for the footer.
     """
 
     name: str

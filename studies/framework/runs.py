@@ -163,7 +163,7 @@ def collect_runs(
             if run.status.state == "done":
                 runs.append(measure(run))
                 continue
-            status, cause = run.status.state, run.status.cause or "it has not finished"
+            status, cause = str(run.status.state), run.status.cause or "it has not finished"
         except InputError as error:
             status = "unusable" if Path(directory, "run.json").exists() else "not started"
             cause = str(error)

@@ -28,6 +28,7 @@ from studies.accuracy import (
     TIME_STEP,
     VARIANT,
     WALL,
+    Rung,
     advise,
     study,
     work_precision,
@@ -36,7 +37,6 @@ from studies.framework.findings import Outcome
 from studies.framework.runs import read_runs
 from studies.framework.study import Report
 from studies.framework.tables import ENGINE
-from studies.ladder import Rung
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 STEPS = [

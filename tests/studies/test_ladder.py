@@ -11,7 +11,7 @@ from dem.phases.gaits.drive import actuated
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
-from studies.ladder import (
+from studies.accuracy import (
     ACTIVITIES,
     ACTUATED,
     BASE,
