@@ -112,11 +112,3 @@ def test_walls_that_nothing_touches_make_no_more_trials_of_one() -> None:
     assert told_once.ours == told_often.ours
     assert "(n = 3)" in told_often.ours
     assert told_once.verdict == told_often.verdict == "not resolved"
-
-
-def test_variants_are_compared_trial_by_trial() -> None:
-    table = STUDY.extra(runs(1.0))["sensitivity"]
-    change = table.set_index(["variant", "quantity"]).loc[("other", PEAK)]
-    assert change["change [%]"] == pytest.approx(10, abs=0.5)
-    assert change["trials [-]"] == 3
-    assert 0 < change["change 95 % [%]"] < 1

@@ -96,16 +96,6 @@ def test_each_verdict_is_given_to_data_that_deserve_it() -> None:
     assert (other["friction-more-than-container"], other["frictions-together"]) == ("not found", "found")
 
 
-@pytest.mark.parametrize(
-    ("off", "noise", "verdict"), [(0.0, 1e-4, "found"), (0.09, 1e-4, "not found"), (0.04, 3e-3, "not resolved")]
-)
-def test_gravish_is_met_or_missed_only_beyond_all_errors(off: float, noise: float, verdict: str) -> None:
-    runs, generator = runs_of(noise=noise), np.random.default_rng(5)
-    # The error of reading alone is ± 0.003, up to 2.9 % of φ_f.
-    runs[PHI_F] = gravish(runs) * (1 + off) + noise * generator.standard_normal(len(runs))
-    assert verdicts(runs)["near-gravish"] == verdict
-
-
 def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     runs = runs_of(noise=1e-4)
     right = (runs[FRICTION] == 0.8) & (runs[WALL] == 0.4) & (runs[RESTITUTION] == 0.7)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -86,13 +85,6 @@ def copy(tmp_path: Path) -> Path:
     for name in ("runs.csv", "provenance.json"):
         shutil.copy(RESULTS / name, folder)
     return folder
-
-
-def test_a_row_without_its_origin_does_not_count(copy: Path, wanted: dict[str, Wanted]) -> None:
-    told = json.loads((copy / "provenance.json").read_text())
-    told["runs"] = [run for run in told["runs"] if not run["directory"].endswith(NAME)]
-    (copy / "provenance.json").write_text(json.dumps(told))
-    assert NAME not in earlier_runs(copy, wanted)
 
 
 @pytest.mark.parametrize(

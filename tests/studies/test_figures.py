@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import studies
 from postprocess.report import figures
 from postprocess.report.limits import hold_everything
-from studies.framework.figures import BARS, POOLED, draw_bounds, draw_means, finish, marker
+from studies.framework.figures import BARS, draw_bounds, draw_means, finish, marker
 from studies.framework.shaken import gravish_note
 from studies.framework.study import format_numbers
 
@@ -47,20 +47,6 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, look=LOOK)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
-
-
-def test_scatter_that_points_share_is_told(tmp_path: Path) -> None:
-    figure, axes = figures.new_figure()
-    points(axes, [1.0], [0.1])
-    assert f"{BARS}, scatter pooled over all points. " in footer(figure, tmp_path, bars=POOLED)
-
-
-def test_error_bars_may_lie_across(tmp_path: Path) -> None:
-    figure, axes = figures.new_figure()
-    draw_means(axes, [3.0], [0], None, across=[0.5], look=LOOK, label="one")
-    assert BARS in footer(figure, tmp_path)
-    (bars,) = axes.containers
-    assert np.concatenate(bars.lines[2][0].get_segments())[:, 0].tolist() == [2.5, 3.5]
 
 
 def test_no_study_draws_error_bars_by_itself() -> None:
@@ -141,13 +127,6 @@ def test_a_footer_never_takes_more_than_its_share(height: float) -> None:
     assert share <= figures.FOOTER_SHARE
     *_, cut, last = text.get_text().splitlines()
     assert (cut.endswith("word …"), last) == (True, "More: toy.md, provenance.json.")
-
-
-@pytest.mark.parametrize("lines", [["One."], ["One.", "Two."], ["word " * 19, "More."]])
-def test_a_short_footer_is_left_as_it_is(lines: list[str]) -> None:
-    figure, _ = figures.new_figure()
-    figures.add_footer(figure, lines)
-    assert figure.texts[-1].get_text().splitlines() == [line.strip() for line in lines]
 
 
 def figures_module_footer(figure: Figure, lines: Sequence[str]) -> None:

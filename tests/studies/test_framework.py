@@ -144,11 +144,6 @@ def test_runs_that_must_not_be_averaged_are_rejected(
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_other_points_may_differ(runs: list[Path], tmp_path: Path) -> None:
-    other = write(tmp_path / "other", count=9, aspect_ratio=0.9)
-    assert len(TOY.analyse([runs[0], other], tmp_path / "out", **ORIGIN).tables["runs"]) == 2
-
-
 def test_an_output_that_is_a_file_is_rejected(runs: list[Path], tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(InputError, match="choose another folder as output"):

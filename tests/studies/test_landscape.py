@@ -34,11 +34,8 @@ from studies.landscape import (
     GAIN,
     HELD_FAST,
     HIGH,
-    LEAD,
     LIFTS,
-    LINKING,
     LOW,
-    OTHER,
     PAIRS,
     PART,
     PEAK,
@@ -202,35 +199,6 @@ def test_where_nothing_tells_strength_nothing_is_found() -> None:
     assert verdicts["best-strength-over"].verdict == verdicts["best-strength-within"].verdict == "not resolved"
     ranked, _ = told(runs, ALL)
     assert ((ranked[LOW] > 0) | (ranked[HIGH] < 0)).sum() <= 2
-
-
-def test_two_measures_that_tell_it_alike_are_not_resolved() -> None:
-    def both(t: pd.DataFrame, random: np.random.Generator) -> Any:
-        t[LINKING] = t[CROSSINGS] + 0.05 * random.normal(size=len(t))
-        return -t[CROSSINGS] - t[LINKING] + 0.3 * random.normal(size=len(t))
-
-    runs = table(both)
-    ranked, compared = told(runs, WITHIN)
-    assert set(ranked[PREDICTOR].iloc[:2]) == {CROSSINGS, LINKING}
-    # Sizes are compared: it falls with both.
-    assert (ranked[RHO].iloc[:2] < -0.9).all()
-    assert compared.set_index(OTHER)[VERDICT].tolist() == ["not resolved"] + ["better"] * (len(PREDICTORS) - 2)
-    assert compared[LEAD].iloc[0] < 0.05
-    verdicts = judged(runs)
-    assert verdicts["best-strength-within"].verdict == "not resolved"
-    assert verdicts["stronger-crossings"].verdict == "not found"
-
-
-def test_what_goes_with_the_aspect_ratio_alone_tells_nothing_within() -> None:
-    def by_ratio(t: pd.DataFrame, random: np.random.Generator) -> Any:
-        t[PHI] = -t[ASPECT] + 0.02 * random.normal(size=len(t))
-        return t[ASPECT] + 0.02 * random.normal(size=len(t))
-
-    runs = table(by_ratio)
-    (over, _), (within, _) = told(runs, ALL), told(runs, WITHIN)
-    assert over[PREDICTOR].iloc[0] == PHI
-    assert over[RHO].iloc[0] < -0.85
-    assert abs(within.set_index(PREDICTOR)[RHO][PHI]) < 0.3
 
 
 def test_lower_bounds_are_left_out_of_their_part() -> None:

@@ -86,12 +86,3 @@ def test_the_study_writes_its_tables_and_figures(tmp_path: Path) -> None:
     assert {"force_raised.png", "strength.png", "peak_crossings.png"} <= set(report.files)
     assert len(report.rows) == 4
     assert len(report.missing) == 1
-
-
-def test_runs_with_a_wall_are_none_of_this_study(tmp_path: Path) -> None:
-    phases = ("deposit", "relax", "pull-hook")
-    keys: dict[str, Any] = {"phases": phases, "packing": (DEPTH,) * 3}
-    run = SyntheticRun(**keys)
-    other = write_hooked_run(tmp_path / "walled", run, np.zeros_like)
-    report = STUDY.analyse([write(tmp_path / "one", STATIC), other], tmp_path / "out", **ORIGIN)
-    assert "its phases are deposit, relax, pull-hook, not" in report.missing[0].cause
