@@ -88,7 +88,7 @@ def measure(run: Run) -> Row:
     found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
     filled = found.filled_before * volumes
-    # Of less than the ball that tells inside from outside, a share says nothing.
+    # A share of less than the ball that separates inside from outside means nothing.
     kept = np.where(filled > 4 / 3 * math.pi * ball**3, found.kept, math.nan)
     row = named_columns(run)
     for k, tier in enumerate(TIERS):

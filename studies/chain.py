@@ -1,7 +1,7 @@
 """Strain test of a chain of two or six robots between two walls: force, yield, width and fracture against confinement.
 
 Against Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical
-experiment", and what friction, servos and strings matter, which the paper does not tell. In `chain-bodies` robots have
+experiment", and what friction, servos and strings matter, which the paper omits. In `chain-bodies` robots have
 bodies 2.1 cm thick. Runs of one seed have the same servos. --quick takes minutes.
 """
 
@@ -257,7 +257,7 @@ STUDY = Study(
                 unit="of strain",
                 x_label="strain [-]",
                 quantities={"": label},
-                told=["Up to the first fracture."],
+                notes=["Up to the first fracture."],
             )
             for name, read, label in _HISTORIES
         ),
@@ -268,7 +268,7 @@ STUDY = Study(
             x_label="confinement h/H [-]",
             split=lambda points: one_by_one(COUNT, "n = {:g}".format)(baseline(points)),
             marks=RANGE,
-            told=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
+            notes=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
         ),
         figures.Rows(
             name="sensitivity",
@@ -278,7 +278,7 @@ STUDY = Study(
             rows=lambda table: table[table["quantity"].isin([PEAK, FRACTURE])],
             split=one_by_one("quantity", str),
             levels={"change [%]": 0.0},
-            told=["Means over pairs of runs with the same servos, n = 2."],
+            notes=["Means over pairs of runs with the same servos, n = 2."],
         ),
     ),
     extra=tabulate,

@@ -40,7 +40,7 @@ from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of
 from studies.framework.provenance import Reference
 from studies.framework.runs import Row, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import Key, Quantity, sort_rows
+from studies.framework.tables import ASPECT_KEY, Key, Quantity, sort_rows
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, DEFINITION, TIME = "container radius [m]", "definition", "tau [s]"
@@ -61,7 +61,7 @@ CLOSE = 0.20
 _DIGITISED = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 KEYS = (
     Key(column=DEFINITION, label="height", order=tuple(HEIGHTS)),
-    Key(column=ASPECT, label="l/w", form="g"),
+    ASPECT_KEY,
     Key(column=GAMMA, label="Γ", form="g"),
 )
 
@@ -273,7 +273,7 @@ _HISTORIES = Histories(
     level=1 / math.e,
     x_label="time since the vibration began [s]",
     quantities={"": r"height remaining $h/h_0$ [-]"},
-    told=["Level: 1/e, which a stretched exponential to 0 crosses at τ whatever its exponent."],
+    notes=["Level: 1/e, which a stretched exponential to 0 crosses at τ whatever its exponent."],
 )
 
 
@@ -301,7 +301,7 @@ STUDY = Study(
             rows=_with_bounds,
             bounds={LOG: AT_LEAST},
             split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
-            told=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
+            notes=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
         ),
         Means(
             name="delta_aspect",
@@ -311,7 +311,7 @@ STUDY = Study(
             split=one_by_one(DEFINITION, str),
             bounds={ACTIVATION: AT_LEAST},
             reference={ACTIVATION: (_GRAVISH["l_over_w"], _GRAVISH["delta"])},
-            told=[
+            notes=[
                 "Open, with an arrow: no acceleration at which all runs collapsed, a bound.",
                 "Experiment: Gravish et al., PRL 108, 208001 (2012), digitised.",
             ],

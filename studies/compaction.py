@@ -34,12 +34,12 @@ from studies.framework.shaken import (
     while_shaken,
 )
 from studies.framework.study import Study
-from studies.framework.tables import Key, Quantity
+from studies.framework.tables import ASPECT_KEY, Key, Quantity
 
 Array = NDArray[np.float64]
 
 TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # s; φ is a mean over the last fifth of each
-EARLY = 0.25  # share of the time that a law is fitted to, to see whether it tells the rest
+EARLY = 0.25  # share of the time that a law is fitted to, to see whether it predicts the rest
 FIRST, INTERVALS = 0.1, 40  # s, three periods of shaking: where fits begin; and in how many intervals
 STRETCHED, LOGARITHMIC = "stretched exponential", "inverse logarithm"
 
@@ -69,7 +69,7 @@ class Fit:
     Attributes:
         law: Its name.
         begin: φ as shaking begins [-].
-        end: φ in the end [-]; of a law that has not come near its end as uncertain as it looks.
+        end: φ in the end [-]; of a law that has not come near its end uncertain.
         tau: τ [s].
         power: β or B [1].
         residual: Root mean square of what the law leaves [-].
@@ -148,12 +148,12 @@ def measure(run: Run) -> Row:
     return row
 
 
-def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], told: str) -> Finding:
+def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], form: str) -> Finding:
     """Make the finding that a number of each run is above 0 in the mean."""
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:
         mean = mean_over_seeds(values(runs).dropna().tolist())
-        text = told.format(told_number(mean.value, "+.2f", mean.half_width))
+        text = form.format(told_number(mean.value, "+.2f", mean.half_width))
         return [Effect(label="mean over runs, ± 95 %:", value=mean, text=f"{text} (n = {mean.count})")]
 
     return Finding(id=name, says=says, outcome=outcome)
@@ -191,7 +191,7 @@ STUDY = Study(
     name="compaction",
     title="Piles that are shaken for long",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=FRICTION, label="friction", form="g")),
+    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         *(
             Quantity(column=at(time), label=f"φ {time:g} s", form=".4f", meaning=f"φ after {time:g} s of shaking")

@@ -34,7 +34,7 @@ from studies.framework.shaken import (
     timed_row,
 )
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, Quantity, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity, declare
 
 MARGIN = 5.0  # % from Gravish's points
 WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
@@ -149,13 +149,13 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
     off, error = known[DEVIATION].abs(), known[marked(DEVIATION, "95 %")]
-    told = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
-    each = told.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
+    judged = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
+    each = judged.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
     each.columns = pd.Index(["inside", "outside", "off", "places"])
     # A combination that lacks an aspect ratio can be rejected by another one, and not accepted.
     whole = each[each["places"] == each["places"].max()]
     best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
-    rows = told[np.all([told[name] == best[name] for name in FACTORS], axis=0)]
+    rows = judged[np.all([judged[name] == best[name] for name in FACTORS], axis=0)]
     places = ", ".join(
         f"{row[ASPECT]:g}: {told_number(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"
         for _, row in rows.iterrows()
@@ -214,10 +214,7 @@ STUDY: Study = Study(
     name="contacts",
     title="Friction between smarticles, friction at the container, restitution",
     measure=measure,
-    keys=(
-        *(Key(column=name, label=called, form="g") for name, called in CALLED.items()),
-        Key(column=ASPECT, label="l/w", form="g"),
-    ),
+    keys=(*(Key(column=name, label=called, form="g") for name, called in CALLED.items()), ASPECT_KEY),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(

@@ -202,7 +202,7 @@ def pitch_of(variant: str) -> float:
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     """Average the shaken pile by pitch of YADE's spheres, links as pitch 0, with differences to links, paired by seed.
 
-    Only the shaken runs count, so that every pitch has the same ones.
+    Only the shaken runs count, so that every pitch has equal ones.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []
@@ -257,7 +257,7 @@ STUDY: Study = Study(
             row="quantity",
             rows=lambda table: table[table["pairs [-]"] > 0],
             margin="margin [%]",
-            told=["Bands: margins, chosen beforehand."],
+            notes=["Bands: margins, chosen beforehand."],
         ),
         Means(
             name="pitch",

@@ -21,7 +21,7 @@ from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.procedures import CROSSINGS, ENERGY, HEIGHT, PHI_ACTIVE, PROCEDURE, SHAPE, procedure_row
 from studies.framework.runs import Row
 from studies.framework.study import Study
-from studies.framework.tables import Key, declare
+from studies.framework.tables import ASPECT_KEY, Key, declare
 
 LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
 FACTORS: dict[str, tuple[object, object]] = {LAW: ("halt", "ease"), FRICTION: (0.4, 0.2), RADIUS: (0.0234, 0.0224)}
@@ -86,7 +86,7 @@ STUDY = Study(
         Key(column=LAW, label="law"),
         Key(column=FRICTION, label="friction", form="g"),
         Key(column=RADIUS, label="wall [mm]", form=".1f", scale=1e3),
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
     ),
     quantities=tuple(QUANTITIES.values()),
     findings=tuple(effect(quantity, factor) for quantity, factor in product(SIGNS, FACTORS)),

@@ -33,7 +33,7 @@ from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.provenance import NOTHING
 from studies.framework.runs import Row, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, declare
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"
@@ -58,8 +58,8 @@ AT_THRESHOLD = -0.155
 """Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,
 β/(νd) with β = 0.41 and ν = 0.88: Stauffer & Aharony, Introduction to Percolation Theory (1994), table 2."""
 
-_REFUSED = 0.05
-_TOLD_APART = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is told from others
+_REJECTED = 0.05
+_DISTINCT = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is distinguished from others
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
@@ -255,8 +255,8 @@ def _law(runs: pd.DataFrame, quantity: str) -> Outcome:
     if law is None or math.isnan(law.refused):
         return Outcome(verdict=Verdict.NO_DATA)
     best, low, high = law.powers
-    wrong = law.refused < _REFUSED
-    right = low >= _TOLD_APART[0] and high <= _TOLD_APART[1]
+    wrong = law.refused < _REJECTED
+    right = low >= _DISTINCT[0] and high <= _DISTINCT[1]
     note = f"it leaves {law.excess:.2g} times what scatter explains, p = {law.refused:.2g}; power {best:.2f} "
     ends = "" if POWERS[0] < low and high < POWERS[-1] else ", the end of what is tried"
     return Outcome(note=f"{note}({low:.2f} to {high:.2f}{ends})", verdict=decide(right and not wrong, wrong))
@@ -286,7 +286,7 @@ def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Ou
         for _, row in rows.iterrows()
     )
     note = f"N = {cells}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}"
-    return Outcome(note=note, verdict=decide(chance < _REFUSED))
+    return Outcome(note=note, verdict=decide(chance < _REJECTED))
 
 
 def _falls(table: pd.DataFrame, stage: str) -> Outcome:
@@ -336,7 +336,7 @@ FINDINGS = (
         Finding(
             id=f"threshold-moves-{name}-{stage}",
             says=f"(ours) the {axis} at which clusters span half of the piles {stage} the shake goes with their size",
-            found_if="one place for all sizes is refused, p < 0.05",
+            found_if="one place for all sizes is rejected, p < 0.05",
             outcome=partial(_shift, stage=stage, axis=axis),
             tables=["runs", "thresholds"],
         )
@@ -366,7 +366,7 @@ FIGURES = (
         rows=lambda points: points[points[ASPECT] == PAPER_ASPECT],
         split=one_by_one(ASPECT, "l/w = {:g}".format),
         marks=[PAPER_COUNT**-POWER],
-        told=[f"0 is a pile without end; broken line: the paper's {PAPER_COUNT} smarticles. Fits: laws.csv."],
+        notes=[f"0 is a pile without end; broken line: the paper's {PAPER_COUNT} smarticles. Fits: laws.csv."],
     ),
     Means(
         name="percolation",
@@ -375,7 +375,7 @@ FIGURES = (
         x_label=r"$l/w$ [-]",
         rows=lambda points: points[points[ASPECT] <= LARGEST],
         split=one_by_one(COUNT, "N = {:g}".format),
-        told=["Spanned: entangled clusters join floor and top, and wall and wall."],
+        notes=["Spanned: entangled clusters join floor and top, and wall and wall."],
     ),
 )
 
@@ -383,11 +383,7 @@ STUDY = Study(
     name="finite-size",
     title="Finite size: 100 to 10 000 smarticles",
     measure=measure,
-    keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
-        Key(column=COUNT, label="N", form="g"),
-        Key(column=RADIUS, label="radius / w", form=".2f"),
-    ),
+    keys=(ASPECT_KEY, Key(column=COUNT, label="N", form="g"), Key(column=RADIUS, label="radius / w", form=".2f")),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=FIGURES,
@@ -403,7 +399,7 @@ STUDY = Study(
         "Laws q_∞ + a N^(-1/3): least squares, weights by a scatter that is a power of N, fitted within sizes; where "
         "the law leaves more than scatter, errors are larger by the square root of the ratio.",
         "Thresholds: logistic function of its own width at each size, profile likelihood, 95 %; one for all sizes "
-        "against one for each by the ratio of likelihoods, refused below p = 0.05.",
+        "against one for each by the ratio of likelihoods, rejected below p = 0.05.",
     ),
     reference=NOTHING,
     pictured={"l_over_w": 0.7, "count": 1000},

@@ -50,7 +50,7 @@ from studies.framework.procedures import (
 )
 from studies.framework.runs import Row, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 from studies.strength import (
     ABOVE,
     BEFORE,
@@ -194,7 +194,7 @@ def _all_points(table: pd.DataFrame) -> list[Series]:
     ]
 
 
-def _forces(name: str, rows: Rows, split: Split, told: str, *, net: bool = False) -> Histories:
+def _forces(name: str, rows: Rows, split: Split, note: str, *, net: bool = False) -> Histories:
     return Histories(
         name=name,
         history=partial(force_history, net=net),
@@ -204,12 +204,12 @@ def _forces(name: str, rows: Rows, split: Split, told: str, *, net: bool = False
         level=1.0,
         x_label="time since the hook began to rise [s]",
         quantities={"": rf"{'upper less lower' if net else 'force on the'} hook, $F/(n W_\mathrm{{s}})$ [-]"},
-        told=[f"{told} Level: weight of all smarticles."],
+        notes=[f"{note} Level: weight of all smarticles."],
     )
 
 
-def _peaks(name: str, x: str, x_label: str, split: Split, told: str) -> Means:
-    return Means(name=name, quantities=[QUANTITIES[PEAK]], x=x, x_label=x_label, split=split, told=[told])
+def _peaks(name: str, x: str, x_label: str, split: Split, note: str) -> Means:
+    return Means(name=name, quantities=[QUANTITIES[PEAK]], x=x, x_label=x_label, split=split, notes=[note])
 
 
 _AT_ASPECT, _AT_THETA = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
@@ -227,11 +227,7 @@ STUDY = Study(
     name="fracture",
     title="A hook pulled out of a pile, against the findings of Savoie et al.",
     measure=measure,
-    keys=(
-        Key(column=PROCEDURE, label="procedure", order=ORDER),
-        Key(column=THETA, label="θ", form="g", unit="°"),
-        Key(column=ASPECT, label="l/w", form="g"),
-    ),
+    keys=(Key(column=PROCEDURE, label="procedure", order=ORDER), THETA_KEY, ASPECT_KEY),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=FIGURES,

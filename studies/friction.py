@@ -44,7 +44,7 @@ from studies.framework.shaken import (
     while_shaken,
 )
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, Quantity
+from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity
 
 Array = NDArray[np.float64]
 
@@ -453,7 +453,7 @@ STUDY = Study(
     name="friction",
     title="Friction that packs smarticles as Gravish et al. 2012 found",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=FRICTION, label="friction", form="g")),
+    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         PHI_QUANTITY,
         Quantity(column=DEVIATION, label="from Gravish [%]", form="+.1f", meaning="less Gravish's, over it"),
@@ -471,7 +471,7 @@ STUDY = Study(
             levels=_gravish,
             share_y=True,
             bars=POOLED,
-            told=[gravish_note((0.4, 0.7, 1.0))],
+            notes=[gravish_note((0.4, 0.7, 1.0))],
         ),
         Histories(
             name="phi_time",

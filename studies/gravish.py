@@ -46,7 +46,7 @@ from studies.framework.shaken import (
     read_gravish,
 )
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, Quantity, by_engine
+from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity, by_engine
 
 ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
 COSTLY = "voronoi"  # takes seconds per frame, and is left out of drafts
@@ -218,7 +218,7 @@ STUDY = Study(
     name="gravish",
     title="Packing of shaken smarticles against Gravish et al. 2012",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=SHAKEN, label="shaken [s]", form="g")),
+    keys=(ASPECT_KEY, Key(column=SHAKEN, label="shaken [s]", form="g")),
     quantities=tuple(QUANTITIES.values()),
     findings=(
         *map(falls, STAGES),
@@ -241,7 +241,7 @@ STUDY = Study(
             reference={
                 phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[GRAVISH_COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
             },
-            told=[gravish_note(sorted(_PUBLISHED["l_over_w"]))],
+            notes=[gravish_note(sorted(_PUBLISHED["l_over_w"]))],
         ),
         Means(
             name="crossings",

@@ -62,7 +62,7 @@ from studies.framework.procedures import (
 from studies.framework.provenance import NOTHING
 from studies.framework.runs import Row, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, Quantity, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Quantity, declare
 
 PLANNED = "time planned [s]"
 LINKING, CONTACTS = "linking number per smarticle [-]", "contacts per smarticle [-]"
@@ -83,7 +83,7 @@ PREDICTORS = {
     ABOVE: "share above the hook",
     ENERGY: "energy spent",
 }
-"""What may tell strength, all at rest before the pull, and what it is called."""
+"""What may predict strength, all at rest before the pull, and what it is called."""
 
 STRENGTHS = {PEAK: "strength", BEYOND: "strength beyond the weight above the hook"}
 
@@ -318,7 +318,7 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drawn_ratio(values: Floats) -> Interval:
-    """Divide means of pairs, gain over energy, and where there are four columns that by the same of the others.
+    """Divide means of pairs, gain over energy, and where there are four columns that by the ratio of the others.
 
     With the 95 % interval by drawing pairs anew; NaN ends below three pairs.
     """
@@ -518,8 +518,8 @@ def _correlations(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _scopes(table: pd.DataFrame) -> list[Series]:
-    looks = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
-    return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in looks.items()]
+    styles = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
+    return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
 
 
 FIGURES = (
@@ -573,7 +573,7 @@ FIGURES = (
         log_x=True,
         rows=lambda table: table[table[SCOPE] == COMMON],
         split=_bought,
-        told=["Pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."],
+        notes=["Pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."],
     ),
 )
 
@@ -595,9 +595,9 @@ STUDY = Study(
     title="Packing, entanglement, linking and strength over l/w, θ and the energy spent",
     measure=measure,
     keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=PROCEDURE, label="procedure"),
-        Key(column=THETA, label="θ", form="g", unit="°"),
+        THETA_KEY,
         Key(column=PLANNED, label="for", form="g", unit=" s"),
     ),
     quantities=tuple(QUANTITIES.values()),

@@ -22,7 +22,7 @@ from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
 from studies.framework.runs import MeasuredRun, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import Key, declare
+from studies.framework.tables import ASPECT_KEY, Key, declare
 
 WHOLE = 0.95  # of the smarticles in one cluster: of 60, no more than 2 apart
 SAME_WIDTH = 0.05  # of a pile's radius; smarticles are 0.5 of it long
@@ -230,7 +230,7 @@ def _against_time(aspect: float, lift: float) -> Histories:
         x_label="time since the wall went [s]",
         rows=lambda runs: runs[(runs[ASPECT] == aspect) & (runs[LIFT] == lift)],
         split=by_procedure(),
-        told=[f"l/w = {aspect:g}, wall {f'lifted at {lift:g} m/s' if lift else 'gone at once'}."],
+        notes=[f"l/w = {aspect:g}, wall {f'lifted at {lift:g} m/s' if lift else 'gone at once'}."],
     )
 
 
@@ -240,7 +240,7 @@ STUDY = Study(
     measure=measure,
     keys=(
         Key(column=LIFT, label="lift [m/s]", form="g"),
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=PROCEDURE, label="procedure", order=ORDER),
     ),
     quantities=tuple(QUANTITIES.values()),

@@ -64,7 +64,7 @@ from studies.framework.procedures import (
 )
 from studies.framework.runs import duration
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 
 FLAT = 0.2  # of the mean of ⟨N⟩: by less it does not change with l/w
 NEAR = 0.15  # of l/w: how far from 1.0 a maximum is still near it, one and a half steps of the paper's l/w
@@ -189,7 +189,7 @@ def _little_less(table: pd.DataFrame) -> list[Effect]:
             sign=-1,
             text=text if value.count > 1 else "no data",
         ),
-        Effect(label="the same", value=value, threshold=-math.log(2), text="above 1/2"),
+        Effect(label="it is also", value=value, threshold=-math.log(2), text="above 1/2"),
     ]
 
 
@@ -484,7 +484,7 @@ def _means(name: str, columns: Sequence[str], x: str, split: Split, *, mark: boo
         log=ENERGY in columns and not mark,
         marks=[PEAK] if mark else [],
         share_y=len(columns) > 1,
-        told=[f"Broken line: l/w = {PEAK:g}, where the paper's energies have a local maximum."] if mark else [],
+        notes=[f"Broken line: l/w = {PEAK:g}, where the paper's energies have a local maximum."] if mark else [],
     )
 
 
@@ -495,11 +495,7 @@ STUDY = Study(
     name="procedures",
     title="Procedures of smarticles against the findings of Savoie et al.",
     measure=procedure_row,
-    keys=(
-        Key(column=PROCEDURE, label="procedure", order=ORDER),
-        Key(column=THETA, label="θ", form="g", unit="°"),
-        Key(column=ASPECT, label="l/w", form="g"),
-    ),
+    keys=(Key(column=PROCEDURE, label="procedure", order=ORDER), THETA_KEY, ASPECT_KEY),
     quantities=tuple(QUANTITIES.values()),
     findings=(*PACKING, *ENERGIES, *ENTANGLEMENT),
     figures=(
@@ -511,7 +507,7 @@ STUDY = Study(
             x_label="time since the activity began [s]",
             quantities={"": r"height of the centre of mass $h/h_0$ [-]"},
             level=1.0,
-            told=["l/w = 0.7, or the nearest one. Each activity begins and ends at the broken lines."],
+            notes=["l/w = 0.7, or the nearest one. Each activity begins and ends at the broken lines."],
         ),
         _means("phi_aspect", [PHI_ACTIVE], ASPECT, _PROCEDURES),
         _means("crossings_aspect", [CROSSINGS], ASPECT, _PROCEDURES),

@@ -122,7 +122,7 @@ STUDY = Study(
             quantities=[QUANTITIES[COMPARED[stage]] for stage in ("phi_0", "phi_f")],
             row=VARIANT,
             levels={COMPARED[stage]: gravish_at(0.7, stage) for stage in ("phi_0", "phi_f")},
-            told=[f"Lines: {gravish_note([0.7])}"],
+            notes=[f"Lines: {gravish_note([0.7])}"],
         ),
     ),
     extra=summarise,

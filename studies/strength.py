@@ -46,7 +46,7 @@ from studies.framework.procedures import (
 )
 from studies.framework.runs import Row, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, declare
+from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 
 UPPER = "hook above the floor [m]"
 PEAK, RAISED, WORK = "peak force over n W_s [-]", "hook raised at the peak [m]", "work over n W_s w [-]"
@@ -284,10 +284,10 @@ STUDY = Study(
     title="Piles torn between a grip on the floor and a hook, against the findings of Savoie et al.",
     measure=measure,
     keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=UPPER, label="hook [mm]", form="g", scale=1e3),
         Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, INTERNAL, SHAPE)),
-        Key(column=THETA, label="θ", form="g", unit="°"),
+        THETA_KEY,
     ),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,

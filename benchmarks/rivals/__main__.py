@@ -45,7 +45,7 @@ REST = 0.3  # s before the activity
 POUR = {"engine": "links", "fidelity": {"base": "standard", "diameter_m": 1.37e-3}}
 KEYS = ["activity", "engine", "setting"]
 COST, STEP, MEMORY = "cost [s/s]", "dt [s]", "peak memory [MiB]"
-DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of looks [m]", "of the true boxes [m]"
+DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of samples [m]", "of the true boxes [m]"
 PHI_REST, PHI_END, SINKING = "phi at rest [1]", "phi at the end [1]", "sinks at rest [m/s]"
 SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of it are cheaper by [1]"
 

@@ -146,7 +146,7 @@ def _earlier(results: Path | None, folder: Folder, load: Callable[[], Study]) ->
 
 def told_report(report: Report) -> str:
     """What a study says at the terminal."""
-    return told_results(columns(report.header, report.rows), report.told, report.files, report.output)
+    return told_results(columns(report.header, report.rows), report.lines, report.files, report.output)
 
 
 def _changed(name: str, file: Path, fidelity: str | None) -> dict[str, str]:

@@ -147,7 +147,7 @@ class Means:
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
     bounds: Mapping[str, str] = field(default_factory=dict)
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
-    told: Sequence[str] = ()
+    notes: Sequence[str] = ()
     bars: str = BARS
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
@@ -170,7 +170,7 @@ class Means:
             self._panel(axes, quantity, part)
             if value is not None and (quantity is self.quantities[0]):
                 axes.set_title(self.panel.format(value), fontsize=8)
-        return finish(figure, path, self.told, analysis.footer, bars=self.bars)
+        return finish(figure, path, self.notes, analysis.footer, bars=self.bars)
 
     def _panel(self, axes: Axes, quantity: Quantity, table: pd.DataFrame) -> None:
         column, scale = quantity.column, quantity.axis_scale
@@ -235,7 +235,7 @@ class Rows:
     margin: str = ""
     levels: Mapping[str, float] = field(default_factory=dict)
     columns: int = 2
-    told: Sequence[str] = ()
+    notes: Sequence[str] = ()
     bars: str = BARS
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
@@ -267,7 +267,7 @@ class Rows:
             axes.set_xlabel(quantity.axis or column)
             axes.set_yticks(range(len(names)), list(names))
         grid[0].set_ylim(len(names) - 0.4, -0.6)
-        return finish(figure, path, self.told, analysis.footer, bars=self.bars)
+        return finish(figure, path, self.notes, analysis.footer, bars=self.bars)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -302,7 +302,7 @@ class Histories:
     unit: str = "s"
     log: bool = False
     level: float | None = None
-    told: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw a line and a band for each series that has histories."""
@@ -337,10 +337,10 @@ class Histories:
             if value is not None:
                 axes.set_title(self.panel.format(self.panel_scale * value), fontsize=8)
         means = "logarithmic intervals" if self.log else f"{width:.2g} {self.unit}"
-        told = [f"Line: mean over seeds of means over {means}; band: lowest to highest seed, no error.", *self.told]
+        notes = [f"Line: mean over seeds of means over {means}; band: lowest to highest seed, no error.", *self.notes]
         if missing:
-            told.append(f"Without a recorded history: {missing} runs.")
-        return finish(figure, path, told, analysis.footer)
+            notes.append(f"Without a recorded history: {missing} runs.")
+        return finish(figure, path, notes, analysis.footer)
 
     def _read(self, analysis: Analysis, run: str, quantity: str) -> History | None:
         if self.history is None:
@@ -371,7 +371,7 @@ class Scatter:
     split: Split
     bounds: str
     means: bool = True
-    told: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw runs, then means with the error bars of both quantities."""
@@ -394,8 +394,8 @@ class Scatter:
             axes.set_xlabel(quantity.axis or x)
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
-        told = "Small: runs, with an arrow: a lower bound; large: means over seeds."
-        return finish(figure, path, [told, *self.told], analysis.footer)
+        note = "Small: runs, with an arrow: a lower bound; large: means over seeds."
+        return finish(figure, path, [note, *self.notes], analysis.footer)
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> Split:
@@ -545,13 +545,13 @@ def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, 
         axes.errorbar(at[known], from_[known], yerr=long[known], lolims=True, **look)
 
 
-def finish(figure: Canvas, path: Path, told: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
+def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
     """Put legend and footer to a figure and write it; no limit of an axis hides anything.
 
     Args:
         figure: Drawn completely.
         path: Without suffix.
-        told: What is to be known of this figure.
+        notes: What is to be known of this figure.
         footer: Origin.
         bars: What error bars are, stated where there are any.
     """
@@ -568,5 +568,5 @@ def finish(figure: Canvas, path: Path, told: Sequence[str], footer: Sequence[str
         if isinstance(container, ErrorbarContainer)
         for lines in container.lines[2]
     )
-    style.add_footer(figure, [*told, *([f"{bars}."] if there else []), *hidden, *footer])
+    style.add_footer(figure, [*notes, *([f"{bars}."] if there else []), *hidden, *footer])
     return style.save(figure, path)

@@ -33,9 +33,7 @@ SAVOIE = Reference(
     facts=MappingProxyType({"doi": "10.1039/d2sm01573k", "what": "statements in the text"}),
 )
 
-NOTHING = Reference(
-    statement="none; nobody has published these numbers", facts=MappingProxyType({"what": "our own runs alone"})
-)
+NOTHING = Reference(statement="none; no published numbers", facts=MappingProxyType({"what": "our own runs alone"}))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -100,6 +100,6 @@ class Pictures:
         if not rows:
             return []
         columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")
-        told = "Each smarticle keeps its colour in all pictures of a row; first seed."
+        note = "Each smarticle keeps its colour in all pictures of a row; first seed."
         output = path.with_suffix(".png")
-        return [strip.draw_strip(rows, output, columns=columns, footer=[told, *analysis.footer])]
+        return [strip.draw_strip(rows, output, columns=columns, footer=[note, *analysis.footer])]

@@ -45,7 +45,7 @@ class MissingRun:
 
     @property
     def common_cause(self) -> str:
-        """The cause without the name of the directory: equal for all runs that lack the same."""
+        """The cause without the name of the directory, to be counted."""
         return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 

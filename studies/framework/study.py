@@ -43,7 +43,7 @@ class Report:
     Attributes:
         header: Columns of the short table.
         rows: Of that table.
-        told: Lines below it: what the numbers are, and every finding with its verdict.
+        lines: Below it: what the numbers are, and every finding with its verdict.
         tables: All tables by name, `runs`, `points` and `findings` among them.
         missing: Runs that were given and are not in the tables.
         footer: Origin of the results, one statement each.
@@ -53,7 +53,7 @@ class Report:
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]] = field(repr=False)
-    told: Sequence[str]
+    lines: Sequence[str]
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
     judged: Sequence[Judged]
     missing: Sequence[MissingRun]
@@ -154,7 +154,7 @@ class Study:
         return Report(
             header=header,
             rows=rows,
-            told=[_MEANS, "", *verdicts],
+            lines=[_MEANS, "", *verdicts],
             tables=tables,
             judged=judged,
             missing=found.missing,

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import pandas as pd
 
 from postprocess.report.markdown import table_lines
-from postprocess.statistics.columns import SEED
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 
@@ -102,6 +102,10 @@ class Key:
         if not isinstance(value, int | float):
             return str(value)
         return "" if math.isnan(value) else f"{self.scale * value:{self.form}}{self.unit}"
+
+
+ASPECT_KEY = Key(column=ASPECT, label="l/w", form="g")
+THETA_KEY = Key(column="theta [deg]", label="θ", form="g", unit="°")
 
 
 def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) -> pd.DataFrame:
