@@ -173,7 +173,7 @@ class Means:
         return finish(figure, path, self.notes, analysis.footer, bars=self.bars)
 
     def _panel(self, axes: Axes, quantity: Quantity, table: pd.DataFrame) -> None:
-        column, scale = quantity.column, quantity.axis_scale
+        column, scale = quantity.column, quantity.scale
         for x in self.marks:
             axes.axvline(x, color=style.GREY, linewidth=0.6, linestyle=(0, (2, 2)))
         for (label, level), line in zip(self.levels(judging(table)).items(), ("solid", (0, (4, 3))), strict=False):

@@ -15,7 +15,6 @@ from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
 from studies.framework.findings import CRITERION, Finding, Judged, findings_table
-from studies.framework.procedures import ACTIVE, PROCEDURE, STATIC
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
 from studies.framework.runs import Collected, MeasuredRun, MissingRun, Row, collect_runs
 from studies.framework.tables import (
@@ -25,7 +24,6 @@ from studies.framework.tables import (
     Quantity,
     by_engine,
     compared_engines,
-    engine_lines,
     engines_of,
     judging,
     sort_rows,
@@ -259,7 +257,6 @@ class Study:
             *table_lines(["finding", "ours (± standard error)", "verdict", "found if"], findings),
             *(line for remark in self.remarks for line in ("", remark)),
             *("", "## Points", "", _MEANS, "", *table),
-            *(engine_lines(tables["engines"], self.keys) if "engines" in tables else ()),
             *meaning_lines("points.csv", {quantity.column: quantity.meaning for quantity in self.quantities}),
         ]
 
@@ -273,9 +270,6 @@ class Study:
             parts.append(f"{key.label} {' '.join(filter(None, values))}")
         counts = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
         statement = ", ".join([*parts, f"{format_range(counts)} smarticles", self._seeds(tables)])
-        if {PROCEDURE, ACTIVE} <= set(runs):
-            times = runs[runs[PROCEDURE] != STATIC].groupby(PROCEDURE)[ACTIVE].first()
-            statement += "; active for: " + ", ".join(f"{name} {time:.3g} s" for name, time in times.items())
         statements = [f"{statement}."]
         if "engines" in tables:
             several = engines_of(every)

@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.report.markdown import table_lines
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
@@ -35,9 +34,8 @@ class Quantity:
         meaning: What it is, for readers of the table.
         label: Header in the short table; empty: only in the CSV files.
         form: Format of a number there.
-        scale: Factor of the numbers shown, such as 1e3 for millimetres.
+        scale: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres.
         axis: Label of an axis of a figure; by default the column's name.
-        axis_scale: Factor of the numbers in figures.
         bar: Which error of the points stands behind a number: `SE` or `95 %`.
     """
 
@@ -47,7 +45,6 @@ class Quantity:
     form: str = ".3g"
     scale: float = 1.0
     axis: str = ""
-    axis_scale: float = 1.0
     bar: str = "SE"
 
     def cell(self, point: Mapping[str, float]) -> str:
@@ -71,7 +68,6 @@ def declare(
             meaning=meaning,
             axis=axes.get(column, ""),
             scale=scales.get(column, 1.0),
-            axis_scale=scales.get(column, 1.0),
         )
         for column, (label, form, meaning) in rows.items()
     }
@@ -178,18 +174,3 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
     columns = [*keys, "quantity", "engine", "other engine", PAIRS, "mean", "other mean"]
     columns += ["difference", "difference 95 %", "difference [%]", "difference 95 % [%]"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def engine_lines(table: pd.DataFrame, keys: Sequence[Key]) -> list[str]:
-    """Make the part of a text that compares engines, of `compared_engines`."""
-    rows = [
-        [
-            *(key.text(row[key.column]) for key in keys),
-            *(str(row[name]) for name in ("quantity", PAIRS)),
-            *(f"{row[name]:.4g}" for name in ("mean", "other mean")),
-            f"{told_number(row['difference [%]'], '+.1f', row['difference 95 % [%]'])} %",
-        ]
-        for _, row in table.iterrows()
-    ]
-    header = [*(key.label for key in keys), "quantity", "pairs of seeds", "links", "YADE", "difference ± 95 %"]
-    return ["", "## Engines", "", "The same seeds on both engines.", "", *table_lines(header, rows)]
