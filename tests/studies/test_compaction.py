@@ -12,8 +12,6 @@ import pytest
 
 from studies import compaction
 from studies.compaction import (
-    FIRST,
-    INTERVALS,
     LAWS,
     LOGARITHMIC,
     MISSED,
@@ -24,7 +22,6 @@ from studies.compaction import (
     at,
     fit,
     of,
-    spread_out,
 )
 from studies.framework.figures import History
 
@@ -84,13 +81,3 @@ def test_growth_is_that_of_the_law_and_noise_does_not_grow(monkeypatch: pytest.M
     short = runs_of(monkeypatch, STRETCHED, seeds=(1, 2), seconds=10.0)
     assert short[[at(20.0), at(200.0)]].isna().all(axis=None)
     assert verdicts(short)[0] == "no data"
-
-
-def test_intervals_on_a_logarithmic_axis_average() -> None:
-    times = np.arange(1, 10_001) * 0.02
-    centres, means = spread_out(times, times)
-    assert (np.diff(centres) > 0).all()
-    assert len(centres) <= INTERVALS
-    assert means[0] >= FIRST
-    # A constant stays one, however many samples an interval has.
-    np.testing.assert_allclose(spread_out(times, np.full(len(times), 0.3))[1], 0.3)

@@ -111,22 +111,6 @@ def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     assert row[DEVIATION.replace(" [", " 95 % [")] == pytest.approx(100 * np.hypot(own, 0.003) / known)
 
 
-def test_from_runs_to_effects(tmp_path: Path) -> None:
-    """Every combination at one l/w, two seeds: friction between smarticles takes a tenth of φ, the container's none."""
-    runs = []
-    for (between, wall, restitution), seed in product(product(*FACTORS.values()), (1, 2)):
-        share = (0.9 if between > 0.5 else 1.0) * (1 + 0.001 * seed * (1 + wall))
-        packing = tuple(share * value for value in (0.100, 0.105, 0.130, 0.132))
-        run = SyntheticRun(seed=seed, packing=packing, friction=between, friction_wall=wall, restitution=restitution)
-        runs.append(write_run(tmp_path / f"mu{between}_wall{wall}_e{restitution}_seed{seed}", run))
-    report = STUDY.analyse(runs, tmp_path / "out", note="the full study", command="smarticles study contacts")
-    effect = report.tables["effects"].set_index([QUANTITY, FACTOR, ASPECT])[EFFECT]
-    # A tenth of 0.130, and of what seeds add to it.
-    assert effect["phi_f", CALLED[FRICTION], EVERYWHERE] == pytest.approx(-0.0130, rel=5e-3)
-    assert abs(effect["phi_f", CALLED[RESTITUTION], EVERYWHERE]) < 1e-9
-    assert {"points.csv", "effects.csv", "findings.csv", "contacts.png"} <= set(report.files)
-
-
 def test_the_lowest_tenth_rises_by_what_the_piles_height_makes_it(tmp_path: Path) -> None:
     run = SyntheticRun(packing=(0.100, 0.105, 0.090, 0.100), floor_z=0.003)
     manifest = open_run(write_run(tmp_path / "run", run))

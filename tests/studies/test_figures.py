@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 
 import studies
 from postprocess.report import figures
-from postprocess.report.limits import hold_everything
 from studies.framework.figures import BARS, draw_bounds, draw_means, finish, marker
 from studies.framework.shaken import gravish_note
 from studies.framework.study import format_numbers
@@ -78,21 +77,6 @@ def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:
     assert axes.get_xlim()[0] < 0
 
 
-def test_limits_that_hold_everything_stay() -> None:
-    figure, axes = figures.new_figure()
-    points(axes, [0.5, 0.6], [0.1, 0.1])
-    axes.set_xlim(-2, 7)
-    axes.set_ylim(1.1, 0)  # downwards
-    assert hold_everything(figure) == []
-    assert (*axes.get_xlim(), *axes.get_ylim()) == (-2, 7, 1.1, 0)
-    axes.set_ylim(0.55, 0)
-    hold_everything(figure)
-    assert axes.get_ylim()[0] > 0.7
-    assert axes.get_ylim()[1] == 0
-    empty, _ = figures.new_figure()
-    assert hold_everything(empty) == []
-
-
 @pytest.mark.parametrize(
     ("half_widths", "told"),
     [
@@ -114,30 +98,6 @@ def test_what_a_logarithmic_axis_cannot_show_is_told(
 
 
 # -- footers ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("height", [1.5, 2.6, 4.6])
-def test_a_footer_never_takes_more_than_its_share(height: float) -> None:
-    figure, _ = figures.new_figure(height=height)
-    # Behind the back of the test that looks at all figures: this one is to be cut.
-    figures_module_footer(figure, ["word " * 300, "More: toy.md, provenance.json."])
-    text = figure.texts[-1]
-    figure.draw_without_rendering()
-    share = text.get_window_extent().height / (figure.get_size_inches()[1] * figure.dpi)
-    assert share <= figures.FOOTER_SHARE
-    *_, cut, last = text.get_text().splitlines()
-    assert (cut.endswith("word …"), last) == (True, "More: toy.md, provenance.json.")
-
-
-def figures_module_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """`figures.add_footer` as it is, without the eye of the tests on it."""
-    wrapped = figures.add_footer
-    original = next(
-        cell.cell_contents
-        for cell in wrapped.__closure__ or ()
-        if getattr(cell.cell_contents, "__name__", "") == "add_footer"
-    )
-    original(figure, lines)
 
 
 # -- points that were never digitised ----------------------------------------------------------------------------------

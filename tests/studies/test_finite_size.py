@@ -152,17 +152,3 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
         assert row[spans(stage, "height")] == there["crossing graph spans height [-]"]
         assert row[spans(stage)] == min(row[spans(stage, what)] for what in ("height", "width"))
         assert row[phi(stage, "voxel")] == there["phi voxel [-]"]
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_whole_study(tmp_path: Path) -> None:
-    runs = [
-        write(tmp_path, ratio=ratio, count=count, seed=seed)
-        for ratio in (0.7, 0.1)
-        for count in (12, 20, 30)
-        for seed in (1, 2)
-    ]
-    report = STUDY.analyse([*runs, tmp_path / "never"], tmp_path / "out", note="a test", command="a command")
-    names = {"laws.csv", "thresholds.csv", "growth.csv", "findings.csv", "points.csv", "findings.md"}
-    assert names <= set(report.files)
-    assert (len(report.rows), len(report.missing)) == (6, 1)

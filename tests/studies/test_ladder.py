@@ -7,13 +7,10 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.gaits.drive import actuated
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 from studies.accuracy import (
-    ACTIVITIES,
-    ACTUATED,
     BASE,
     KNOBS,
     Ladder,
@@ -173,15 +170,6 @@ def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: 
 def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
     assert default_seeds(scene_of(tmp_path)) == (1, 2, 3)
     assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
-
-
-def test_types_of_phase_that_actuate_are_those_of_the_simulator(tmp_path: Path) -> None:
-    phase = scene_of(tmp_path, OSCILLATION).phases[-1]
-    assert actuated(phase)
-    assert phase.type in ACTUATED
-    shaken = scene_of(tmp_path).phases[-1]
-    assert not actuated(shaken)
-    assert shaken.type in ACTIVITIES - ACTUATED
 
 
 def test_what_the_scene_cannot_have_is_left_out_and_said(tmp_path: Path) -> None:

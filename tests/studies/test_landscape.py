@@ -29,7 +29,6 @@ from studies.landscape import (
     ENERGY,
     EVERY,
     FIRST,
-    FREE,
     FRONTIER,
     GAIN,
     HELD_FAST,
@@ -51,7 +50,6 @@ from studies.landscape import (
     WITHIN,
     WORK,
     YIELD,
-    best_points,
     common_aspects,
     costs,
     measure,
@@ -201,18 +199,6 @@ def test_where_nothing_tells_strength_nothing_is_found() -> None:
     assert ((ranked[LOW] > 0) | (ranked[HIGH] < 0)).sum() <= 2
 
 
-def test_lower_bounds_are_left_out_of_their_part() -> None:
-    runs = table(lambda t, _: t[CROSSINGS])
-    stopped = runs.index[:20]
-    runs.loc[stopped, PEAK] = -runs.loc[stopped, CROSSINGS]
-    runs.loc[stopped, HELD_FAST] = 1.0
-    ranked, _ = told(runs, WITHIN, part=FREE)
-    assert ranked["runs [-]"].iloc[0] == len(runs) - 20
-    assert (ranked[PREDICTOR].iloc[0], ranked[RHO].iloc[0]) == (CROSSINGS, pytest.approx(1.0))
-    every, _ = told(runs, WITHIN)
-    assert every.set_index(PREDICTOR)[RHO][CROSSINGS] < 0.9
-
-
 def test_runs_of_one_trajectory_are_one_block() -> None:
     def by_trajectory(t: pd.DataFrame, random: np.random.Generator) -> Any:
         numbers = trajectories(t)
@@ -270,12 +256,6 @@ def test_the_cheapest_procedure_is_found_where_it_surely_is() -> None:
     assert sure.verdict == "found"
     assert sure.ours.index("internal θ = 10° for 0.5 s") < sure.ours.index("shape-change for 3 s")
     assert judged(bought(scatter=0.6), correlated=False)["cheapest"].verdict == "not resolved"
-
-
-def test_of_a_procedure_the_point_that_surely_gains_is_its_best() -> None:
-    row = {SCOPE: COMMON, PROCEDURE: INTERNAL, HIGH: 1.0}
-    found = pd.DataFrame([{**row, PLANNED: 1.0, YIELD: 0.2, LOW: 0.1}, {**row, PLANNED: 2.0, YIELD: 0.5, LOW: -0.1}])
-    assert best_points(found)[PLANNED].tolist() == [1.0]
 
 
 def test_only_aspect_ratios_that_have_everything_are_averaged_over() -> None:

@@ -70,19 +70,3 @@ def test_a_pile_that_is_held_fast_is_told(tmp_path: Path) -> None:
     # What came off is not known.
     assert runs[CARRIED].isna().tolist() == [False, True]
     assert any("held fast: 1 of 2 runs" in line for line in report.footer)
-
-
-def test_the_study_writes_its_tables_and_figures(tmp_path: Path) -> None:
-    levels = {STATIC: 0.3, EXTERNAL: 0.6, INTERNAL: 0.5, SHAPE: 0.9}
-    runs = [
-        write(tmp_path / f"{name}{seed}", name, seed=seed, top=level * (1 + 0.02 * seed))
-        for name, level in levels.items()
-        for seed in (1, 2, 3)
-    ]
-    report = STUDY.analyse([*runs, tmp_path / "never"], tmp_path / "out", **ORIGIN)
-    verdicts = [one.verdict for one in report.judged]
-    assert verdicts[:2] == ["found", "found"]
-    assert verdicts[4] == "found"
-    assert {"force_raised.png", "strength.png", "peak_crossings.png"} <= set(report.files)
-    assert len(report.rows) == 4
-    assert len(report.missing) == 1
