@@ -33,9 +33,8 @@ from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatte
 from studies.framework.figures import POOLED, Means, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
-from studies.framework.runs import Row, duration, last_columns
+from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, ENGINE, Key, Quantity
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import Sweep, SweepFile
 

@@ -23,9 +23,8 @@ from studies.framework.figures import PROCEDURE_LABELS, Rows, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
-from studies.framework.runs import Row, duration, last_columns
+from studies.framework.runs import Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import Key, declare
 
 AFTER = 1.0  # s after the walls went, as in the paper
 # Of a tier's volume inside the pile. A plain cylinder of r = 1.2 w has 0.74 ± 0.02 by this measure as poured (three

@@ -38,9 +38,8 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
 from studies.framework import figures
 from studies.framework.figures import Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
-from studies.framework.runs import Row, last_columns
+from studies.framework.runs import Key, Quantity, Row, declare, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import Key, Quantity, declare
 
 RANGE = (0.52, 0.65)  # h/H of the paper
 YIELDS = {2: 0.2, 6: 0.4}  # strains at which the paper's single trials yield, by number of robots

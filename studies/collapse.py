@@ -38,9 +38,8 @@ from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_
 from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
 from studies.framework.provenance import Reference
-from studies.framework.runs import Row, duration, last_columns
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, last_columns, sort_rows
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, Key, Quantity, sort_rows
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
 RADIUS, DEFINITION, TIME = "container radius [m]", "definition", "tau [s]"

@@ -23,7 +23,7 @@ from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, one_by_one
 from studies.framework.findings import Effect, Finding
-from studies.framework.runs import Row
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row
 from studies.framework.shaken import (
     FRICTION,
     GRAVISH,
@@ -34,7 +34,6 @@ from studies.framework.shaken import (
     while_shaken,
 )
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, Key, Quantity
 
 Array = NDArray[np.float64]
 

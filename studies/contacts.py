@@ -21,7 +21,7 @@ from postprocess.statistics.points import marked, mean_columns, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
-from studies.framework.runs import Row
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row, declare
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     FRICTION,
@@ -34,7 +34,6 @@ from studies.framework.shaken import (
     timed_row,
 )
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity, declare
 
 MARGIN = 5.0  # % from Gravish's points
 WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"

@@ -37,9 +37,8 @@ from studies.framework.procedures import (
     procedure_row,
 )
 from studies.framework.provenance import Reference
-from studies.framework.runs import Row, last_columns, run_columns
+from studies.framework.runs import ENGINE, Key, Quantity, Row, declare, last_columns, run_columns
 from studies.framework.study import Study
-from studies.framework.tables import ENGINE, Key, Quantity, declare
 
 CASE, VARIANT, PITCH = "case", "variant", "pitch [-]"
 LINKS, YADE = "links", "yade"

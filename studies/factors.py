@@ -19,9 +19,8 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.procedures import CROSSINGS, ENERGY, HEIGHT, PHI_ACTIVE, PROCEDURE, SHAPE, procedure_row
-from studies.framework.runs import Row
+from studies.framework.runs import ASPECT_KEY, Key, Row, declare
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, Key, declare
 
 LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
 FACTORS: dict[str, tuple[object, object]] = {LAW: ("halt", "ease"), FRICTION: (0.4, 0.2), RADIUS: (0.0234, 0.0224)}

@@ -31,9 +31,8 @@ from postprocess.statistics.threshold import Profile, alike, profiles
 from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.provenance import NOTHING
-from studies.framework.runs import Row, duration, last_columns
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, declare
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"

@@ -48,9 +48,8 @@ from studies.framework.procedures import (
     of_procedure,
     prepared_by,
 )
-from studies.framework.runs import Row, last_columns
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 from studies.strength import (
     ABOVE,
     BEFORE,

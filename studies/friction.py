@@ -25,7 +25,7 @@ from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
 from studies.framework.figures import POOLED, Histories, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
-from studies.framework.runs import Row
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     FRICTION,
@@ -44,7 +44,6 @@ from studies.framework.shaken import (
     while_shaken,
 )
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity
 
 Array = NDArray[np.float64]
 

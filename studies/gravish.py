@@ -29,7 +29,7 @@ from studies.framework.figures import (
 )
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.procedures import EXTERNAL
-from studies.framework.runs import Row
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row, by_engine
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     GRAVISH,
@@ -46,7 +46,6 @@ from studies.framework.shaken import (
     read_gravish,
 )
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, Key, Quantity, by_engine
 
 ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
 COSTLY = "voronoi"  # takes seconds per frame, and is left out of drafts

@@ -60,9 +60,8 @@ from studies.framework.procedures import (
     prepared_by,
 )
 from studies.framework.provenance import NOTHING
-from studies.framework.runs import Row, last_columns
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Quantity, Row, declare, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Quantity, declare
 
 PLANNED = "time planned [s]"
 LINKING, CONTACTS = "linking number per smarticle [-]", "contacts per smarticle [-]"

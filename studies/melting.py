@@ -20,9 +20,8 @@ from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, decide, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
-from studies.framework.runs import MeasuredRun, duration, last_columns
+from studies.framework.runs import ASPECT_KEY, Key, MeasuredRun, declare, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, Key, declare
 
 WHOLE = 0.95  # of the smarticles in one cluster: of 60, no more than 2 apart
 SAME_WIDTH = 0.05  # of a pile's radius; smarticles are 0.5 of it long

@@ -62,9 +62,8 @@ from studies.framework.procedures import (
     procedure_row,
     samples,
 )
-from studies.framework.runs import duration
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare, duration
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 
 FLAT = 0.2  # of the mean of ⟨N⟩: by less it does not change with l/w
 NEAR = 0.15  # of l/w: how far from 1.0 a maximum is still near it, one and a half steps of the paper's l/w

@@ -18,10 +18,9 @@ from postprocess.statistics.points import marked, seeds_of
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, relative_difference
 from studies.framework.figures import Rows
 from studies.framework.findings import Effect, Finding, Outcome, decide
-from studies.framework.runs import Row
+from studies.framework.runs import DEFINITION, Key, Row, declare
 from studies.framework.shaken import GRAVISH, SHAKEN, WHEN, gravish_at, gravish_note, measured_row, phi
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION, Key, declare
 
 VARIANT = "variant"
 VARIANTS = (

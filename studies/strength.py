@@ -44,9 +44,8 @@ from studies.framework.procedures import (
     paired,
     prepared_by,
 )
-from studies.framework.runs import Row, duration, last_columns
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
-from studies.framework.tables import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare
 
 UPPER = "hook above the floor [m]"
 PEAK, RAISED, WORK = "peak force over n W_s [-]", "hook raised at the peak [m]", "work over n W_s w [-]"

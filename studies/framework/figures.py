@@ -23,7 +23,7 @@ from postprocess.report import figures as style
 from postprocess.report.limits import hold_everything
 from postprocess.statistics.points import marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC, of_procedure
-from studies.framework.tables import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
+from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

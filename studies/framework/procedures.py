@@ -25,8 +25,7 @@ from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.seeds import SeedMean
-from studies.framework.runs import duration, last_columns, run_columns
-from studies.framework.tables import DEFINITION
+from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
 ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)

@@ -16,8 +16,7 @@ from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.figures import whole_file
 from postprocess.report.markdown import table_lines
-from studies.framework.runs import Collected
-from studies.framework.tables import DEFINITION
+from studies.framework.runs import DEFINITION, Collected
 
 
 @dataclass(frozen=True, kw_only=True)

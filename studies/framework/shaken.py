@@ -18,8 +18,7 @@ from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_ru
 from postprocess.statistics.columns import ASPECT
 from studies.framework.figures import History
 from studies.framework.provenance import Reference
-from studies.framework.runs import duration, last_columns, run_columns
-from studies.framework.tables import DEFINITION
+from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 SHAKEN = "time shaken [s]"
 SHAKE_TIME = 20.0

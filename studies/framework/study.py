@@ -16,13 +16,17 @@ from postprocess.statistics.points import averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
 from studies.framework.findings import CRITERION, Finding, Judged, findings_table
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
-from studies.framework.runs import Collected, MeasuredRun, MissingRun, Row, collect_runs
-from studies.framework.tables import (
+from studies.framework.runs import (
     ENGINE,
     ENGINE_NAMES,
+    Collected,
     Key,
+    MeasuredRun,
+    MissingRun,
     Quantity,
+    Row,
     by_engine,
+    collect_runs,
     compared_engines,
     engines_of,
     judging,

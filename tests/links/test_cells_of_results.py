@@ -23,8 +23,8 @@ from scipy import stats
 from dem.record.run import open_run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
+from studies.framework.runs import DEFINITION
 from studies.framework.study import Study
-from studies.framework.tables import DEFINITION
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import SEED, load_sweep

@@ -33,9 +33,8 @@ from studies.accuracy import (
     work_precision,
 )
 from studies.framework.findings import Outcome
-from studies.framework.runs import read_runs
+from studies.framework.runs import ENGINE, read_runs
 from studies.framework.study import Report
-from studies.framework.tables import ENGINE
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 STEPS = [

@@ -16,9 +16,8 @@ from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import mean
 from studies.framework.provenance import NOTHING
-from studies.framework.runs import Row
+from studies.framework.runs import Key, Quantity, Row
 from studies.framework.study import Study
-from studies.framework.tables import Key, Quantity
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study toy --out 'my toy'"}
 LEVEL = Quantity(column="level [m]", label="level [mm]", form=".1f", scale=1e3, meaning="a level")

@@ -10,7 +10,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
-from studies.framework.tables import DEFINITION
+from studies.framework.runs import DEFINITION
 from studies.sensitivity import STUDY
 
 PHI_0, PHI_F = f"phi_0 {DEFINITION} [-]", f"phi_f {DEFINITION} [-]"
