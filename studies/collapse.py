@@ -120,19 +120,11 @@ def measure(run: Run) -> Sequence[Row]:
 def times(runs: pd.DataFrame) -> pd.DataFrame:
     """Average ln(fτ) over seeds by definition, l/w and Γ; a mean with a bound in it is a bound, and has no error."""
     found = []
-    for (definition, aspect, gamma), group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
+    for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])
-        found.append(
-            {
-                DEFINITION: definition,
-                ASPECT: aspect,
-                GAMMA: gamma,
-                SEEDS: len(group),
-                CENSORED: bounds,
-                **mean_columns(LOG, replace(mean, standard_error=math.nan, half_width=math.nan) if bounds else mean),
-                DELTA: gamma * mean.value,
-            }
-        )
+        row = dict(zip((DEFINITION, ASPECT, GAMMA), point, strict=True)) | {SEEDS: len(group), CENSORED: bounds}
+        row |= mean_columns(LOG, replace(mean, standard_error=math.nan, half_width=math.nan) if bounds else mean)
+        found.append(row | {DELTA: float(group[GAMMA].iloc[0]) * mean.value})
     return sort_rows(pd.DataFrame(found), [DEFINITION, ASPECT, GAMMA], KEYS)
 
 
@@ -200,14 +192,10 @@ def _law(runs: pd.DataFrame) -> Outcome:
 
 def _greatest_between(table: pd.DataFrame) -> Outcome:
     own = table[table[DEFINITION] == REMAINING].set_index(ASPECT)
+    columns = own[[ACTIVATION, marked(ACTIVATION, "SE"), marked(ACTIVATION, "95 %"), SEEDS]]
     means = {
-        aspect: SeedMean(
-            value=row[ACTIVATION],
-            standard_error=row[marked(ACTIVATION, "SE")],
-            half_width=row[marked(ACTIVATION, "95 %")],
-            count=int(row[SEEDS]),
-        )
-        for aspect, row in own.iterrows()
+        aspect: SeedMean(value=value, standard_error=error, half_width=half_width, count=int(count))
+        for aspect, value, error, half_width, count in columns.itertuples()
     }
     verdict = Verdict.NO_DATA
     if INTERMEDIATE in list(means)[1:-1]:

@@ -9,8 +9,8 @@ what they leave can be compared.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -61,17 +61,10 @@ _MEANINGS = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Fit:
-    """A law fitted to a history.
+class Fit(NamedTuple):
+    """A law fitted to a history: φ as shaking begins and in the end [-], τ [s], β or B, and the root mean square left.
 
-    Attributes:
-        law: Its name.
-        begin: φ as shaking begins [-].
-        end: φ in the end [-]; of a law that has not come near its end uncertain.
-        tau: τ [s].
-        power: β or B [1].
-        residual: Root mean square of what the law leaves [-].
+    The end of a law that has not come near it is uncertain.
     """
 
     law: str
@@ -102,9 +95,7 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
     tries = (least_squares(lambda x: solved(x)[1], start, bounds=(low, high)) for start in starts)
     best = min(tries, key=lambda found: float(found.cost))
     (begin, end), left = solved(best.x)
-    tau, power = np.exp(best.x)
-    residual = float(np.sqrt(np.mean(left**2)))
-    return Fit(law=law, begin=float(begin), end=float(end), tau=float(tau), power=float(power), residual=residual)
+    return Fit(law, float(begin), float(end), *map(float, np.exp(best.x)), float(np.sqrt(np.mean(left**2))))
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
@@ -141,8 +132,7 @@ def measure(run: Run) -> Row:
     whole, early = spread_out(times, values), spread_out(times[first], values[first])
     for law in LAWS:
         found = fit(law, *whole)
-        numbers = (found.begin, found.end, found.tau, found.power, found.residual)
-        row |= {of(law, name): number for name, number in zip(_MEANINGS, numbers, strict=False)}
+        row |= {of(law, name): number for name, number in zip(_MEANINGS, found[1:], strict=False)}
         row[of(law, MISSED)] = float(np.mean(fit(law, *early).at(times[last]))) - float(np.mean(values[last]))
     return row
 

@@ -29,7 +29,7 @@ from studies.framework.figures import (
 )
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.procedures import EXTERNAL
-from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row, by_engine
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Row, by_engine, declare
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     GRAVISH,
@@ -50,40 +50,25 @@ from studies.framework.study import Study
 ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
 COSTLY = "voronoi"  # takes seconds per frame, and is left out of drafts
 
-_SYMBOLS = {
-    "phi_0": ("φ_0", "$\\phi_0$ before shaking [-]"),
-    "phi_f": ("φ_f", "$\\phi_\\mathrm{f}$ at the end [-]"),
-    "phi_f relaxed": ("φ_f at rest again", ""),
-}
-
-
-QUANTITIES = {
-    quantity.column: quantity
-    for quantity in (
-        *(
-            Quantity(
-                column=phi(stage, definition),
-                label=_SYMBOLS[stage][0] if definition == DEFINITION else "",
-                form=".4f",
-                axis=_SYMBOLS[stage][1],
-                meaning=f"packing fraction {meaning}, by {definition}",
-            )
-            for definition in DEFINITIONS
-            for stage, meaning in STAGES.items()
-            if stage != "phi_f relaxed" or definition in (DEFINITION, "top-percentile")
-        ),
-        *(
-            Quantity(
-                column=f"crossings {when} [-]",
-                label=f"⟨N⟩ {when}",
-                form=".2f",
-                axis=f"{CROSSINGS_LABEL}\n{meaning}",
-                meaning=f"links through a smarticle's plane {meaning}",
-            )
-            for when, meaning in zip(("before", "after", "relaxed"), STAGES.values(), strict=True)
-        ),
-    )
-}
+_SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "phi_f relaxed": "φ_f at rest again"}
+QUANTITIES = declare(
+    {
+        phi(stage, one): (_SYMBOLS[stage] * (one == DEFINITION), ".4f", f"packing fraction {meaning}, by {one}")
+        for one in DEFINITIONS
+        for stage, meaning in STAGES.items()
+        if stage != "phi_f relaxed" or one in (DEFINITION, "top-percentile")
+    }
+    | {
+        f"crossings {when} [-]": (f"⟨N⟩ {when}", ".2f", f"links through a smarticle's plane {meaning}")
+        for when, meaning in zip(("before", "after", "relaxed"), STAGES.values(), strict=True)
+    },
+    axes={
+        phi("phi_0"): r"$\phi_0$ before shaking [-]",
+        phi("phi_f"): r"$\phi_\mathrm{f}$ at the end [-]",
+        "crossings before [-]": f"{CROSSINGS_LABEL}\nbefore shaking",
+        "crossings after [-]": f"{CROSSINGS_LABEL}\nat the end of shaking",
+    },
+)
 
 
 def measure(run: Run) -> Row:
@@ -107,21 +92,11 @@ def deviations(runs: pd.DataFrame) -> pd.DataFrame:
             known = gravish_at(aspect, stage)
             if math.isnan(known):
                 continue
-            rows.append(
-                {
-                    "stage": stage,
-                    "definition": DEFINITION,
-                    ASPECT: aspect,
-                    SEEDS: mean.count,
-                    "phi [-]": mean.value,
-                    "phi 95 % [-]": mean.half_width,
-                    "phi Gravish [-]": known,
-                    "digitising error [-]": DIGITISING_ERROR,
-                    "deviation [-]": mean.value - known,
-                    "deviation [%]": 100 * (mean.value / known - 1),
-                    "deviation 95 % [%]": 100 * mean.half_width / known,
-                }
-            )
+            row = {"stage": stage, "definition": DEFINITION, ASPECT: aspect, SEEDS: mean.count}
+            row |= {"phi [-]": mean.value, "phi 95 % [-]": mean.half_width, "phi Gravish [-]": known}
+            row |= {"digitising error [-]": DIGITISING_ERROR, "deviation [-]": mean.value - known}
+            row["deviation [%]"] = 100 * (mean.value / known - 1)
+            rows.append(row | {"deviation 95 % [%]": 100 * mean.half_width / known})
     return pd.DataFrame(rows)
 
 
@@ -160,7 +135,7 @@ def falls(stage: str) -> Finding:
 
     return Finding(
         id=f"{_id(stage)}-falls",
-        says=f"{_SYMBOLS[stage][0]} falls monotonically with l/w within error bars",
+        says=f"{_SYMBOLS[stage]} falls monotonically with l/w within error bars",
         outcome=outcome,
         found_if="no step between neighbouring l/w rises by more than its 95 % half-width, and the whole change is "
         "beyond its own",
@@ -188,7 +163,7 @@ def near(stage: str) -> Finding:
 
     return Finding(
         id=f"{_id(stage)}-near",
-        says=f"The mean absolute deviation of {_SYMBOLS[stage][0]} from Gravish is at most {ACCEPTED:g} %",
+        says=f"The mean absolute deviation of {_SYMBOLS[stage]} from Gravish is at most {ACCEPTED:g} %",
         outcome=outcome,
         found_if="mean over the l/w at which Gravish has a point",
     )
