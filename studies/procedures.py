@@ -276,7 +276,6 @@ def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, F
 
 BY_SAMPLES = f", summed every {APART:g} s"
 
-_OTHERS_SHAPE, _OTHERS_INTERNAL = (EXTERNAL, INTERNAL), (EXTERNAL, SHAPE)
 PACKING = (
     with_aspect("poured-falls", "φ_0 of the poured pile falls with l/w", only(STATIC), PHI, -1),
     with_aspect("shaken-falls", "External oscillation: φ_f falls with l/w", only(EXTERNAL), PHI_ACTIVE, -1),
